@@ -1,0 +1,99 @@
+"""What a BRDF term is: a quotient times one-dimensional curves, and the parameters that generate the curves.
+
+Eqs. 7 and 9, Ben-Artzi 2006. A term's own file declares one `Term`; the registry lists them; sliders, validation and
+`GET /api/models` are generated from the declaration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+Params = Mapping[str, float]
+
+
+class Angle(IntEnum):
+    """The 1-D parameterisations γ(wi, wo), each an angle in [0, π/2]; computed by `relume.brdf.angles`."""
+
+    THETA_I = 0
+    THETA_H = 1
+    THETA_D = 2
+    THETA_R = 3
+    ALPHA = 4
+    BETA = 5
+    THETA_O = 6
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that generates curves; a look gives one value, or three for separate R, G, B.
+
+    Attributes:
+        unit: "" where the number has none.
+        scale: how a slider moves, "linear" or "log".
+    """
+
+    name: str
+    label: str
+    minimum: float
+    maximum: float
+    default: float
+    unit: str
+    scale: str
+    help: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """An editable factor f(γ) of a term.
+
+    Attributes:
+        angle: which angle γ it is a function of; `THETA_O` curves multiply the finished pixel.
+        generator: (γ in radians (...,) float64, params) -> f(γ) (...,) float64, finite and not negative.
+        parameters: names of the parameters the generator reads.
+        num_bands: J, a power of two.
+        label: what people read, e.g. "half angle θh".
+    """
+
+    name: str
+    label: str
+    angle: Angle
+    generator: Callable[[F64, Params], F64]
+    parameters: tuple[str, ...]
+    num_bands: int
+
+
+@dataclass(frozen=True)
+class Term:
+    """One BRDF term, 1/sr without the cosine: quotient(wi, wo) · Π curves.
+
+    Attributes:
+        model: name in look documents.
+        quotient: ufunc (wi_x, wi_y, wi_z, wo_x, wo_y, wo_z) -> value, local frame, z = normal; float32 and float64
+            loops; zero where either direction is below the horizon.
+        source: the equation it is built from.
+        texture: the texture channel it takes by default, "diffuse" or "specular".
+    """
+
+    model: str
+    label: str
+    parameters: tuple[Parameter, ...]
+    curves: tuple[Curve, ...]
+    quotient: Callable[..., Any]
+    source: str
+    texture: str
+    help: str
+
+    def parameter(self, name: str) -> Parameter:
+        """The declaration of one parameter; KeyError where there is none of that name."""
+        return {p.name: p for p in self.parameters}[name]
+
+    def curve(self, name: str) -> Curve:
+        """The declaration of one curve; KeyError where there is none of that name."""
+        return {c.name: c for c in self.curves}[name]

@@ -1,0 +1,110 @@
+"""Every failure that relume knows by name. Messages end with what to do about it."""
+
+from __future__ import annotations
+
+
+class RelumeError(Exception):
+    """The root of all of them; anything else that escapes is a defect."""
+
+
+class SceneError(RelumeError, ValueError):
+    """A scene or environment file cannot be used as it is."""
+
+
+class MissingNormalsError(SceneError):
+    """A mesh has no normals and none can be made from its triangles."""
+
+
+class ParameterError(RelumeError, ValueError):
+    """A value lies outside what its parameter allows.
+
+    Attributes:
+        name: JSON pointer or name of the parameter.
+        value: what was given.
+        allowed: what would have been accepted, in words.
+    """
+
+    def __init__(self, name: str, value: object, allowed: str) -> None:
+        shown = repr(value)
+        if len(shown) > 80:
+            shown = shown[:77] + "..."
+        super().__init__(f"{name} is {shown}; give {allowed}")
+        self.name, self.value, self.allowed = name, value, allowed
+
+
+class ShapeMismatchError(RelumeError, ValueError):
+    """Two arrays that belong together do not fit."""
+
+
+class PlanError(RelumeError):
+    """A bake or render cannot be planned as asked."""
+
+
+class MemoryBudgetError(PlanError):
+    """A plan needs more than the budget allows; refused before anything is computed."""
+
+    def __init__(self, what: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
+        super().__init__(
+            f"{what} needs {needed_bytes / 1e6:,.0f} MB and {allowed_bytes / 1e6:,.0f} MB are allowed; {remedy}"
+        )
+        self.needed_bytes, self.allowed_bytes = needed_bytes, allowed_bytes
+
+
+class StoreError(RelumeError):
+    """A transfer store cannot be read or written."""
+
+
+class StoreNotFoundError(StoreError, FileNotFoundError):
+    """There is no store where one was expected."""
+
+
+class SchemaVersionError(StoreError):
+    """A store was written by a version of relume whose layout differs."""
+
+    def __init__(self, stored: int, current: int) -> None:
+        super().__init__(f"the store has schema version {stored}, this relume reads {current}; bake the scene again")
+        self.stored, self.current = stored, current
+
+
+class StaleStoreError(StoreError):
+    """A store belongs to another scene or recipe than the one asked for."""
+
+    def __init__(self, stored: str, current: str) -> None:
+        super().__init__(f"the store was baked for {stored}, not for {current}; bake again")
+        self.stored, self.current = stored, current
+
+
+class ChunkDamagedError(StoreError):
+    """A chunk of a store is missing or fails its checksum."""
+
+    def __init__(self, path: str, detail: str) -> None:
+        super().__init__(f"{path} is damaged ({detail}); delete the bake and bake again")
+        self.path = path
+
+
+class EditError(RelumeError):
+    """An edit cannot be applied; the look stays as it was."""
+
+
+class EditNotSupportedError(EditError):
+    """The transfer method of this bake cannot follow such an edit."""
+
+    def __init__(self, method: str, kind: str) -> None:
+        super().__init__(f"a bake of method {method!r} cannot follow an edit of {kind}; bake again for it")
+        self.method, self.kind = method, kind
+
+
+class ProtocolError(RelumeError):
+    """A client broke the rules of the session; carries the WebSocket close code."""
+
+    def __init__(self, message: str, close_code: int) -> None:
+        super().__init__(message)
+        self.close_code = close_code
+
+
+class VersionMismatchError(ProtocolError):
+    """Client and server speak different versions of the session protocol."""
+
+
+class CancelledError(RelumeError):
+    """Work was stopped because somebody asked for it."""

@@ -1,0 +1,114 @@
+"""A scene as relume sees it: triangles in world space, materials by name, cameras, one environment.
+
+Right-handed, +Y up, metres. Importers produce it, bakes read it; nothing changes it afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+U32 = NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image in linear values, ready to be sampled.
+
+    Attributes:
+        pixels: linear RGB, top row first. (height, width, 3) float32
+        wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
+    """
+
+    pixels: F32
+    wrap: tuple[str, str] = ("repeat", "repeat")
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles of one material, node transforms applied.
+
+    Attributes:
+        positions: world space, metres. (num_vertices, 3) float32
+        normals: unit, world space. (num_vertices, 3) float32
+        tangents: unit, world space, with handedness in w; zeros where the file has none. (num_vertices, 4) float32
+        uvs: texture coordinates, v from the top as in glTF; zeros where there are none. (num_vertices, 2) float32
+        faces: counter-clockwise seen from outside. (num_faces, 3) uint32
+        material: index into `Scene.materials`.
+    """
+
+    name: str
+    positions: F32
+    normals: F32
+    tangents: F32
+    uvs: F32
+    faces: U32
+    material: int
+
+
+@dataclass(frozen=True)
+class Material:
+    """A named material: its default terms (look-document form) and its images.
+
+    Attributes:
+        terms: the material's default terms as they stand in a look document.
+        textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
+            `textures["diffuse"]`. Known channels: "diffuse", "specular".
+        normal_map: tangent-space normals in [-1, 1], already scaled; None where there is none.
+        double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
+    """
+
+    name: str
+    terms: tuple[dict[str, Any], ...]
+    textures: dict[str, Texture] = field(default_factory=dict)
+    normal_map: Texture | None = None
+    double_sided: bool = True
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view: looks along its -Z, `yfov` vertical, in radians.
+
+    Attributes:
+        to_world: camera to world. (4, 4) float64, rigid
+    """
+
+    name: str
+    to_world: NDArray[np.float64]
+    yfov: float
+
+
+@dataclass(frozen=True)
+class Environment:
+    """Distant light: equirectangular linear radiance, top row first.
+
+    The direction of texel (u, v), v from the top: u = atan2(z, x)/2π + ½, v = ½ − asin(y)/π.
+
+    Attributes:
+        radiance: finite, not negative. (height, width, 3) float32
+    """
+
+    name: str
+    radiance: F32
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything a bake needs.
+
+    Attributes:
+        id: hash of the content, hexadecimal; the same content has the same id.
+        warnings: what the importer did not understand, one sentence each.
+    """
+
+    id: str
+    name: str
+    meshes: tuple[Mesh, ...]
+    materials: tuple[Material, ...]
+    cameras: tuple[Camera, ...]
+    environment: Environment
+    warnings: tuple[str, ...] = ()

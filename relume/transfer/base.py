@@ -1,0 +1,144 @@
+"""The protocol of a transfer method: plan (pure), tasks, compute (pure), and what a worker needs to run it.
+
+bake (worker, once) → freeze (server, on touch) → frame (server, per edit). A method joins by one module and one line in
+`relume.transfer.registry`, and inherits the contract suite in tests/contract.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.scene.model import Scene
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to bake. The same scene and recipe give the same store, bit for bit.
+
+    Attributes:
+        method: name of a transfer method.
+        views: camera names, in order.
+        size: width and height in pixels.
+        num_lights: triangles that the environment is divided into.
+    """
+
+    method: str
+    views: tuple[str, ...]
+    size: tuple[int, int]
+    num_lights: int
+
+
+@dataclass(frozen=True)
+class ArraySpec:
+    """One Zarr array of a store.
+
+    Attributes:
+        path: inside the store, e.g. "views/front/visibility".
+        chunks: unit of reading. shards: unit of writing; a task owns whole shards.
+    """
+
+    path: str
+    shape: tuple[int, ...]
+    dtype: str
+    chunks: tuple[int, ...]
+    shards: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A piece of a bake that one process computes alone.
+
+    Attributes:
+        stage: index into `TransferMethod.stages`; a stage starts when the one before is complete.
+        index: position within the stage; (stage, index) names the task.
+        view: the view it belongs to, "" for none.
+        start, stop: the rows of the stage's arrays that it owns, shard-aligned.
+    """
+
+    stage: int
+    index: int
+    view: str
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a bake will cost, before anything is traced. Upper bounds.
+
+    Attributes:
+        num_rays: shadow and camera rays.
+        store_bytes: on disk, uncompressed.
+        peak_bytes: memory of one worker process.
+    """
+
+    num_view_samples: int
+    num_rays: int
+    store_bytes: int
+    peak_bytes: int
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a task computed: rows [start, stop) of each array, and what it cost.
+
+    Attributes:
+        arrays: by array path, the task's rows.
+        num_rays: rays traced. trace_s: seconds spent in the tracing kernels alone.
+    """
+
+    arrays: Arrays
+    num_rays: int
+    trace_s: float
+
+
+class StoreReader(Protocol):
+    """Reads what earlier stages wrote; raises `ChunkDamagedError` where a checksum fails."""
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Rows [start, stop) of an array."""
+        ...
+
+    def shape(self, path: str) -> tuple[int, ...]:
+        """Shape of an array."""
+        ...
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """The store's root attributes."""
+        ...
+
+
+class TransferMethod(Protocol):
+    """How one paper's light transport is baked."""
+
+    name: str
+    stages: tuple[str, ...]
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Cost of a bake; pure, traces nothing. Raises PlanError where the recipe does not fit the scene."""
+        ...
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """Root attributes of the store: JSON, enough to open it without the scene."""
+        ...
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The tasks of a stage, given what the stages before it wrote; pure."""
+        ...
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """The arrays that a stage fills and whose shape is known before it runs; pure."""
+        ...
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        """Compute a task's rows; pure, seeded by (scene id, task). Arrays not announced by `arrays` are created
+        by the task itself, whole (the view samples of a view, whose number only tracing tells)."""
+        ...
