@@ -1,0 +1,83 @@
+# The short way to everything. `make demo` and `make test` are all that most people need.
+#
+# Stamp files make reruns instant: what is installed is installed again only when its lock file changes,
+# and the editor is built again only when its sources change.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(VENV)/bin
+PYTHON_STAMP := $(VENV)/.stamp-packages
+PROJECT_STAMP := $(VENV)/.stamp-project
+CLIENT_STAMP := client_web/node_modules/.stamp-packages
+CLIENT_BUILD := client_web/dist/.stamp-build
+CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
+LOCK_TOOLS := build/lock-tools
+
+# Everything that is not slow; browser tests only where there is a browser.
+CHROMIUM := $(firstword $(foreach name,chromium chromium-browser google-chrome,$(shell command -v $(name) 2>/dev/null)))
+MARKERS := not slow$(if $(CHROMIUM),, and not e2e)
+
+.PHONY: help setup demo test test-slow bench lint lock clean client-check
+
+help:  ## what each target does
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
+
+setup: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## virtual environment, packages, the editor's build
+
+demo: setup  ## bake the built-in scene, serve it, open the editor
+	$(BIN)/relume demo $(ARGS)
+
+test: setup lint client-check  ## everything that must hold before a commit
+	$(if $(CHROMIUM),,@echo "No chromium on this machine: the browser tests (marker e2e) are left out.")
+	$(BIN)/python -m pytest -m "$(MARKERS)"
+
+test-slow: setup  ## the long tests
+	$(BIN)/python -m pytest -m slow
+
+bench: setup  ## the project's own figures
+	$(BIN)/relume bench $(ARGS)
+
+lint: $(PROJECT_STAMP)  ## style and types
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+client-check: $(CLIENT_STAMP)
+	cd client_web && npm run --silent typecheck && npm test --silent
+
+lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
+	printf 'hatchling>=1.27\neditables\n' | $(LOCK_TOOLS)/bin/uv $(LOCK_ARGS) --extra dev pyproject.toml - -o requirements.lock
+	printf 'hatchling>=1.27\neditables\n' | $(LOCK_TOOLS)/bin/uv $(LOCK_ARGS) --constraint requirements.lock pyproject.toml - -o docker/requirements.lock
+
+clean:  ## remove what make made; data and bakes stay
+	rm -rf $(VENV) client_web/node_modules client_web/dist build test-results
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Names, versions and hashes only: where packages come from is each machine's own setting.
+LOCK_ARGS := pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+	--no-annotate --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
+
+$(LOCK_TOOLS)/bin/uv:
+	python="$$(.ci/find-python)" && "$$python" -m venv $(LOCK_TOOLS)
+	$(LOCK_TOOLS)/bin/pip install --quiet uv
+
+$(PYTHON_STAMP): requirements.lock
+	python="$$(.ci/find-python)" && { [ -x $(BIN)/python ] || "$$python" -m venv $(VENV); }
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	touch $@
+
+$(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+$(CLIENT_STAMP): client_web/package-lock.json
+	.ci/check-node
+	cd client_web && npm ci --no-audit --no-fund --loglevel=error
+	touch $@
+
+$(CLIENT_BUILD): $(CLIENT_STAMP) $(CLIENT_SOURCES)
+	cd client_web && npm run --silent build
+	touch $@
