@@ -1,0 +1,62 @@
+"""Runs a transfer method into a store: the stages, their arrays, one task. The worker calls these from its processes;
+`bake_here` calls them one after another, for tests, notebooks and measurements."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from relume.errors import StoreError
+from relume.scene.model import Scene
+from relume.store.publish import publish
+from relume.store.reader import open_staging
+from relume.store.writer import StoreWriter, create_store
+from relume.transfer.base import Recipe, Task, TransferMethod, Written
+
+
+def begin(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
+    """Create the store of a bake, or keep the unfinished one that is there."""
+    create_store(staging, method.attributes(scene, recipe))
+
+
+def begin_stage(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
+    """Create the arrays that a stage announces and return its tasks. The stages before it are complete."""
+    reader, writer = open_staging(staging), StoreWriter(staging)
+    for spec in method.arrays(stage, scene, recipe, reader):
+        writer.create_array(spec)
+    return method.tasks(stage, scene, recipe, reader)
+
+
+def run_task(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
+    """Compute a task and write its rows; doing it twice leaves the same bytes."""
+    reader = open_staging(staging)
+    written = method.compute(scene, recipe, task, reader)
+    announced = {spec.path for spec in method.arrays(task.stage, scene, recipe, reader)}
+    writer = StoreWriter(staging)
+    for path, rows in written.arrays.items():
+        if path not in announced:
+            writer.write_whole(path, rows)
+        elif rows.shape[0] != task.stop - task.start:
+            raise StoreError(f"task {task} computed {rows.shape[0]} rows of {path}")
+        else:
+            writer.write(path, rows, task.start)
+    return written
+
+
+def bake_here(
+    method: TransferMethod,
+    scene: Scene,
+    recipe: Recipe,
+    target: Path,
+    progress: Callable[[Task, Written], None] = lambda task, written: None,
+) -> Path:
+    """Bake in this process and thread, and publish at `target`. Returns `target`."""
+    staging = target.with_name(f"{target.name}.staging")
+    shutil.rmtree(staging, ignore_errors=True)
+    begin(method, scene, recipe, staging)
+    for stage in range(len(method.stages)):
+        for task in begin_stage(method, scene, recipe, staging, stage):
+            progress(task, run_task(method, scene, recipe, staging, task))
+    publish(staging, target)
+    return target

@@ -1,0 +1,84 @@
+"""Publishes a finished store: verify every chunk, consolidate metadata, write the manifest, rename into place."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import warnings
+from pathlib import Path
+
+import zarr
+from zarr.storage import LocalStore
+
+from relume.errors import ChunkDamagedError
+from relume.store.files import read_json
+from relume.store.reader import Reader, open_staging, rows_per_shard
+from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
+
+
+def publish(staging: Path, target: Path) -> int:
+    """Make a staging store public, whole or not at all.
+
+    Every chunk is read back first. Files that interrupted writes left behind are removed, so that the same bake gives
+    the same files, byte for byte, however often it was interrupted.
+
+    Args:
+        staging: the finished store, same file system as `target`.
+        target: where readers look for it; an older store there is replaced.
+    Returns:
+        Size of the store in bytes.
+    Raises:
+        ChunkDamagedError: a chunk is missing or damaged.
+    """
+    for leftover in [*staging.rglob("*.partial"), staging / MANIFEST_NAME]:
+        leftover.unlink(missing_ok=True)
+    reader = open_staging(staging)
+    for path in array_paths(staging):
+        _verify(reader, path)
+    with warnings.catch_warnings():
+        # Zarr warns that consolidated metadata is an extension; readers that do not know it fall back.
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(LocalStore(staging))
+    num_bytes = _write_manifest(staging)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        shutil.rmtree(target)
+    staging.rename(target)
+    return num_bytes
+
+
+def array_paths(path: Path) -> list[str]:
+    """Paths of all arrays of a store, sorted."""
+    documents = sorted(path.rglob("zarr.json"))
+    return [str(d.parent.relative_to(path)) for d in documents if read_json(d).get("node_type") == "array"]
+
+
+def _verify(reader: Reader, path: str) -> None:
+    spec = reader.spec(path)
+    step = rows_per_shard(spec)
+    for start in range(0, spec.shape[0], step):
+        reader.read(path, start, min(start + step, spec.shape[0]))
+
+
+def _write_manifest(staging: Path) -> int:
+    files = []
+    for file in sorted(file for file in staging.rglob("*") if file.is_file()):
+        with file.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        files.append({"path": file.relative_to(staging).as_posix(), "bytes": file.stat().st_size, "sha256": digest})
+    text = json.dumps({"schema_version": SCHEMA_VERSION, "files": files}, indent=1)
+    with (staging / MANIFEST_NAME).open("w") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return sum(int(str(entry["bytes"])) for entry in files) + len(text)
+
+
+def verify_manifest(path: Path) -> None:
+    """Compare every file of a published store with its SHA-256. Raises ChunkDamagedError."""
+    for entry in read_json(path / MANIFEST_NAME)["files"]:
+        with (path / entry["path"]).open("rb") as stream:
+            if hashlib.file_digest(stream, "sha256").hexdigest() != entry["sha256"]:
+                raise ChunkDamagedError(entry["path"], "its SHA-256 differs from the manifest")

@@ -1,0 +1,165 @@
+"""Reads a store. Damage is an error with the array's name, never zeros.
+
+Zarr fills what it does not find; here a missing shard, a cut shard and a failed checksum all raise ChunkDamagedError.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from zarr.storage import LocalStore
+
+from relume.errors import ChunkDamagedError, StoreError, StoreNotFoundError
+from relume.store.files import read_json
+from relume.store.schema import (
+    MANIFEST_NAME,
+    check_path,
+    check_version,
+    num_shards,
+    spec_from_metadata,
+)
+from relume.transfer.base import ArraySpec
+
+# Zarr decodes on one event loop and a pool of threads that all readers share; the defaults (10 and 32) only make the
+# threads of a small machine wait for each other. They take effect when zarr first reads.
+zarr.config.set({"async.concurrency": 4, "threading.max_workers": 4})
+
+
+class Reader:
+    """A store open for reading; implements `relume.transfer.base.StoreReader`. Safe to use from several threads."""
+
+    def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
+        self.path = path
+        self._attributes = attributes
+        self._arrays: dict[str, tuple[ArraySpec, zarr.Array[Any]]] = {}
+        self._lock = threading.Lock()
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """The store's root attributes."""
+        return self._attributes
+
+    def spec(self, path: str) -> ArraySpec:
+        """Shape, type, chunks and shards of an array. Raises StoreError where there is none."""
+        return self._open(path)[0]
+
+    def shape(self, path: str) -> tuple[int, ...]:
+        """Shape of an array. Raises StoreError where there is none."""
+        return self.spec(path).shape
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Rows [start, stop) of an array.
+
+        Raises:
+            ChunkDamagedError: a shard is missing or cut, or a checksum fails.
+            StoreError: there is no such array, or the rows lie outside it.
+        """
+        spec, array = self._open(path)
+        stop = spec.shape[0] if stop is None else stop
+        if not 0 <= start <= stop <= spec.shape[0]:
+            raise StoreError(f"rows {start}..{stop} lie outside {path} with {spec.shape[0]} rows")
+        if start == stop or 0 in spec.shape:
+            return np.zeros((stop - start, *spec.shape[1:]), spec.dtype)
+        self._check_shards_exist(spec, start, stop)
+        try:
+            return np.asarray(array[start:stop])
+        except MemoryError:
+            raise
+        except Exception as error:  # zarr and its codecs raise many kinds on damaged bytes
+            raise ChunkDamagedError(path, f"rows {start}..{stop}: {str(error)[:120]}") from error
+
+    def _open(self, path: str) -> tuple[ArraySpec, zarr.Array[Any]]:
+        with self._lock:
+            if path not in self._arrays:
+                try:
+                    metadata = read_json(self.path / check_path(path) / "zarr.json")
+                except StoreNotFoundError as error:
+                    raise StoreError(f"the store has no array {path}; bake the scene again") from error
+                spec = spec_from_metadata(path, metadata)
+                self._arrays[path] = spec, zarr.open_array(LocalStore(self.path, read_only=True), path=path, mode="r")
+            return self._arrays[path]
+
+    def _check_shards_exist(self, spec: ArraySpec, start: int, stop: int) -> None:
+        # An empty file would read as zeros; a shard ends with its index: 16 bytes per chunk and a checksum.
+        index_bytes = 16 * (math.prod(spec.shards) // math.prod(spec.chunks)) + 4
+        per_row = [-(-n // s) for n, s in zip(spec.shape[1:], spec.shards[1:], strict=True)]
+        for row in range(start // spec.shards[0], -(-stop // spec.shards[0])):
+            for index in np.ndindex(*per_row):
+                shard = self.path.joinpath(spec.path, "c", str(row), *map(str, index))
+                if not shard.is_file() or shard.stat().st_size < index_bytes:
+                    raise ChunkDamagedError(spec.path, f"the shard of row {row * spec.shards[0]} is missing or cut")
+
+
+def open_staging(path: Path) -> Reader:
+    """Open a store that is still being written: no manifest yet. Raises StoreNotFoundError, SchemaVersionError."""
+    attributes = read_json(path / "zarr.json").get("attributes")
+    if not isinstance(attributes, dict):
+        raise StoreError(f"{path.name} has no attributes; bake the scene again")
+    check_version(attributes)
+    return Reader(path, attributes)
+
+
+def open_store(path: Path) -> Reader:
+    """Open a published store; checks version, sizes of all files, and that every array has all its shards.
+
+    Checksums of the content are verified when rows are read.
+
+    Raises:
+        StoreNotFoundError: there is no published store.
+        SchemaVersionError: it was written by a relume with another layout.
+        ChunkDamagedError: a file is missing or has another size than when it was published.
+        StoreError: its metadata is unreadable or absurd.
+    """
+    path = Path(path)
+    if not (path / MANIFEST_NAME).is_file():
+        raise StoreNotFoundError(f"there is no complete store {path.name}; bake the scene first")
+    reader = open_staging(path)
+    sizes = _manifest_sizes(path)
+    for name, size in sizes.items():
+        file = path / name
+        if not file.is_file() or file.stat().st_size != size:
+            raise ChunkDamagedError(name, "missing or cut since it was published")
+    for name in sizes:
+        if name.endswith("/zarr.json"):
+            _check_array(path, name, sizes)
+    return reader
+
+
+def _manifest_sizes(path: Path) -> dict[str, int]:
+    """Size in bytes of every file by name; names stay inside the store."""
+    try:
+        sizes = {str(entry["path"]): int(entry["bytes"]) for entry in read_json(path / MANIFEST_NAME)["files"]}
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"the manifest of {path.name} is unreadable; bake the scene again") from error
+    if any(name.startswith("/") or ".." in name.split("/") for name in sizes) or "zarr.json" not in sizes:
+        raise StoreError(f"the manifest of {path.name} names files outside the store; bake the scene again")
+    return sizes
+
+
+def _check_array(path: Path, document: str, sizes: Mapping[str, int]) -> None:
+    metadata = read_json(path / document)
+    if metadata.get("node_type") == "group":
+        return
+    array_path = document.removesuffix("/zarr.json")
+    spec = spec_from_metadata(check_path(array_path), metadata)
+    present = sum(name.startswith(f"{array_path}/c/") for name in sizes)
+    if present != num_shards(spec):
+        raise ChunkDamagedError(array_path, f"{present} shards of {num_shards(spec)}")
+
+
+def stored_bytes(reader: Reader) -> int:
+    """Size of a store's files on disk, in bytes."""
+    return sum(file.stat().st_size for file in reader.path.rglob("*") if file.is_file())
+
+
+def rows_per_shard(spec: ArraySpec) -> int:
+    """Rows that one read should take to touch each shard once and stay near 64 MB."""
+    row_bytes = max(1, math.prod(spec.shape[1:]) * np.dtype(spec.dtype).itemsize)
+    return max(spec.chunks[0], min(spec.shards[0], (64 << 20) // row_bytes // spec.chunks[0] * spec.chunks[0]))

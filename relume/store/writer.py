@@ -1,0 +1,101 @@
+"""Writes a store: arrays from their specifications, rows by whole shards.
+
+Several processes write one store at the same time, each its own shards. A shard appears by rename, so a killed process
+leaves either nothing or a whole shard; what is finished is recorded in the worker's ledger, never read off the files.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from zarr.codecs import Crc32cCodec, ZstdCodec
+from zarr.storage import LocalStore
+
+from relume.errors import StoreError
+from relume.store.files import read_json
+from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
+from relume.transfer.base import ArraySpec
+
+# Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
+ZSTD_LEVEL = 1
+
+
+def create_store(path: Path, attributes: Mapping[str, Any]) -> StoreWriter:
+    """Create an empty store, or open the unfinished one that is there for writing on.
+
+    Args:
+        path: folder of the store; made where it is missing.
+        attributes: JSON; what readers need to understand the arrays.
+    """
+    document = json.loads(json.dumps({**attributes, "schema_version": SCHEMA_VERSION}, sort_keys=True))
+    path.mkdir(parents=True, exist_ok=True)
+    if not (path / "zarr.json").exists():
+        zarr.create_group(LocalStore(path), attributes=document)
+    return StoreWriter(path)
+
+
+class StoreWriter:
+    """An unfinished store, open for writing."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._root = zarr.open_group(LocalStore(path), mode="r+", use_consolidated=False)
+
+    def create_array(self, spec: ArraySpec) -> None:
+        """Create an array; one that is there with the same layout keeps its shards, any other is replaced."""
+        check_spec(spec)
+        if self._spec(spec.path) == spec:
+            return
+        parent, _, _ = spec.path.rpartition("/")
+        if parent:
+            self._root.require_group(parent)
+        self._root.create_array(
+            spec.path,
+            shape=spec.shape,
+            dtype=spec.dtype,
+            chunks=spec.chunks,
+            shards=spec.shards,
+            compressors=(ZstdCodec(level=ZSTD_LEVEL), Crc32cCodec()),
+            filters=None,
+            fill_value=0,
+            overwrite=True,
+            config={"write_empty_chunks": True},
+        )
+
+    def write(self, path: str, rows: NDArray[Any], start: int = 0) -> None:
+        """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
+
+        Raises:
+            StoreError: the rows do not fit the array or cut a shard in two.
+        """
+        spec = self._spec(path)
+        if spec is None:
+            raise StoreError(f"array {path} was not created; announce it, or write it whole with write_whole")
+        stop = start + rows.shape[0]
+        fits = rows.shape[1:] == spec.shape[1:] and rows.dtype == np.dtype(spec.dtype)
+        if not fits or not 0 <= start <= stop <= spec.shape[0]:
+            given, wanted = f"{rows.dtype}{rows.shape}", f"{spec.dtype}{spec.shape}"
+            raise StoreError(f"rows {start}..{stop} {given} do not fit {path} {wanted}")
+        if start % spec.shards[0] or (stop % spec.shards[0] and stop != spec.shape[0]):
+            raise StoreError(f"rows {start}..{stop} of {path} cut a shard of {spec.shards[0]} rows; write whole shards")
+        if rows.size:
+            array = cast("zarr.Array[Any]", self._root[path]).with_config({"write_empty_chunks": True})
+            array[start:stop] = rows
+
+    def write_whole(self, path: str, values: NDArray[Any]) -> None:
+        """Create an array that nobody announced, as large as `values`, and write it."""
+        self.create_array(default_layout(path, values.shape, values.dtype.name, values.dtype.itemsize))
+        self.write(path, values)
+
+    def _spec(self, path: str) -> ArraySpec | None:
+        document = self.path / path / "zarr.json"
+        if not document.exists():
+            return None
+        metadata = read_json(document)
+        return spec_from_metadata(path, metadata) if metadata.get("node_type") == "array" else None

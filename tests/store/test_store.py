@@ -1,0 +1,210 @@
+"""A store keeps what was written, gives the same files for the same input, and never turns damage into zeros."""
+
+import hashlib
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreNotFoundError
+from relume.store import StoreWriter, create_store, open_store, publish
+from relume.store.publish import verify_manifest
+from relume.transfer.base import ArraySpec
+
+ROWS = 100
+SPEC = ArraySpec("views/front/visibility", (ROWS, 7), "uint8", (8, 7), (32, 7))
+
+
+def bits() -> np.ndarray:
+    values = np.random.default_rng(5).integers(0, 256, (ROWS, 7), dtype=np.uint8)
+    values[32:64] = 0  # a shard in full shadow
+    return values
+
+
+def build(folder: Path, order: tuple[int, ...] = (0, 32, 64, 96)) -> Path:
+    staging, target = folder / "staging", folder / "store"
+    writer = create_store(staging, {"method": "fake", "num_lights": 7})
+    writer.create_array(SPEC)
+    for start in order:
+        writer.write(SPEC.path, bits()[start : start + 32], start)
+    writer.write_whole("views/front/depth", np.linspace(0, 1, 5000, dtype=np.float32))
+    publish(staging, target)
+    return target
+
+
+def shards(store: Path) -> list[Path]:
+    return sorted(p for p in (store / SPEC.path / "c").rglob("*") if p.is_file())
+
+
+def tree_hash(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+        digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def test_reopened_store_gives_what_was_written(tmp_path: Path) -> None:
+    reader = open_store(build(tmp_path))
+    assert reader.attributes["num_lights"] == 7
+    assert reader.shape(SPEC.path) == (ROWS, 7)
+    np.testing.assert_array_equal(reader.read(SPEC.path), bits())
+    np.testing.assert_array_equal(reader.read(SPEC.path, 30, 97), bits()[30:97])
+    np.testing.assert_array_equal(reader.read("views/front/depth"), np.linspace(0, 1, 5000, dtype=np.float32))
+
+
+def test_same_input_gives_the_same_files_in_any_order_of_writing(tmp_path: Path) -> None:
+    first, second = build(tmp_path / "a"), build(tmp_path / "b", (96, 32, 0, 64))
+    assert tree_hash(first) == tree_hash(second)
+
+
+def test_shards_of_zeros_are_files_too(tmp_path: Path) -> None:
+    assert len(shards(build(tmp_path))) == 4
+
+
+def test_leftovers_of_an_interrupted_write_are_not_published(tmp_path: Path) -> None:
+    clean = tree_hash(build(tmp_path / "a"))
+    staging = tmp_path / "b" / "staging"
+    create_store(staging, {"method": "fake", "num_lights": 7}).create_array(SPEC)
+    (staging / SPEC.path / "c" / "0").mkdir(parents=True)
+    (staging / SPEC.path / "c" / "0" / "0.1234.partial").write_bytes(b"half")
+    assert tree_hash(build(tmp_path / "b")) == clean
+
+
+def test_readers_in_several_threads_agree(tmp_path: Path) -> None:
+    reader, wrong = open_store(build(tmp_path)), []
+
+    def read(start: int) -> None:
+        for _ in range(10):
+            if not np.array_equal(reader.read(SPEC.path, start, start + 40), bits()[start : start + 40]):
+                wrong.append(start)
+
+    threads = [threading.Thread(target=read, args=(start,)) for start in (0, 20, 40, 60)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+def test_flipped_byte_is_damage(tmp_path: Path) -> None:
+    store = build(tmp_path)
+    data = bytearray(shards(store)[0].read_bytes())
+    data[20] ^= 0xFF
+    shards(store)[0].write_bytes(data)
+    with pytest.raises(ChunkDamagedError, match="views/front/visibility is damaged"):
+        open_store(store).read(SPEC.path)
+    with pytest.raises(ChunkDamagedError):
+        verify_manifest(store)
+    np.testing.assert_array_equal(open_store(store).read(SPEC.path, 32, 100), bits()[32:])
+
+
+@pytest.mark.parametrize("keep", [0, 10, -1])
+def test_cut_shard_is_damage_on_opening_and_on_reading(tmp_path: Path, keep: int) -> None:
+    store = build(tmp_path)
+    reader = open_store(store)
+    shards(store)[2].write_bytes(shards(store)[2].read_bytes()[:keep])
+    with pytest.raises(ChunkDamagedError):
+        open_store(store)
+    with pytest.raises(ChunkDamagedError):
+        reader.read(SPEC.path)
+
+
+def test_missing_shard_is_damage_not_zeros(tmp_path: Path) -> None:
+    store = build(tmp_path)
+    reader = open_store(store)
+    shards(store)[1].unlink()
+    with pytest.raises(ChunkDamagedError, match="missing"):
+        reader.read(SPEC.path)
+    with pytest.raises(ChunkDamagedError):
+        open_store(store)
+
+
+def test_unfinished_bake_is_not_published(tmp_path: Path) -> None:
+    writer = create_store(tmp_path / "staging", {})
+    writer.create_array(SPEC)
+    writer.write(SPEC.path, bits()[:32], 0)
+    with pytest.raises(ChunkDamagedError):
+        publish(tmp_path / "staging", tmp_path / "store")
+    with pytest.raises(StoreNotFoundError):
+        open_store(tmp_path / "store")
+    with pytest.raises(StoreNotFoundError):
+        open_store(tmp_path / "staging")
+
+
+def edit_json(path: Path, **changes: object) -> None:
+    """Change metadata and the manifest's size with it, as somebody who means harm would."""
+    store = next(parent for parent in path.parents if (parent / "manifest.json").exists())
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+    manifest = json.loads((store / "manifest.json").read_text())
+    for entry in manifest["files"]:
+        entry["bytes"] = (store / entry["path"]).stat().st_size
+    (store / "manifest.json").write_text(json.dumps(manifest))
+
+
+def test_other_schema_version_is_refused(tmp_path: Path) -> None:
+    store = build(tmp_path)
+    edit_json(store / "zarr.json", attributes={"schema_version": 99})
+    with pytest.raises(SchemaVersionError, match="99"):
+        open_store(store)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"shape": [10**15, 7]},
+        {"shape": [-1, 7]},
+        {"shape": [10**6, 7]},
+        {"shape": ["x", 7]},
+        {"shape": []},
+        {"data_type": "object"},
+        {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**12, 7]}}},
+        {"codecs": []},
+        {"codecs": [{"name": "bytes"}]},
+    ],
+)
+def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path, changes: dict[str, object]) -> None:
+    store = build(tmp_path)
+    edit_json(store / SPEC.path / "zarr.json", **changes)
+    with pytest.raises(StoreError):
+        open_store(store)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"files": 3}', '{"files": [{"path": "../x", "bytes": 1}]}', "[" * 9999]
+)
+def test_unreadable_manifest_is_refused(tmp_path: Path, text: str) -> None:
+    store = build(tmp_path)
+    (store / "manifest.json").write_text(text)
+    with pytest.raises(StoreError):
+        open_store(store)
+
+
+@pytest.mark.parametrize("path", ["../x", "/x", "a//b", "a/../b", ".x", "a/c/b", "", "a b", "zarr.json"])
+def test_array_paths_stay_inside_the_store(tmp_path: Path, path: str) -> None:
+    writer = create_store(tmp_path, {})
+    with pytest.raises(StoreError):
+        writer.write_whole(path, np.zeros(3, np.float32))
+
+
+def test_rows_that_cut_a_shard_are_refused(tmp_path: Path) -> None:
+    writer = create_store(tmp_path, {})
+    writer.create_array(SPEC)
+    with pytest.raises(StoreError, match="cut a shard"):
+        writer.write(SPEC.path, bits()[:16], 0)
+    with pytest.raises(StoreError, match="do not fit"):
+        writer.write(SPEC.path, bits()[:32].astype(np.float32), 0)
+    with pytest.raises(StoreError, match="not created"):
+        StoreWriter(tmp_path).write("other", bits(), 0)
+
+
+def test_objects_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="numbers only"):
+        create_store(tmp_path, {}).write_whole("x", np.array([{}], dtype=object))
+
+
+def test_empty_arrays_survive(tmp_path: Path) -> None:
+    create_store(tmp_path / "s", {}).write_whole("views/back/depth", np.zeros((0, 3), np.float32))
+    publish(tmp_path / "s", tmp_path / "t")
+    assert open_store(tmp_path / "t").read("views/back/depth").shape == (0, 3)
