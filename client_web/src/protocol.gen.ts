@@ -1,0 +1,286 @@
+// Written by `python -m server.typescript` from the server's models. Do not edit.
+
+
+export const SUBPROTOCOL = "relume.v1";
+
+export const MAX_MESSAGE_BYTES = 65536;
+
+export const MAX_FRAMES_IN_FLIGHT = 2;
+
+/** client → server: this frame was received and shown. */
+export interface AckMessage {
+  type: "ack";
+  frame: number;
+}
+
+/** What to bake. A preset gives size and lights; what is named beside it wins. */
+export interface BakeRequest {
+  scene: string;
+  method?: string;
+  views?: string[] | null;
+  preset?: "preview" | "good" | "final" | null;
+  size?: [number, number] | null;
+  lights?: number | null;
+  dry_run?: boolean;
+}
+
+/** client → server: which pixels does this stretch of a curve light? Answered by a frame of kind "brush". */
+export interface BrushMessage {
+  type: "brush";
+  curve: string;
+  from: number;
+  to: number;
+}
+
+/** client → server: change the look; `revision` must be newer than the last. */
+export interface EditMessage {
+  type: "edit";
+  revision: number;
+  patch: PatchOperation[];
+}
+
+/** One operation of a JSON Patch (RFC 6902) on the look. */
+export interface PatchOperation {
+  op: "replace" | "add" | "remove" | "test";
+  path: string;
+  value?: unknown;
+}
+
+/** client → server: what makes up this pixel? Answered by `ProbeAnswer`. */
+export interface ProbeMessage {
+  type: "probe";
+  view?: string | null;
+  x: number;
+  y: number;
+}
+
+/** A batch of exact pictures; looks may be partial. */
+export interface RenderRequest {
+  bake: string;
+  view: string;
+  looks: Record<string, unknown>[];
+  format: "exr" | "png" | "webp";
+  size?: [number, number] | null;
+}
+
+/** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
+export interface StreamMessage {
+  type: "stream";
+  format: "hdr" | "jpeg" | "auto";
+  quality?: number;
+}
+
+/** client → server: the user opened this curve: freeze it ahead and send its `CurveMessage` from now on. */
+export interface TouchMessage {
+  type: "touch";
+  curve: string;
+}
+
+/** client → server: show this view. `size` is the space the client has; frames come in the baked size. */
+export interface ViewMessage {
+  type: "view";
+  name: string;
+  size?: [number, number] | null;
+}
+
+/** A bake; `progress` 0…1, `problem` one sentence where it failed. */
+export interface BakeBody {
+  id: string;
+  scene: string;
+  state: "queued" | "running" | "ready" | "failed" | "cancelled";
+  progress: number;
+  rays_per_second: number | null;
+  seconds_left: number | null;
+  bytes: number;
+  problem: string | null;
+  recipe: RecipeBody;
+  plan: PlanBody | null;
+}
+
+/** server → client: another bake of the same scene goes on or is ready; open a session on it and send the look. */
+export interface BakeMessage {
+  type: "bake";
+  bake: string;
+  replaces: string;
+  state: string;
+  progress: number;
+  seconds_left: number | null;
+}
+
+/** server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`. */
+export interface CurveMessage {
+  type: "curve";
+  curve: string;
+  revision: number;
+  bands: number[][];
+  generated: number[][];
+  max_degrees: number;
+}
+
+/** The answer to a dry run: nothing was queued. */
+export interface DryRunBody {
+  id: string;
+  recipe: RecipeBody;
+  plan: PlanBody;
+}
+
+/** Header of a binary frame. */
+export interface FrameHeader {
+  frame: number;
+  revision: number;
+  view: string;
+  width: number;
+  height: number;
+  tiles: [number, number, number, number][];
+  format: "rgb9e5" | "jpeg" | "f32" | "r8";
+  exact: boolean;
+  kind: "picture" | "brush";
+  ms: FrameTimes;
+}
+
+/** Milliseconds spent on a frame: edit waiting, updating the picture, encoding. */
+export interface FrameTimes {
+  wait: number;
+  update: number;
+  encode: number;
+}
+
+/** server → client: first message. `revision` is the last one of a resumed session, else 0. */
+export interface HelloMessage {
+  type: "hello";
+  session: string;
+  bake: string;
+  scene: string;
+  look: Record<string, unknown>;
+  revision: number;
+  resumed: boolean;
+  view: string;
+  views: ViewInfo[];
+  materials: string[];
+  resume: string;
+}
+
+/** A saved look in the list of them. */
+export interface LookEntry {
+  name: string;
+  etag: string;
+  modified: string;
+  bytes: number;
+}
+
+/** What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown. */
+export interface PlanBody {
+  view_samples: number;
+  rays: number;
+  store_bytes: number;
+  peak_bytes: number;
+  seconds: number | null;
+}
+
+/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. */
+export interface ProbeAnswer {
+  type: "probe";
+  view: string;
+  x: number;
+  y: number;
+  material: string | null;
+  radiance: [number, number, number];
+  curve: string | null;
+  bands: number[][] | null;
+}
+
+/** RFC 9457. `type` names the kind, `detail` says what happened and what to do. */
+export interface Problem {
+  type: string;
+  title: string;
+  status: number;
+  detail: string;
+  [extra: string]: unknown;
+}
+
+/** server → client: a message was refused; the look stays as it was. */
+export interface ProblemMessage {
+  type: "problem";
+  revision: number | null;
+  problem: Problem;
+}
+
+/** What was asked for, complete. */
+export interface RecipeBody {
+  method: string;
+  views: string[];
+  size: [number, number];
+  lights: number;
+}
+
+/** A batch; `done` of `total` frames are finished. */
+export interface RenderBody {
+  id: string;
+  bake: string;
+  view: string;
+  format: "exr" | "png" | "webp";
+  size: [number, number] | null;
+  state: "queued" | "running" | "ready" | "failed";
+  done: number;
+  total: number;
+  progress: number;
+  problem: string | null;
+}
+
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. */
+export interface SceneBody {
+  id: string;
+  name: string;
+  created: string;
+  views: SceneView[];
+  materials: SceneMaterial[];
+  lights: string[];
+  warnings: string[];
+  triangles: number;
+  thumbnail: string | null;
+  bakes: string[];
+}
+
+/** A material and its default terms, in look-document form. */
+export interface SceneMaterial {
+  name: string;
+  terms: Record<string, unknown>[];
+}
+
+/** A camera; `aspect` is width ÷ height. */
+export interface SceneView {
+  name: string;
+  aspect: number;
+}
+
+/** server → client: something takes time; `progress` 0…1. "ready": frames go on. */
+export interface StatusMessage {
+  type: "status";
+  state: "freezing" | "ready";
+  what: string;
+  progress: number;
+}
+
+/** A baked view and its size in pixels. */
+export interface ViewInfo {
+  name: string;
+  width: number;
+  height: number;
+}
+
+export type ClientMessage =
+  | EditMessage
+  | ViewMessage
+  | AckMessage
+  | StreamMessage
+  | ProbeMessage
+  | BrushMessage
+  | TouchMessage;
+
+export type ServerMessage =
+  | HelloMessage
+  | StatusMessage
+  | ProblemMessage
+  | ProbeAnswer
+  | CurveMessage
+  | BakeMessage;

@@ -1,0 +1,137 @@
+"""Bodies of the REST calls: what is accepted and what is answered."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
+Name = Annotated[str, Field(min_length=1, max_length=256)]
+Side = Annotated[int, Field(ge=1, le=16384)]
+Preset = Literal["preview", "good", "final"]
+ImageFormat = Literal["exr", "png", "webp"]
+MAX_LOOKS = 1000
+
+
+class Body(BaseModel):
+    """The base of all bodies."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class SceneView(Body):
+    """A camera; `aspect` is width ÷ height."""
+
+    name: str
+    aspect: float
+
+
+class SceneMaterial(Body):
+    """A material and its default terms, in look-document form."""
+
+    name: str
+    terms: list[dict[str, Any]]
+
+
+class SceneBody(Body):
+    """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first."""
+
+    id: str
+    name: str
+    created: str
+    views: list[SceneView]
+    materials: list[SceneMaterial]
+    lights: list[str]
+    warnings: list[str]
+    triangles: int
+    thumbnail: str | None
+    bakes: list[str]
+
+
+class BakeRequest(Body):
+    """What to bake. A preset gives size and lights; what is named beside it wins."""
+
+    scene: Id
+    method: Name = "direct"
+    views: Annotated[list[Name], Field(min_length=1, max_length=64)] | None = None
+    preset: Preset | None = None
+    size: tuple[Side, Side] | None = None
+    lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    dry_run: bool = False
+
+
+class PlanBody(Body):
+    """What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown."""
+
+    view_samples: int
+    rays: int
+    store_bytes: int
+    peak_bytes: int
+    seconds: float | None
+
+
+class RecipeBody(Body):
+    """What was asked for, complete."""
+
+    method: str
+    views: list[str]
+    size: tuple[int, int]
+    lights: int
+
+
+class BakeBody(Body):
+    """A bake; `progress` 0…1, `problem` one sentence where it failed."""
+
+    id: str
+    scene: str
+    state: Literal["queued", "running", "ready", "failed", "cancelled"]
+    progress: float
+    rays_per_second: float | None
+    seconds_left: float | None
+    bytes: int
+    problem: str | None
+    recipe: RecipeBody
+    plan: PlanBody | None
+
+
+class DryRunBody(Body):
+    """The answer to a dry run: nothing was queued."""
+
+    id: str
+    recipe: RecipeBody
+    plan: PlanBody
+
+
+class RenderRequest(Body):
+    """A batch of exact pictures; looks may be partial."""
+
+    bake: Id
+    view: Name
+    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
+    format: ImageFormat
+    size: tuple[Side, Side] | None = None
+
+
+class RenderBody(Body):
+    """A batch; `done` of `total` frames are finished."""
+
+    id: str
+    bake: str
+    view: str
+    format: ImageFormat
+    size: tuple[int, int] | None
+    state: Literal["queued", "running", "ready", "failed"]
+    done: int
+    total: int
+    progress: float
+    problem: str | None
+
+
+class LookEntry(Body):
+    """A saved look in the list of them."""
+
+    name: str
+    etag: str
+    modified: str
+    bytes: int

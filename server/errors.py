@@ -1,0 +1,179 @@
+"""The one table from exceptions to HTTP status and WebSocket close code, and the RFC 9457 bodies made from it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import ValidationError
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+
+from relume import errors as relume_errors
+from relume.errors import ProtocolError, RelumeError
+from server.protocol import Problem
+
+log = logging.getLogger(__name__)
+MEDIA_TYPE = "application/problem+json"
+
+CLOSE_GOING_AWAY = 1001
+CLOSE_PROTOCOL = 1002
+CLOSE_POLICY = 1008
+CLOSE_TOO_BIG = 1009
+CLOSE_INTERNAL = 1011
+CLOSE_BUSY = 1013
+CLOSE_NOT_FOUND = 4404
+CLOSE_NO_ACKNOWLEDGEMENT = 4408
+CLOSE_NOT_READY = 4409
+CLOSE_DAMAGED = 4410
+
+
+class NotFoundError(RelumeError):
+    """Nothing of that name is here."""
+
+
+class NotReadyError(RelumeError):
+    """It is here, but it is not in the state that the call needs."""
+
+
+class BusyError(RelumeError):
+    """The server has all it can take; later it may have room."""
+
+
+class TooLargeError(RelumeError):
+    """More was sent than is taken."""
+
+
+class PreconditionFailedError(RelumeError):
+    """Somebody else changed it in the meantime."""
+
+
+class PreconditionRequiredError(RelumeError):
+    """A change must say which version it changes."""
+
+
+class ForbiddenOriginError(RelumeError):
+    """A page of another site called."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a client is told about one kind of exception.
+
+    Attributes:
+        slug: last part of the problem's `type`.
+        close_code: how a session ends that cannot go on because of it.
+    """
+
+    status: int
+    slug: str
+    title: str
+    close_code: int
+
+
+# The first row whose exception fits is taken: subclasses stand before their bases.
+TABLE: Sequence[tuple[type[Exception], Row]] = (
+    (NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
+    (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
+    (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
+    (PreconditionFailedError, Row(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
+    (PreconditionRequiredError, Row(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
+    (ForbiddenOriginError, Row(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
+    (relume_errors.SceneError, Row(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
+    (relume_errors.ParameterError, Row(422, "parameter", "Value not allowed", CLOSE_POLICY)),
+    (relume_errors.ShapeMismatchError, Row(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
+    (relume_errors.MemoryBudgetError, Row(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),
+    (relume_errors.PlanError, Row(422, "plan", "Cannot be planned", CLOSE_INTERNAL)),
+    (relume_errors.StoreNotFoundError, Row(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
+    (relume_errors.StoreError, Row(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
+    (relume_errors.EditNotSupportedError, Row(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
+    (relume_errors.EditError, Row(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
+    (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
+    (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
+    (RelumeError, Row(500, "failure", "Failure", CLOSE_INTERNAL)),
+    (OperationalError, Row(503, "database", "Database not reachable", CLOSE_BUSY)),
+    (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
+)
+DEFECT = Row(500, "defect", "Defect in the server", CLOSE_INTERNAL)
+
+
+def row_of(error: Exception) -> Row:
+    """The table's row for an exception; `DEFECT` for what nobody foresaw."""
+    return next((row for kind, row in TABLE if isinstance(error, kind)), DEFECT)
+
+
+def close_code_of(error: Exception) -> int:
+    """The WebSocket close code with which a session ends."""
+    return error.close_code if isinstance(error, ProtocolError) else row_of(error).close_code
+
+
+def problem_of(error: Exception) -> Problem:
+    """The RFC 9457 body; only messages that relume wrote itself reach the client, never a path or a trace."""
+    row = row_of(error)
+    extra: dict[str, Any] = {}
+    if isinstance(error, relume_errors.ParameterError):
+        extra = {"parameter": error.name, "allowed": error.allowed}
+    if isinstance(error, RelumeError):
+        detail = str(error)
+    elif isinstance(error, OSError):
+        detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
+    else:
+        detail = "look into the server's log and report it"
+    return Problem(type=f"urn:relume:problem:{row.slug}", title=row.title, status=row.status, detail=detail, **extra)
+
+
+def validation_problem(errors: Sequence[Any], status: int = 422) -> Problem:
+    """The body for a request or message that does not have the declared form."""
+    places = [
+        {"pointer": "/" + "/".join(str(part) for part in error["loc"]), "detail": str(error["msg"])[:200]}
+        for error in errors[:20]
+    ]
+    detail = "; ".join(f"{place['pointer']}: {place['detail']}" for place in places[:3])
+    return Problem(
+        type="urn:relume:problem:form", title="Not of the declared form", status=status, detail=detail, errors=places
+    )
+
+
+def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> JSONResponse:
+    """A problem as an HTTP response."""
+    return JSONResponse(problem.model_dump(), problem.status, dict(headers or {}), MEDIA_TYPE)
+
+
+def message_problem(error: ValidationError) -> Problem:
+    """The body for a session message that does not have the declared form."""
+    return validation_problem(error.errors(include_url=False, include_context=False, include_input=False), status=400)
+
+
+def install(app: FastAPI) -> None:
+    """Make every failure of the app an `application/problem+json` response."""
+
+    async def on_known(_: Request, error: Exception) -> JSONResponse:
+        if row_of(error).status >= 500:
+            log.error("%s: %s", type(error).__name__, error)
+        return problem_response(problem_of(error))
+
+    async def on_defect(_: Request, error: Exception) -> JSONResponse:
+        return problem_response(problem_of(error))
+
+    async def on_http(_: Request, error: Exception) -> JSONResponse:
+        assert isinstance(error, HTTPException)
+        title = HTTPStatus(error.status_code).phrase
+        problem = Problem(type="about:blank", title=title, status=error.status_code, detail=str(error.detail))
+        return problem_response(problem, error.headers)
+
+    async def on_validation(_: Request, error: Exception) -> JSONResponse:
+        assert isinstance(error, RequestValidationError)
+        return problem_response(validation_problem(error.errors()))
+
+    for kind in (RelumeError, OperationalError, OSError):
+        app.add_exception_handler(kind, on_known)
+    app.add_exception_handler(HTTPException, on_http)
+    app.add_exception_handler(RequestValidationError, on_validation)
+    app.add_exception_handler(Exception, on_defect)

@@ -1,0 +1,134 @@
+"""What every request passes first: known host name, no foreign page, no body beyond the limit; and the safe headers.
+
+Pure ASGI, so that streaming and WebSockets pass without a detour. A page of another site must neither open a session
+(WebSockets know no same-origin policy) nor send a form; a DNS name that an attacker points here is refused by its Host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
+
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+SECURITY_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; "
+        "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+def host_is_allowed(host: str, allowed_hosts: Sequence[str]) -> bool:
+    """Whether a Host header names this server."""
+    return "*" in allowed_hosts or (urlsplit(f"//{host}").hostname or "") in {h.lower() for h in allowed_hosts}
+
+
+def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
+    """Whether the calling page, if it is one, is ours: its origin's host and port are those of the request."""
+    origin = headers.get("origin")
+    if origin is None or origin in allowed_origins:
+        return True
+    parts = urlsplit(origin)
+    return parts.scheme in ("http", "https") and parts.netloc.lower() == headers.get("host", "").lower()
+
+
+class Guard:
+    """The outermost middleware."""
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        allowed_hosts: Sequence[str],
+        allowed_origins: Sequence[str],
+        max_body_bytes: int,
+        max_upload_bytes: int,
+    ) -> None:
+        self._app = app
+        self._allowed_hosts, self._allowed_origins = allowed_hosts, allowed_origins
+        self._max_body_bytes, self._max_upload_bytes = max_body_bytes, max_upload_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or hand on with counted body and safe headers."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal is not None:
+            await _refuse(refusal, scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._app(scope, receive, send)
+        else:
+            await self._pass(scope, receive, send)
+
+    def _refusal(self, scope: Scope) -> Exception | None:
+        headers = Headers(scope=scope)
+        try:
+            if not host_is_allowed(headers.get("host", ""), self._allowed_hosts):
+                return ForbiddenOriginError("this server is not known by that name; add it to RELUME_ALLOWED_HOSTS")
+            is_safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
+            if not is_safe and not origin_is_allowed(headers, self._allowed_origins):
+                return ForbiddenOriginError("calls from pages of other sites are refused; see RELUME_ALLOWED_ORIGINS")
+            length = headers.get("content-length", "0")
+            if not length.isdecimal() or int(length[:20]) > self._limit(scope):
+                return self._too_large(scope)
+        except ValueError:  # urlsplit on a malformed host or origin
+            return ForbiddenOriginError("the Host or Origin header cannot be read; send a proper one")
+        return None
+
+    def _limit(self, scope: Scope) -> int:
+        return self._max_upload_bytes if scope["path"] == "/api/scenes" else self._max_body_bytes
+
+    def _too_large(self, scope: Scope) -> TooLargeError:
+        return TooLargeError(f"the request is larger than {self._limit(scope):,} bytes; send less")
+
+    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Count the body as it streams in; a limit passed on the way ends in 413 whatever the app makes of it."""
+        num_bytes, is_over, is_started = 0, False, False
+
+        async def counted() -> Message:
+            nonlocal num_bytes, is_over
+            message = await receive()
+            num_bytes += len(message.get("body", b""))
+            if num_bytes > self._limit(scope):
+                is_over = True
+                raise self._too_large(scope)
+            return message
+
+        async def dressed(message: Message) -> None:
+            nonlocal is_started
+            if is_over and not is_started:
+                return
+            if message["type"] == "http.response.start":
+                is_started = True
+                headers = MutableHeaders(scope=message)
+                for name, value in SECURITY_HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        try:
+            await self._app(scope, counted, dressed)
+        except TooLargeError:
+            if is_started:
+                raise
+        if is_over and not is_started:
+            await _refuse(self._too_large(scope), scope, receive, send)
+
+
+async def _refuse(error: Exception, scope: Scope, receive: Receive, send: Send) -> None:
+    problem = problem_of(error)
+    response = problem_response(problem, {"Connection": "close"} if problem.status == 413 else None)
+    if scope["type"] == "websocket" and "websocket.http.response" not in scope.get("extensions", {}):
+        await send({"type": "websocket.close", "code": 1008, "reason": problem.detail})
+    else:
+        await response(scope, receive, send)

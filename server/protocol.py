@@ -1,0 +1,221 @@
+"""Every message of a live session (subprotocol relume.v1), typed once; the editor's TypeScript is generated from here.
+
+Text messages are JSON, at most `MAX_MESSAGE_BYTES`. A binary message is one frame: uint32 little-endian header length,
+JSON header (`FrameHeader`), payload. The payload holds the header's tiles one after another, row-major, top row first:
+"rgb9e5" 4 bytes a pixel, "f32" 12 bytes a pixel, "jpeg" one image of the whole picture, "r8" one byte a pixel
+(frames of kind "brush": 0…255 stands for 0…1).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+SUBPROTOCOL = "relume.v1"
+MAX_MESSAGE_BYTES = 64 * 1024
+MAX_FRAMES_IN_FLIGHT = 2
+
+Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
+Name = Annotated[str, Field(min_length=1, max_length=256)]
+Revision = Annotated[int, Field(ge=0, le=2**53)]
+Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
+Pixel = Annotated[int, Field(ge=0, le=65535)]
+
+
+class Message(BaseModel):
+    """The base of all messages: immutable, nothing beyond what is declared."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PatchOperation(Message):
+    """One operation of a JSON Patch (RFC 6902) on the look."""
+
+    op: Literal["replace", "add", "remove", "test"]
+    path: Annotated[str, Field(max_length=512)]
+    value: Any = None
+
+
+class EditMessage(Message):
+    """client → server: change the look; `revision` must be newer than the last."""
+
+    type: Literal["edit"]
+    revision: Revision
+    patch: Annotated[list[PatchOperation], Field(min_length=1, max_length=256)]
+
+
+class ViewMessage(Message):
+    """client → server: show this view. `size` is the space the client has; frames come in the baked size."""
+
+    type: Literal["view"]
+    name: Name
+    size: tuple[Pixel, Pixel] | None = None
+
+
+class AckMessage(Message):
+    """client → server: this frame was received and shown."""
+
+    type: Literal["ack"]
+    frame: Annotated[int, Field(ge=0, le=2**53)]
+
+
+class StreamMessage(Message):
+    """client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it."""
+
+    type: Literal["stream"]
+    format: Literal["hdr", "jpeg", "auto"]
+    quality: Annotated[int, Field(ge=1, le=95)] = 80
+
+
+class ProbeMessage(Message):
+    """client → server: what makes up this pixel? Answered by `ProbeAnswer`."""
+
+    type: Literal["probe"]
+    view: Name | None = None
+    x: Pixel
+    y: Pixel
+
+
+class BrushMessage(Message):
+    """client → server: which pixels does this stretch of a curve light? Answered by a frame of kind "brush"."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
+
+    type: Literal["brush"]
+    curve: Pointer
+    from_degrees: Degrees = Field(alias="from")
+    to_degrees: Degrees = Field(alias="to")
+
+
+class TouchMessage(Message):
+    """client → server: the user opened this curve: freeze it ahead and send its `CurveMessage` from now on."""
+
+    type: Literal["touch"]
+    curve: Pointer
+
+
+ClientMessage = Annotated[
+    EditMessage
+    | ViewMessage
+    | AckMessage
+    | StreamMessage
+    | ProbeMessage
+    | BrushMessage
+    | TouchMessage,
+    Field(discriminator="type"),
+]
+CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
+
+
+class Problem(BaseModel):
+    """RFC 9457. `type` names the kind, `detail` says what happened and what to do."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    type: str
+    title: str
+    status: int
+    detail: str
+
+
+class ViewInfo(Message):
+    """A baked view and its size in pixels."""
+
+    name: str
+    width: int
+    height: int
+
+
+class HelloMessage(Message):
+    """server → client: first message. `revision` is the last one of a resumed session, else 0."""
+
+    type: Literal["hello"] = "hello"
+    session: str
+    bake: str
+    scene: str
+    look: dict[str, Any]
+    revision: int
+    resumed: bool
+    view: str
+    views: list[ViewInfo]
+    materials: list[str]
+    resume: str
+
+
+class StatusMessage(Message):
+    """server → client: something takes time; `progress` 0…1. "ready": frames go on."""
+
+    type: Literal["status"] = "status"
+    state: Literal["freezing", "ready"]
+    what: str
+    progress: float
+
+
+class ProblemMessage(Message):
+    """server → client: a message was refused; the look stays as it was."""
+
+    type: Literal["problem"] = "problem"
+    revision: int | None
+    problem: Problem
+
+
+class ProbeAnswer(Message):
+    """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel."""
+
+    type: Literal["probe"] = "probe"
+    view: str
+    x: int
+    y: int
+    material: str | None
+    radiance: tuple[float, float, float]
+    curve: str | None
+    bands: list[list[float]] | None
+
+
+class CurveMessage(Message):
+    """server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`."""
+
+    type: Literal["curve"] = "curve"
+    curve: str
+    revision: int
+    bands: list[list[float]]
+    generated: list[list[float]]
+    max_degrees: float = 90.0
+
+
+class BakeMessage(Message):
+    """server → client: another bake of the same scene goes on or is ready; open a session on it and send the look."""
+
+    type: Literal["bake"] = "bake"
+    bake: str
+    replaces: str
+    state: str
+    progress: float
+    seconds_left: float | None
+
+
+ServerMessage = HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage
+
+
+class FrameTimes(Message):
+    """Milliseconds spent on a frame: edit waiting, updating the picture, encoding."""
+
+    wait: float
+    update: float
+    encode: float
+
+
+class FrameHeader(Message):
+    """Header of a binary frame."""
+
+    frame: int
+    revision: int
+    view: str
+    width: int
+    height: int
+    tiles: list[tuple[int, int, int, int]]
+    format: Literal["rgb9e5", "jpeg", "f32", "r8"]
+    exact: bool
+    kind: Literal["picture", "brush"]
+    ms: FrameTimes

@@ -1,0 +1,54 @@
+"""What an operator may set, each by an environment variable RELUME_<NAME>."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from platformdirs import user_data_dir
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+GIB = 1024**3
+
+
+def _quarter_of_memory() -> int:
+    """A quarter of the machine's memory in bytes, at most 6 GiB."""
+    try:
+        total_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (ValueError, OSError, AttributeError):  # not every system tells
+        total_bytes = 4 * GIB
+    return min(total_bytes // 4, 6 * GIB)
+
+
+class Settings(BaseSettings):
+    """Settings of one server process; unknown RELUME_ variables are left to the other parts."""
+
+    model_config = SettingsConfigDict(env_prefix="RELUME_", env_ignore_empty=True, extra="ignore")
+
+    data: Path = Field(default_factory=lambda: Path(user_data_dir("relume")), description="data directory")
+    database: str = Field(default="", description="SQLAlchemy URL; empty: relume.db in the data directory")
+    host: str = Field(default="127.0.0.1", description="address to listen on")
+    port: int = Field(default=8420, ge=0, le=65535, description="port to listen on")
+    scheduler: str | None = Field(default=None, description="tcp://… of a Dask scheduler; unset: an embedded worker")
+    client: Path = Field(
+        default=Path(__file__).resolve().parent.parent / "client_web" / "dist", description="the built editor"
+    )
+    cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of the frozen caches")
+    max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
+    max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
+    max_sessions: int = Field(default=32, ge=1, description="live sessions at once")
+    import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
+    import_bytes: int = Field(default=8 * GIB, gt=0, description="address space a scene import may use")
+    ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
+    resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")
+    allowed_origins: list[str] = Field(default=[], description="origins besides the server's own, as JSON list")
+    allowed_hosts: list[str] = Field(
+        default=["localhost", "127.0.0.1", "::1"],
+        description='names by which clients reach the server, as JSON list; ["*"] for any',
+    )
+
+    @property
+    def database_url(self) -> str:
+        """The SQLAlchemy URL that is meant."""
+        return self.database or f"sqlite:///{self.data / 'relume.db'}"
