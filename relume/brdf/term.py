@@ -68,6 +68,11 @@ class Curve:
     parameters: tuple[str, ...]
     num_bands: int
 
+    @property
+    def outgoing(self) -> bool:
+        """Whether it depends on wo alone and so multiplies the finished sample instead of entering the transport."""
+        return self.angle is Angle.THETA_O
+
 
 @dataclass(frozen=True)
 class Term:

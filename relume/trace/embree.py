@@ -1,0 +1,137 @@
+"""Embree 4 through its C interface: the packet calls that embreex's own wrapper does not offer.
+
+The library is the one that the embreex wheel bundles. Numba kernels receive `occluded16` and `intersect16` as first-class
+functions and call them without the interpreter: 16 rays a call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import glob
+import os
+from dataclasses import dataclass
+
+import embreex
+import embreex.rtcore  # noqa: F401  (loads the libraries that the bundled Embree depends on)
+import numba as nb
+import numba.experimental.function_type  # noqa: F401  (teaches Numba to type functions given by address)
+import numpy as np
+from numba.core import types
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+
+_POINTER, _WORD = ctypes.c_void_p, ctypes.c_uint64
+_TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9003
+_COHERENT, _FEATURE_TRIANGLE = 1 << 16, 2
+_BUILD_QUALITY_MEDIUM = 1
+
+PacketCall = types.void(types.int64, types.int64, types.int64, types.int64)
+
+
+def _open_library() -> ctypes.CDLL:
+    folder = os.path.join(os.path.dirname(os.path.dirname(embreex.__file__)), "embreex.libs")
+    found = sorted(glob.glob(os.path.join(glob.escape(folder), "libembree4*")))
+    if not found:
+        raise ImportError("the embreex wheel bundles no Embree library here; install embreex from a binary wheel")
+    return ctypes.CDLL(found[0])
+
+
+_library = _open_library()
+
+
+def _function(name: str, result: type | None, *arguments: type) -> ctypes._NamedFuncPointer:
+    function = getattr(_library, name)
+    function.restype, function.argtypes = result, arguments
+    return function  # type: ignore[no-any-return]
+
+
+_new_device = _function("rtcNewDevice", _POINTER, ctypes.c_char_p)
+_release_scene = _function("rtcReleaseScene", None, _POINTER)
+_release_geometry = _function("rtcReleaseGeometry", None, _POINTER)
+_new_scene = _function("rtcNewScene", _POINTER, _POINTER)
+_set_quality = _function("rtcSetSceneBuildQuality", None, _POINTER, ctypes.c_int)
+_new_geometry = _function("rtcNewGeometry", _POINTER, _POINTER, ctypes.c_int)
+_set_buffer = _function(
+    "rtcSetNewGeometryBuffer",
+    _POINTER, _POINTER, ctypes.c_int, ctypes.c_uint, ctypes.c_int, ctypes.c_size_t, ctypes.c_size_t,
+)  # fmt: skip
+_commit_geometry = _function("rtcCommitGeometry", None, _POINTER)
+_attach_geometry = _function("rtcAttachGeometry", ctypes.c_uint, _POINTER, _POINTER)
+_commit_scene = _function("rtcCommitScene", None, _POINTER)
+_device_error = _function("rtcGetDeviceError", ctypes.c_int, _POINTER)
+
+_device = _new_device(b"threads=1")
+
+
+class _ByAddress(types.WrapperAddressProtocol):  # type: ignore[misc]
+    """A C function that Numba calls by address; typed, so that compiled kernels are cached on disk."""
+
+    def __init__(self, name: str) -> None:
+        self._address = ctypes.cast(getattr(_library, name), _POINTER).value
+
+    def __wrapper_address__(self) -> int:
+        assert self._address is not None
+        return self._address
+
+    def signature(self) -> object:
+        return PacketCall
+
+
+occluded16 = _ByAddress("rtcOccluded16")
+intersect16 = _ByAddress("rtcIntersect16")
+
+
+def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
+    """RTCOccludedArguments / RTCIntersectArguments: flags, feature mask, and three empty pointers."""
+    words = np.zeros(5, np.uint64)
+    halves = words.view(np.uint32)
+    halves[0] = _COHERENT if coherent else 0
+    halves[1] = _FEATURE_TRIANGLE
+    return words
+
+
+@nb.njit(nogil=True, cache=True)
+def aligned(num_floats):  # type: ignore[no-untyped-def]
+    """Zeroed float32 memory on a 64-byte boundary, as Embree's 16-wide packets need it. (num_floats,)"""
+    raw = np.zeros(num_floats + 16, np.float32)
+    skip = (64 - raw.ctypes.data % 64) // 4 % 16
+    return raw[skip : skip + num_floats]
+
+
+@dataclass(frozen=True)
+class EmbreeScene:
+    """Committed triangles; `handle` goes to the kernels. Released with the object."""
+
+    handle: int
+
+    @classmethod
+    def build(cls, positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> EmbreeScene:
+        """Build the acceleration structure.
+
+        Args:
+            positions: (num_vertices, 3) float32, finite. faces: (num_faces, 3) uint32.
+        Raises:
+            SceneError: Embree refused the geometry.
+        """
+        scene = _new_scene(_device)
+        _set_quality(scene, _BUILD_QUALITY_MEDIUM)
+        geometry = _new_geometry(_device, _TRIANGLE)
+        for kind, layout, rows in (
+            (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
+            (_INDEX_BUFFER, _UINT3, np.ascontiguousarray(faces, np.uint32)),
+        ):
+            memory = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
+            if not memory:
+                raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
+            ctypes.memmove(memory, rows.ctypes.data, rows.nbytes)
+        _commit_geometry(geometry)
+        _attach_geometry(scene, geometry)
+        _release_geometry(geometry)
+        _commit_scene(scene)
+        if error := _device_error(_device):
+            raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
+        return cls(scene)
+
+    def __del__(self) -> None:
+        _release_scene(self.handle)

@@ -1,0 +1,64 @@
+"""All triangles of a scene in one set of arrays, as the kernels want them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.model import Scene
+from relume.trace.embree import EmbreeScene
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Merged meshes.
+
+    Attributes:
+        positions, normals: (num_vertices, 3) float32. tangents: (num_vertices, 4). uvs: (num_vertices, 2).
+        faces: (num_faces, 3) uint32 into the above.
+        face_material: index into the scene's materials. (num_faces,) int32
+        face_mesh: index into the scene's meshes. (num_faces,) int32
+        epsilon: how far ray origins are moved off the surface, metres.
+    """
+
+    positions: F32
+    normals: F32
+    tangents: F32
+    uvs: F32
+    faces: NDArray[np.uint32]
+    face_material: NDArray[np.int32]
+    face_mesh: NDArray[np.int32]
+    embree: EmbreeScene
+    epsilon: float
+
+
+def merge(scene: Scene) -> Geometry:
+    """Merge the meshes of a scene and build Embree's tree over them.
+
+    Raises:
+        SceneError: the scene has no triangles.
+    """
+    if not any(len(mesh.faces) for mesh in scene.meshes):
+        raise SceneError("the scene has no triangles; add a mesh")
+    first = np.cumsum([0, *(len(mesh.positions) for mesh in scene.meshes)])
+    positions = np.concatenate([mesh.positions for mesh in scene.meshes])
+    faces = np.concatenate([mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)])
+    counts = [len(mesh.faces) for mesh in scene.meshes]
+    # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
+    reach = float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
+    return Geometry(
+        positions=positions,
+        normals=np.concatenate([mesh.normals for mesh in scene.meshes]),
+        tangents=np.concatenate([mesh.tangents for mesh in scene.meshes]),
+        uvs=np.concatenate([mesh.uvs for mesh in scene.meshes]),
+        faces=faces,
+        face_material=np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32),
+        face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
+        embree=EmbreeScene.build(positions, faces),
+        epsilon=1e-5 * reach,
+    )

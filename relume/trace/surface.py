@@ -1,0 +1,126 @@
+"""Points on surfaces: interpolated position, normals, tangent and textures of ray hits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.scene.model import Material
+from relume.trace.geometry import Geometry
+from relume.trace.primary import Hits
+from relume.trace.texture import MipMap
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """n points with their shading frames; turned to the viewer.
+
+    Attributes:
+        position: (n, 3) float32, moved off the surface by the scene's epsilon.
+        normal: shading normal, in the hemisphere of the viewer. (n, 3) float32
+        tangent: unit, across `normal`. (n, 3) float32
+        diffuse, specular: texture channels, 1 where the material has none. (n, 3) float32
+    """
+
+    position: F32
+    normal: F32
+    tangent: F32
+    diffuse: F32
+    specular: F32
+
+
+def _unit(v: F32, otherwise: F32) -> F32:
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.where(length > 1e-12, v / np.maximum(length, 1e-12), otherwise).astype(np.float32)
+
+
+def _any_tangent(normal: F32) -> F32:
+    """A unit vector across each normal (Duff 2017)."""
+    x, y, z = normal.T
+    sign = np.where(z >= 0, 1.0, -1.0)
+    a = -1.0 / (sign + z)
+    return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1).astype(np.float32)
+
+
+def _across(vector: F32, normal: F32) -> F32:
+    """The part of `vector` across `normal`, unit; any direction across it where there is none."""
+    across = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
+    return _unit(across, _any_tangent(normal))
+
+
+def surface_at(
+    geometry: Geometry,
+    hits: Hits,
+    directions: F32,
+    materials: Sequence[Material] = (),
+    pixel_angle: float = 0.0,
+    origin: F32 | None = None,
+) -> Surface:
+    """Interpolate the surface at ray hits.
+
+    Args:
+        directions: unit, of the rays. (n, 3) float32
+        materials: where given, textures and normal maps are evaluated, filtered over the pixel.
+        pixel_angle: angle that a pixel spans, radians. origin: of the rays. (3,) float32
+    Returns:
+        Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
+    """
+    hit = hits.face >= 0
+    corners = geometry.faces[np.maximum(hits.face, 0)]
+    b = np.stack([1 - hits.uv.sum(axis=1), hits.uv[:, 0], hits.uv[:, 1]], axis=1).astype(np.float32)[:, :, None]
+    p = geometry.positions[corners]
+    face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    twice_area = np.linalg.norm(face_normal, axis=1)
+    face_normal = _unit(face_normal, -directions)
+    face_normal *= -np.sign(np.einsum("nc,nc->n", face_normal, directions) + 1e-30)[:, None].astype(np.float32)
+    normal = _unit((geometry.normals[corners] * b).sum(axis=1), face_normal)
+    normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
+    tangents = (geometry.tangents[corners] * b).sum(axis=1)
+    uv = (geometry.uvs[corners] * b).sum(axis=1)
+    position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
+    diffuse, specular = np.ones((2, *position.shape), np.float32)
+    if materials and origin is not None:
+        uv_area = np.abs(np.cross(np.diff(geometry.uvs[corners], axis=1)[:, 0], np.diff(geometry.uvs[corners], axis=1)[:, 1]))
+        distance = np.where(hit, hits.distance, 1.0)
+        cosine = np.maximum(-np.einsum("nc,nc->n", face_normal, directions), 0.05)
+        # side of the pixel's footprint in uv: its area over the triangle's, in texture space
+        footprint = distance * pixel_angle * np.sqrt(uv_area / np.maximum(twice_area, 1e-20) / cosine)
+        material = np.where(hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
+        for index, m in enumerate(materials):
+            rows = np.nonzero(material == index)[0]
+            for name, out in (("diffuse", diffuse), ("specular", specular)):
+                if name in m.textures and len(rows):
+                    out[rows] = MipMap.of(m.textures[name]).sample(uv[rows], footprint[rows])
+            if m.normal_map is not None and len(rows):
+                mapped = MipMap.of(m.normal_map).sample(uv[rows], footprint[rows])
+                normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
+    normal = _towards(normal, directions)
+    return Surface(
+        np.where(hit[:, None], position, directions).astype(np.float32),
+        np.where(hit[:, None], normal, -directions).astype(np.float32),
+        _across(tangents[:, :3], normal),
+        diffuse,
+        specular,
+    )
+
+
+def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:
+    """Turn tangent-space normals into world space, kept on the outer side of the face."""
+    tangent = _across(tangents[:, :3], normal)
+    bitangent = np.cross(normal, tangent) * np.where(tangents[:, 3:] < 0, -1, 1)
+    world = mapped[:, :1] * tangent + mapped[:, 1:2] * bitangent + mapped[:, 2:] * normal
+    world = _unit(world, normal)
+    below = np.einsum("nc,nc->n", world, face_normal)[:, None] <= 0
+    return np.where(below, normal, world).astype(np.float32)
+
+
+def _towards(normal: F32, directions: F32) -> F32:
+    """Bend shading normals that face away from the viewer just into view, so that no sample is lost to interpolation."""
+    facing = -np.einsum("nc,nc->n", normal, directions)
+    lacking = np.maximum(0.01 - facing, 0)[:, None]
+    return _unit(normal - lacking * directions, -directions)

@@ -1,0 +1,94 @@
+"""Filtered texture lookups: a mip pyramid, trilinear."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.scene.model import Texture
+
+F32 = NDArray[np.float32]
+
+
+class MipMap:
+    """A texture and its halvings down to one texel."""
+
+    def __init__(self, texture: Texture) -> None:
+        self.wrap = texture.wrap
+        self.levels = [np.asarray(texture.pixels, np.float32)]
+        while max(self.levels[-1].shape[:2]) > 1:
+            self.levels.append(_halve(self.levels[-1]))
+
+    @staticmethod
+    def of(texture: Texture) -> MipMap:
+        """The pyramid of a texture, kept for the next call with the same one."""
+        return _pyramid(_ByIdentity(texture))
+
+    def sample(self, uv: F32, footprint: F32) -> F32:
+        """Filtered values.
+
+        Args:
+            uv: v from the top. (n, 2) float32. footprint: side of the filter in uv. (n,) float32
+        Returns:
+            (n, 3) float32
+        """
+        texels = np.maximum(footprint * max(self.levels[0].shape[:2]), 1.0)
+        level = np.minimum(np.log2(texels), len(self.levels) - 1)
+        lower = np.floor(level).astype(np.int64)
+        out = np.zeros((len(uv), 3), np.float32)
+        for k in np.unique(np.concatenate([lower, np.minimum(lower + 1, len(self.levels) - 1)])):
+            share = np.maximum(1 - np.abs(level - k), 0)
+            rows = np.nonzero(share > 0)[0]
+            out[rows] += (share[rows, None] * self._bilinear(int(k), uv[rows])).astype(np.float32)
+        return out
+
+    def _bilinear(self, k: int, uv: F32) -> F32:
+        image = self.levels[k]
+        height, width = image.shape[:2]
+        x = uv[:, 0].astype(np.float64) * width - 0.5
+        y = uv[:, 1].astype(np.float64) * height - 0.5
+        x0, y0 = np.floor(x), np.floor(y)
+        fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+        columns = [_wrapped(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
+        rows = [_wrapped(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
+        top = image[rows[0], columns[0]] * (1 - fx) + image[rows[0], columns[1]] * fx
+        bottom = image[rows[1], columns[0]] * (1 - fx) + image[rows[1], columns[1]] * fx
+        return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
+
+
+class _ByIdentity:
+    """A texture as a key: its arrays are not hashable, and equal content is not worth comparing."""
+
+    def __init__(self, texture: Texture) -> None:
+        self.texture = texture
+
+    def __hash__(self) -> int:
+        return id(self.texture)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByIdentity) and other.texture is self.texture
+
+
+@lru_cache(maxsize=32)
+def _pyramid(key: _ByIdentity) -> MipMap:
+    return MipMap(key.texture)
+
+
+def _halve(image: F32) -> F32:
+    height, width = image.shape[:2]
+    padded = np.pad(image, ((0, height % 2 if height > 1 else 1), (0, width % 2 if width > 1 else 1), (0, 0)), mode="edge")
+    return np.asarray(
+        (padded[0::2, 0::2] + padded[1::2, 0::2] + padded[0::2, 1::2] + padded[1::2, 1::2]) / 4, np.float32
+    )
+
+
+def _wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int64]:
+    """Texel indices inside the image. Indices far outside stay exact: they are reduced in float64."""
+    if wrap == "clamp":
+        return np.clip(index, 0, size - 1).astype(np.int64)
+    if wrap == "mirror":
+        folded = np.mod(index, 2 * size)
+        return np.minimum(folded, 2 * size - 1 - folded).astype(np.int64)
+    return np.mod(index, size).astype(np.int64)
