@@ -1,0 +1,35 @@
+"""lambert: the ideal diffuse term. Quotient 1/π; one curve over θi, which is one until it is drawn by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relume.brdf.local import ZERO, quotient_ufunc
+from relume.brdf.term import F64, Angle, Curve, Params, Term
+
+
+@quotient_ufunc
+def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
+    """1/π above the horizon, 1/sr."""
+    if wi_z <= ZERO or wo_z <= ZERO:
+        return ZERO
+    return 1.0 / math.pi
+
+
+def one(theta_i: F64, params: Params) -> F64:
+    """The same reflectance at every angle."""
+    return np.ones_like(theta_i)
+
+
+LAMBERT = Term(
+    model="lambert",
+    label="Lambert (diffuse)",
+    parameters=(),
+    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, one, (), 64),),
+    quotient=quotient,
+    source="Lambert 1760: f = 1/π",
+    texture="diffuse",
+    help="Light scattered evenly in all directions; the colour is the albedo.",
+)
