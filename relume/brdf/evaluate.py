@@ -1,0 +1,68 @@
+"""The whole BRDF of a term in plain NumPy, float64, its curves at exact angles: what frames are compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from relume.brdf.curves import curve_values
+from relume.brdf.registry import TERMS
+from relume.brdf.term import F64, Angle
+
+
+def _normalise(v: F64) -> F64:
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    # opposite directions have no half vector; the value does not matter, such pairs lie on the horizon
+    return np.asarray(v / np.where(length > 0, length, 1.0))
+
+
+def angles_numpy(angle: Angle, wi: F64, wo: F64) -> F64:
+    """γ(wi, wo) in radians, clamped to [0, π/2].
+
+    Definitions: `THETA_R` between wi and the reflection of wo about the normal; `ALPHA` and `BETA` by eqs. 15 and 16,
+    Ben-Artzi 2006: cos γα = (cos θh)^(cos² φh), cos γβ = (cos θh)^(sin² φh), φh from the tangent x.
+
+    Args:
+        wi, wo: local frame, unit, z = normal. (..., 3)
+    Returns:
+        (...) float64
+    """
+    wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
+    half = _normalise(wi + wo)
+    cos_theta_h = np.clip(half[..., 2], 0.0, 1.0)
+    match angle:
+        case Angle.THETA_I:
+            cosine = wi[..., 2]
+        case Angle.THETA_O:
+            cosine = wo[..., 2]
+        case Angle.THETA_H:
+            cosine = cos_theta_h
+        case Angle.THETA_D:
+            cosine = np.sum(half * wi, axis=-1)
+        case Angle.THETA_R:
+            cosine = np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1)
+        case Angle.ALPHA | Angle.BETA:
+            phi_h = np.arctan2(half[..., 1], half[..., 0])
+            cosine = cos_theta_h ** np.square(np.cos(phi_h) if angle is Angle.ALPHA else np.sin(phi_h))
+    return np.arccos(np.clip(cosine, 0.0, 1.0))
+
+
+def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
+    """BRDF of one term: colour · quotient · Π curves.
+
+    Args:
+        term_document: one term of a complete look: model, color, params, curves.
+        wi, wo: directions to light and viewer, local frame, unit, z = normal, x = tangent; they broadcast. (..., 3)
+    Returns:
+        1/sr, no cosine. (..., 3) float64; zero below the horizon. Textures are not part of it.
+    """
+    term = TERMS[term_document["model"]]
+    wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
+    value = term.quotient(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0))[..., None]
+    value = value * np.asarray(term_document.get("color", (1.0, 1.0, 1.0)), np.float64)
+    for curve in term.curves:
+        gamma = angles_numpy(curve.angle, wi, wo)
+        value = value * np.moveaxis(curve_values(term_document, curve, gamma), 0, -1)
+    return np.asarray(value)
