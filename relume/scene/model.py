@@ -90,10 +90,12 @@ class Environment:
 
     Attributes:
         radiance: finite, not negative. (height, width, 3) float32
+        warnings: what had to be repaired when it was read, one sentence each.
     """
 
     name: str
     radiance: F32
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

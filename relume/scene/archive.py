@@ -1,0 +1,221 @@
+"""A scene as a folder: scene.json (words and numbers) and arrays.npz (arrays), named by the hash of its content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import tempfile
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+from numpy.lib import format as npy_format
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.checks import check_scene
+from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+
+FORMAT_VERSION = 1
+MAX_JSON_BYTES = 64 << 20
+MAX_ARRAY_BYTES = 16 << 30
+MESH_ARRAYS = ("positions", "normals", "tangents", "uvs", "faces")
+REMEDY = "import the scene again"
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def make_scene(
+    name: str,
+    meshes: Sequence[Mesh],
+    materials: Sequence[Material],
+    cameras: Sequence[Camera],
+    environment: Environment,
+    warnings: Sequence[str] = (),
+) -> Scene:
+    """Checks the parts and joins them to a scene that knows its id.
+
+    Raises:
+        SceneError: the parts do not make a scene (see `relume.scene.checks`).
+    """
+    check_scene(meshes, materials, cameras, environment)
+    scene = Scene("", name, tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings))
+    document, arrays = _describe(scene)
+    return replace(scene, id=scene_id(document, arrays))
+
+
+def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
+    """First 16 hexadecimal digits of SHA-256 over all arrays and all that stands in the document but warnings."""
+    digest = hashlib.sha256()
+    content = {key: value for key, value in document.items() if key not in ("id", "warnings")}
+    digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
+    for key in sorted(arrays):
+        array = np.ascontiguousarray(arrays[key])
+        digest.update(f"{key} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.data)
+    return digest.hexdigest()[:16]
+
+
+def save_scene(scene: Scene, folder: str | Path) -> None:
+    """Writes the scene into `folder` (made where missing); readers see the old files or the new, never half of one."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    document, arrays = _describe(scene)
+    document["id"] = scene.id
+    with _Replacing(folder / "arrays.npz") as arrays_file:
+        np.savez(arrays_file, allow_pickle=False, **arrays)
+    with _Replacing(folder / "scene.json") as json_file:
+        json_file.write(json.dumps(document, indent=1, allow_nan=False).encode())
+
+
+def load_scene(folder: str | Path) -> Scene:
+    """Reads what `save_scene` wrote.
+
+    Raises:
+        SceneError: a file is missing, damaged, larger than allowed, or does not hash to the id it claims.
+    """
+    folder = Path(folder)
+    try:
+        document = _read_document(folder / "scene.json")
+        arrays = _read_arrays(folder / "arrays.npz")
+        scene = _assemble(document, arrays)
+    except FileNotFoundError:
+        raise SceneError(f"there is no scene in {folder.name!r}; {REMEDY}") from None
+    except SceneError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, zipfile.BadZipFile) as problem:
+        detail = str(problem).partition("\n")[0] or type(problem).__name__
+        raise SceneError(f"the scene in {folder.name!r} is damaged ({detail}); {REMEDY}") from None
+    check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment)
+    if scene_id(*_describe(scene)) != scene.id:
+        raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
+    return scene
+
+
+class _Replacing:
+    """A file that takes its name only when it is complete and on the disk."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> BinaryIO:
+        handle, self._temporary = tempfile.mkstemp(prefix=".", suffix=".part", dir=self._path.parent)
+        self._file = os.fdopen(handle, "wb")
+        return self._file
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        try:
+            if kind is None:
+                self._file.flush()
+                os.fsync(self._file.fileno())
+            self._file.close()
+            if kind is None:
+                os.replace(self._temporary, self._path)
+        finally:
+            Path(self._temporary).unlink(missing_ok=True)
+
+
+def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
+    yield from sorted(material.textures.items())
+    if material.normal_map is not None:
+        yield "normal_map", material.normal_map
+
+
+def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
+    """The scene as a JSON document and named arrays, one to one."""
+    arrays: Arrays = {"environment": scene.environment.radiance}
+    for i, mesh in enumerate(scene.meshes):
+        arrays |= {f"mesh{i}_{key}": getattr(mesh, key) for key in MESH_ARRAYS}
+    for i, material in enumerate(scene.materials):
+        arrays |= {f"material{i}_{channel}": texture.pixels for channel, texture in _textures(material)}
+    document = {
+        "format": FORMAT_VERSION,
+        "name": scene.name,
+        "meshes": [{"name": mesh.name, "material": mesh.material} for mesh in scene.meshes],
+        "materials": [
+            {
+                "name": material.name,
+                "terms": list(material.terms),
+                "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
+                "double_sided": material.double_sided,
+            }
+            for material in scene.materials
+        ],
+        "cameras": [{"name": c.name, "to_world": c.to_world.tolist(), "yfov": c.yfov} for c in scene.cameras],
+        "environment": {"name": scene.environment.name},
+        "warnings": list(scene.warnings),
+    }
+    return document, arrays
+
+
+def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
+    """The inverse of `_describe`; raises what Python raises where something is missing or of the wrong kind."""
+    meshes = [
+        Mesh(name=str(m["name"]), material=int(m["material"]), **{k: arrays[f"mesh{i}_{k}"] for k in MESH_ARRAYS})
+        for i, m in enumerate(document["meshes"])
+    ]
+    cameras = [
+        Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"])) for c in document["cameras"]
+    ]
+    return Scene(
+        str(document["id"]),
+        str(document["name"]),
+        tuple(meshes),
+        tuple(_assemble_material(i, m, arrays) for i, m in enumerate(document["materials"])),
+        tuple(cameras),
+        Environment(str(document["environment"]["name"]), arrays["environment"]),
+        tuple(str(warning) for warning in document["warnings"]),
+    )
+
+
+def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Material:
+    textures = {}
+    for channel, (wrap_u, wrap_v) in document["textures"].items():
+        pixels = arrays[f"material{i}_{channel}"]
+        if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0 or pixels.dtype != np.float32:
+            raise SceneError(f"a texture of material {document['name']!r} has the wrong shape or type; {REMEDY}")
+        textures[channel] = Texture(pixels, (str(wrap_u), str(wrap_v)))
+    normal_map = textures.pop("normal_map", None)
+    terms = tuple(dict(term) for term in document["terms"])
+    return Material(str(document["name"]), terms, textures, normal_map, bool(document["double_sided"]))
+
+
+def _read_document(path: Path) -> dict[str, Any]:
+    if path.stat().st_size > MAX_JSON_BYTES:
+        raise SceneError(f"{path.name} is larger than {MAX_JSON_BYTES >> 20} MB; {REMEDY}")
+    document = json.loads(path.read_bytes())
+    if not isinstance(document, dict) or document.get("format") != FORMAT_VERSION:
+        raise SceneError(f"{path.name} is not a scene that this relume reads; {REMEDY}")
+    return document
+
+
+def _read_arrays(path: Path) -> Arrays:
+    """Members are stored, not compressed, so that none can be larger than the file that is there."""
+    size_bytes = path.stat().st_size
+    if size_bytes > MAX_ARRAY_BYTES:
+        raise SceneError(f"{path.name} is larger than {MAX_ARRAY_BYTES >> 30} GB; {REMEDY}")
+    arrays: Arrays = {}
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            if member.compress_type != zipfile.ZIP_STORED or member.file_size > size_bytes:
+                raise SceneError(f"{path.name} was not written by relume; {REMEDY}")
+            with archive.open(member) as file:
+                arrays[member.filename.removesuffix(".npy")] = _read_array(cast(BinaryIO, file), member.file_size)
+    return arrays
+
+
+def _read_array(file: BinaryIO, size_bytes: int) -> NDArray[Any]:
+    """One .npy member, its header checked against its length before anything of that size is made."""
+    if npy_format.read_magic(file) != (1, 0):
+        raise SceneError(f"arrays.npz was not written by relume; {REMEDY}")
+    shape, fortran_order, dtype = npy_format.read_array_header_1_0(file)
+    needed_bytes = math.prod(shape) * dtype.itemsize
+    if fortran_order or dtype not in (np.dtype("<f4"), np.dtype("<u4")) or not 0 <= needed_bytes <= size_bytes:
+        raise SceneError(f"arrays.npz holds an array that relume does not write; {REMEDY}")
+    data = file.read(needed_bytes)
+    return np.frombuffer(bytearray(data), dtype).reshape(shape)

@@ -1,0 +1,72 @@
+"""What every scene must satisfy before anything is traced; importers and the archive both end here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from relume.errors import SceneError
+from relume.scene.model import Camera, Environment, Material, Mesh
+
+MAX_TRIANGLES = 20_000_000
+MAX_MATERIALS = 1_000
+
+
+def check_mesh(mesh: Mesh, num_materials: int) -> None:
+    """Raises SceneError where shapes do not fit, an index is out of range or a value is not finite."""
+    num_vertices = len(mesh.positions)
+    widths = {"positions": 3, "normals": 3, "tangents": 4, "uvs": 2}
+    for name, width in widths.items():
+        array = getattr(mesh, name)
+        if array.shape != (num_vertices, width) or array.dtype != np.float32:
+            raise SceneError(f"{name} of mesh {mesh.name!r} have the wrong shape or type; export the scene again")
+        if not np.isfinite(array).all():
+            raise SceneError(f"{name} of mesh {mesh.name!r} are not all finite; repair the mesh and export it again")
+    if mesh.faces.ndim != 2 or mesh.faces.shape[1] != 3 or mesh.faces.dtype != np.uint32:
+        raise SceneError(f"faces of mesh {mesh.name!r} have the wrong shape or type; export the scene again")
+    if len(mesh.faces) == 0 or int(mesh.faces.max()) >= num_vertices:
+        raise SceneError(f"mesh {mesh.name!r} has no triangles or indexes vertices it has not; export it again")
+    if not 0 <= mesh.material < num_materials:
+        raise SceneError(f"mesh {mesh.name!r} names material {mesh.material}, which there is not; export it again")
+
+
+def check_camera(camera: Camera) -> None:
+    """Raises SceneError unless the frame is rigid and finite and the field of view lies between 0 and 180°."""
+    to_world = camera.to_world
+    if to_world.shape != (4, 4) or not np.isfinite(to_world).all() or not 0 < camera.yfov < np.pi:
+        raise SceneError(f"camera {camera.name!r} has no usable position or field of view; set them")
+    if not np.allclose(to_world[:3, :3] @ to_world[:3, :3].T, np.eye(3), atol=1e-4):
+        raise SceneError(f"camera {camera.name!r} is not a rigid frame; remove its scale and shear")
+
+
+def check_environment(environment: Environment) -> None:
+    """Raises SceneError unless the radiance is (height, width, 3) float32, finite and not negative."""
+    radiance = environment.radiance
+    if radiance.ndim != 3 or radiance.shape[2] != 3 or radiance.size == 0 or radiance.dtype != np.float32:
+        raise SceneError(f"environment {environment.name!r} is not an RGB float image; convert it to .hdr or .exr")
+    if not np.isfinite(radiance).all() or float(radiance.min()) < 0:
+        raise SceneError(f"environment {environment.name!r} holds texels that are no light; repair the image")
+
+
+def check_scene(
+    meshes: Sequence[Mesh], materials: Sequence[Material], cameras: Sequence[Camera], environment: Environment
+) -> None:
+    """Raises SceneError with what to do where the parts do not make a scene."""
+    if not meshes:
+        raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+    if not cameras:
+        raise SceneError("the scene has no camera; add one")
+    if len(materials) > MAX_MATERIALS:
+        raise SceneError(f"the scene has {len(materials):,} materials, {MAX_MATERIALS:,} are allowed; merge some")
+    num_triangles = sum(len(mesh.faces) for mesh in meshes)
+    if num_triangles > MAX_TRIANGLES:
+        raise SceneError(f"the scene has {num_triangles:,} triangles, {MAX_TRIANGLES:,} are allowed; simplify it")
+    for kind, names in (("materials", [m.name for m in materials]), ("cameras", [c.name for c in cameras])):
+        if len(set(names)) != len(names) or not all(names):
+            raise SceneError(f"the names of the {kind} are empty or not unique; give each its own")
+    for mesh in meshes:
+        check_mesh(mesh, len(materials))
+    for camera in cameras:
+        check_camera(camera)
+    check_environment(environment)

@@ -1,0 +1,111 @@
+"""The demo's arrangement: who stands where, and from where it is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.scene.demo import cloth, pearls, tray
+from relume.scene.demo.surfaces import Surface, merged, turn_y
+from relume.scene.demo.teapot import teapot
+from relume.scene.model import Camera, Mesh
+
+F64 = NDArray[np.float64]
+
+TRAY_Y = cloth.THICKNESS + pearls.GAP
+FLOOR_Y = TRAY_Y + tray.FLOOR + pearls.GAP
+TEAPOT_HEIGHT, TEAPOT_PLACE, TEAPOT_TURN = 0.150, (-0.030, -0.035), -24.0
+BOWL_PLACE = (0.160, 0.062)
+
+
+def meshes() -> tuple[Mesh, ...]:
+    """All objects in world space, materials numbered as in `relume.scene.demo.materials`."""
+    pot = teapot(14, TEAPOT_HEIGHT).moved(turn_y(TEAPOT_TURN), (TEAPOT_PLACE[0], FLOOR_Y, TEAPOT_PLACE[1]))
+    lift = (0.0, TRAY_Y, 0.0)
+    parts: list[tuple[str, Surface]] = [
+        ("Teapot", pot),
+        ("Tray", tray.tray().moved(np.eye(3), lift)),
+        ("Handles", tray.handles().moved(np.eye(3), lift)),
+        ("Pearls", _pearls()),
+        ("Bowl", pearls.bowl().moved(np.eye(3), (BOWL_PLACE[0], FLOOR_Y, BOWL_PLACE[1]))),
+        ("Cloth", cloth.cloth()),
+        ("Table", cloth.stage()),
+    ]
+    return tuple(surface.mesh(name, material) for material, (name, surface) in enumerate(parts))
+
+
+def cameras() -> tuple[Camera, ...]:
+    """Two views at 4:3, about 55 mm on a full-frame sensor."""
+    yfov = float(np.radians(24.0))
+    return (
+        look_at("front", (0.10, 0.36, 0.93), (0.022, 0.052, 0.018), yfov),
+        look_at("left", (-0.66, 0.25, 0.72), (0.0, 0.056, 0.01), yfov),
+    )
+
+
+def look_at(name: str, eye: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
+    """A level camera at `eye` that has `target` in the middle of its picture."""
+    backward = np.subtract(eye, target)
+    backward /= np.linalg.norm(backward)
+    right = np.cross([0.0, 1.0, 0.0], backward)
+    right /= np.linalg.norm(right)
+    to_world = np.eye(4)
+    to_world[:3] = np.column_stack([right, np.cross(backward, right), backward, eye])
+    return Camera(name, to_world, yfov)
+
+
+def ground_height(x: F64, z: F64) -> F64:
+    """Height of tray, cloth and table together."""
+    return np.maximum(cloth.cloth_height(x, z), tray.tray_height(x, z) + TRAY_Y)
+
+
+def _pearls() -> Surface:
+    parts = [pearls.pearls(*_string()), pearls.pearls(*_heap()), pearls.pearls(*_loose())]
+    return merged(parts)
+
+
+def _string() -> tuple[F64, F64]:
+    """A graduated string: from behind the bowl, round the pot's foot, over the rim and onto the cloth."""
+    corners = np.array(
+        [
+            [0.188, -0.020], [0.130, -0.012], [0.105, 0.040], [0.075, 0.088], [0.010, 0.088], [-0.050, 0.108],
+            [-0.075, 0.150], [-0.055, 0.205], [0.010, 0.228], [0.065, 0.214],
+        ]
+    )  # fmt: skip
+    path = smooth_path(corners)
+    num_pearls = 52
+    middle = np.abs(np.linspace(-1, 1, num_pearls))
+    radii = 0.0072 - 0.0026 * middle**1.5
+    centres = pearls.string_of_pearls(ground_height, path, radii)
+    return centres, radii[: len(centres)]
+
+
+def _heap() -> tuple[F64, F64]:
+    radii = np.random.default_rng(3).uniform(0.0062, 0.0090, 15)
+    height = _shifted(pearls.bowl_height, BOWL_PLACE, FLOOR_Y)
+    return pearls.heap(height, BOWL_PLACE, 0.030, radii, seed=11), radii
+
+
+def _loose() -> tuple[F64, F64]:
+    """Three large ones that rolled away."""
+    radii = np.array([0.0135, 0.0105, 0.0085])
+    places = ((0.170, 0.212), (0.205, 0.196), (-0.178, 0.096))
+    centres = [(x, pearls.resting_height(ground_height, x, z, r), z) for (x, z), r in zip(places, radii, strict=True)]
+    return np.array(centres), radii
+
+
+def _shifted(height: Callable[[F64, F64], F64], place: tuple[float, float], lift: float) -> Callable[[F64, F64], F64]:
+    return lambda x, z: height(x - place[0], z - place[1]) + lift
+
+
+def smooth_path(corners: F64) -> F64:
+    """A curve (n, 2) through corners (m, 2) without sharp turns: a Catmull–Rom spline."""
+    padded = np.concatenate([2 * corners[:1] - corners[1:2], corners, 2 * corners[-1:] - corners[-2:-1]])
+    t = np.linspace(0, 1, 24, endpoint=False)[:, None]
+    spans = []
+    for a, b, c, d in zip(padded, padded[1:], padded[2:], padded[3:], strict=False):
+        cubic = 2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3
+        spans.append(cubic / 2)
+    return np.concatenate([*spans, corners[-1:]])
