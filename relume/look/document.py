@@ -1,0 +1,132 @@
+"""Complete looks: the scene's default, and partial looks merged into it, checked as they are merged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+from relume.errors import ParameterError
+from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_rgb, fail, names_text
+from relume.look.model import Look, ToneMap
+from relume.look.terms import complete_term
+from relume.scene.model import Material
+
+MAX_TERMS = 16
+MAX_SCALE = 1e4
+MAX_EXPOSURE = 20.0
+_SECTIONS = ("materials", "environment", "lights", "display")
+
+
+def default_look(scene_materials: Sequence[Material], light_names: Sequence[str] = ()) -> dict[str, Any]:
+    """The complete look of a scene that nobody has edited.
+
+    Raises:
+        ParameterError: a material's own terms are not valid.
+    """
+    return {
+        "materials": {
+            material.name: {"terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ())}
+            for material in scene_materials
+        },
+        "environment": {"scale": 1.0, "rotation": 0.0},
+        "lights": {name: {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True} for name in light_names},
+        "display": {"exposure": 0.0, "tone_map": "agx"},
+    }
+
+
+def complete(partial: Mapping[str, Any], default: Mapping[str, Any]) -> dict[str, Any]:
+    """A complete, valid document: what `partial` does not name is as in `default`.
+
+    A material's list of terms is taken whole; a term's missing fields have its model's defaults.
+
+    Raises:
+        ParameterError: with the JSON pointer of the first thing that is wrong, and what is allowed there.
+    """
+    return complete_changes(partial, default, default)
+
+
+def validate(document: Mapping[str, Any], default: Mapping[str, Any]) -> Look:
+    """The complete look of a document, which may be partial. Raises ParameterError as `complete` does."""
+    return Look.model_validate(complete(document, default))
+
+
+def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
+    """`complete`, checking only what is not, as an object, part of the `known` valid document: an edit changes little.
+
+    Returns:
+        A document that shares with `known` all that did not change.
+    """
+    check_object((), partial, _SECTIONS)
+    return {
+        "materials": _complete_materials(partial.get("materials", {}), default["materials"], known["materials"]),
+        "environment": _complete_environment(partial.get("environment", {}), default["environment"]),
+        "lights": _complete_lights(partial.get("lights", {}), default["lights"]),
+        "display": _complete_display(partial.get("display", {}), default["display"]),
+    }
+
+
+def _complete_materials(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
+    _check_names(("materials",), given, default, "material")
+    return {name: _complete_material(name, given.get(name, default[name]), default, known) for name in default}
+
+
+def _complete_material(name: str, given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> Any:
+    if given is known[name] or given is default[name]:
+        return given
+    pointer: Pointer = ("materials", name)
+    check_object(pointer, given, ("terms",))
+    terms = given.get("terms", default[name]["terms"])
+    return {"terms": _complete_terms((*pointer, "terms"), terms, known[name]["terms"])}
+
+
+def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[Any]:
+    if not isinstance(given, list | tuple) or len(given) > MAX_TERMS:
+        raise fail(pointer, given, f"a list of at most {MAX_TERMS} terms")
+    before = [*known, *[None] * (len(given) - len(known))]
+    return [
+        term if term is was else complete_term((*pointer, k), term, was)
+        for k, (term, was) in enumerate(zip(given, before, strict=False))
+    ]
+
+
+def _complete_environment(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    merged = _merged(("environment",), given, default)
+    check_number(("environment", "scale"), merged["scale"], 0.0, MAX_SCALE)
+    check_number(("environment", "rotation"), merged["rotation"], -360.0, 360.0)
+    return merged
+
+
+def _complete_lights(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    _check_names(("lights",), given, default, "light")
+    return {name: _complete_light(("lights", name), given.get(name, {}), default[name]) for name in default}
+
+
+def _complete_light(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    merged = _merged(pointer, given, default)
+    check_number((*pointer, "scale"), merged["scale"], 0.0, MAX_SCALE)
+    check_rgb((*pointer, "color"), merged["color"], 0.0, MAX_COLOR)
+    if not isinstance(merged["on"], bool):
+        raise fail((*pointer, "on"), merged["on"], "true or false")
+    return merged
+
+
+def _complete_display(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    merged = _merged(("display",), given, default)
+    check_number(("display", "exposure"), merged["exposure"], -MAX_EXPOSURE, MAX_EXPOSURE)
+    if merged["tone_map"] not in get_args(ToneMap):
+        raise fail(("display", "tone_map"), merged["tone_map"], f"one of {names_text(get_args(ToneMap))}")
+    return merged
+
+
+def _merged(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    check_object(pointer, given, default)
+    return {**default, **given}
+
+
+def _check_names(pointer: Pointer, given: Any, default: Mapping[str, Any], what: str) -> None:
+    if not isinstance(given, Mapping):
+        raise fail(pointer, given, f"an object with a field for each {what} to change")
+    unknown = given.keys() - default.keys()
+    if unknown:
+        name = min(unknown, key=str)
+        raise ParameterError("/".join(["", *map(str, pointer)]), name, f"a {what} of this scene: {names_text(default)}")

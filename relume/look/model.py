@@ -1,0 +1,73 @@
+"""The types of a complete look: what `validate` returns and what the API's schema shows.
+
+Terms stay dictionaries, so that `relume.brdf.curves` reads the same thing from a look and from its JSON.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NotRequired
+
+from pydantic import BaseModel, ConfigDict
+from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
+
+Rgb = tuple[float, float, float]
+ToneMap = Literal["agx", "filmic", "linear"]
+
+
+class DrawnCurve(TypedDict):
+    """A curve drawn by hand: either `points`, [degrees, value], or `bands`, J values or three times J."""
+
+    points: NotRequired[list[tuple[float, float]]]
+    bands: NotRequired[list[float] | list[list[float]]]
+    channels: NotRequired[str]
+
+
+class TermLook(TypedDict):
+    """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give."""
+
+    model: str
+    color: Rgb
+    texture: Literal["diffuse", "specular"] | None
+    params: dict[str, float | Rgb]
+    curves: dict[str, DrawnCurve | list[DrawnCurve]]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class MaterialLook(_Frozen):
+    """A material is the sum of its terms."""
+
+    terms: tuple[TermLook, ...]
+
+
+class EnvironmentLook(_Frozen):
+    """`scale` multiplies the environment; `rotation` turns it about +Y, degrees, counter-clockwise from above."""
+
+    scale: float
+    rotation: float
+
+
+class LightLook(_Frozen):
+    """A local light's multipliers."""
+
+    scale: float
+    color: Rgb
+    on: bool
+
+
+class DisplayLook(_Frozen):
+    """How radiance becomes a picture: `exposure` in stops, then the tone map."""
+
+    exposure: float
+    tone_map: ToneMap
+
+
+class Look(_Frozen):
+    """A complete, valid look; made by `relume.look.validate`."""
+
+    materials: dict[str, MaterialLook]
+    environment: EnvironmentLook
+    lights: dict[str, LightLook]
+    display: DisplayLook

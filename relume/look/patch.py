@@ -1,0 +1,76 @@
+"""Edits: JSON Patch (RFC 6902) on a complete look."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import jsonpatch
+import jsonpointer
+
+from relume.errors import EditError
+from relume.look.document import complete_changes
+
+MAX_OPERATIONS = 256
+MAX_PATH = 1024
+_OPERATIONS = ("add", "remove", "replace", "test")
+
+
+def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    """The complete, valid look after a patch; neither argument is changed, unchanged parts are shared.
+
+    What a patch removes is as in the scene's default again. Replacing the path "" replaces the whole look. Only what
+    the patch touches is checked.
+
+    Args:
+        document: a complete look, as `complete` or an earlier call returned it.
+        patch: list of at most 256 operations `add`, `remove`, `replace`, `test`.
+        default: the scene's default look.
+    Raises:
+        EditError: the patch is malformed, does not fit the document, or a test failed.
+        ParameterError: the patched look is not valid.
+    """
+    if not isinstance(patch, list | tuple) or len(patch) > MAX_OPERATIONS:
+        raise EditError(f"an edit is a list of at most {MAX_OPERATIONS} operations; send several edits")
+    changed: Any = document
+    for k, operation in enumerate(patch):
+        try:
+            changed = _apply(changed, _checked(operation, k))
+        except (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError) as error:
+            raise EditError(f"operation {k} cannot be applied: {str(error)[:200] or 'no such path'}") from error
+    return complete_changes(changed, default, document)
+
+
+def _checked(operation: Any, k: int) -> dict[str, Any]:
+    if not isinstance(operation, dict) or operation.get("op") not in _OPERATIONS:
+        raise EditError(f"operation {k} is not one of {', '.join(_OPERATIONS)}")
+    path = operation.get("path")
+    if not isinstance(path, str) or len(path) > MAX_PATH:
+        raise EditError(f"operation {k} needs a path, a JSON pointer of at most {MAX_PATH} characters")
+    if operation["op"] != "remove" and "value" not in operation:
+        raise EditError(f"operation {k} ({operation['op']}) needs a value")
+    return operation
+
+
+def _apply(document: Any, operation: dict[str, Any]) -> Any:
+    """One operation on a copy of the containers along its path: the rest of the document is shared."""
+    parts = jsonpointer.JsonPointer(operation["path"]).parts
+    if not parts and operation["op"] == "remove":
+        raise EditError('the whole look cannot be removed; replace the path "" by {} for the default look')
+    return jsonpatch.apply_patch(_unshared(document, parts), [operation], in_place=True)
+
+
+def _unshared(document: Any, parts: list[str]) -> Any:
+    if not parts:
+        return document
+    if isinstance(document, dict):
+        copy: Any = dict(document)
+        if parts[0] in copy:
+            copy[parts[0]] = _unshared(copy[parts[0]], parts[1:])
+        return copy
+    if isinstance(document, list | tuple):
+        copy = list(document)
+        if parts[0].isdecimal() and int(parts[0]) < len(copy):
+            copy[int(parts[0])] = _unshared(copy[int(parts[0])], parts[1:])
+        return copy
+    return document
