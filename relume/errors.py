@@ -7,6 +7,10 @@ class RelumeError(Exception):
     """The root of all of them; anything else that escapes is a defect."""
 
 
+class NotFoundError(RelumeError):
+    """Nothing of that name is here."""
+
+
 class SceneError(RelumeError, ValueError):
     """A scene or environment file cannot be used as it is."""
 

@@ -1,0 +1,196 @@
+"""Runs one bake: stages in order, what is not done goes to an executor, what is finished goes into the ledger.
+
+Killed at any moment, the next run continues where the ledger stands and the published store is the same, bit for bit:
+a task is pure, its shards appear by rename, and only a recorded task counts as done.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import shutil
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sqlalchemy.exc import IntegrityError
+
+from relume.errors import CancelledError, ChunkDamagedError, RelumeError
+from relume.scene.model import Scene
+from relume.store import fill, open_store, publish
+from relume.transfer.base import Task
+from worker.lease import HEARTBEAT_S, LeaseKeeper
+from worker.ledger import Ledger
+from worker.paths import bake_path, staging_path
+from worker.progress import Progress
+from worker.status import TaskCost
+from worker.tasks import Job, run_task, scene_of
+
+log = logging.getLogger(__name__)
+
+MAX_ATTEMPTS = 3
+
+
+@dataclass
+class BakeRunner:
+    """One run of a bake whose lease `owner` holds.
+
+    Attributes:
+        window: how many tasks are handed out at once; the rest wait here, so that a cancel takes effect at once.
+        changed: called after every change of the ledger.
+        stopped: the service is closing; the bake stays `running` for the next start.
+    """
+
+    ledger: Ledger
+    job: Job
+    owner: str
+    executor: Executor
+    window: int
+    changed: Callable[[], None] = lambda: None
+    stopped: Callable[[], bool] = lambda: False
+    _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
+
+    def run(self) -> None:
+        """Bake and publish; every failure ends in the ledger as a state and a sentence."""
+        with LeaseKeeper(self.ledger, self.job.bake_id, self.owner):
+            self._run()
+        self.changed()
+
+    def _run(self) -> None:
+        identity = self.job.bake_id
+        try:
+            num_bytes = self._bake()
+        except CancelledError:
+            self._land()
+            if not self.stopped():
+                self.ledger.finish(identity, self.owner, "cancelled")
+        except Exception as error:  # whatever a method raises must not end the service
+            self._land()
+            if not isinstance(error, RelumeError | OSError):
+                log.exception("bake %s failed", identity)
+            self.ledger.finish(identity, self.owner, "failed", self._sentence(error))
+        else:
+            self.ledger.finish(identity, self.owner, "ready", num_bytes=num_bytes)
+
+    def _bake(self) -> int:
+        job, target, staging = self.job, self._target, self._staging
+        if target.exists():  # published, and then killed before the ledger knew
+            return _size(target)
+        if not staging.exists():
+            self.ledger.forget_tasks(job.bake_id)
+        plan = self.ledger.bake(job.bake_id).plan
+        scene, progress = scene_of(job.data_dir, job.scene_id), Progress(plan)
+        fill.begin(job.method, scene, job.recipe, staging)
+        for stage in range(len(job.method.stages)):
+            self._run_stage(scene, stage, progress)
+        self._beat(progress)
+        try:
+            return publish(staging, target)
+        except ChunkDamagedError:
+            shutil.rmtree(staging, ignore_errors=True)
+            self.ledger.forget_tasks(job.bake_id)
+            raise
+
+    def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
+        job = self.job
+        tasks = fill.begin_stage(job.method, scene, job.recipe, self._staging, stage)
+        progress.begin_stage(tasks, last=stage == len(job.method.stages) - 1)
+        done = self.ledger.finished_tasks(job.bake_id)
+        waiting: deque[tuple[Task, int]] = deque()
+        for task in tasks:
+            if (cost := done.get((stage, task.index))) is not None:
+                progress.add(task, cost, here=False)
+            else:
+                waiting.append((task, 1))
+        self._beat(progress)
+        while waiting or self._flying:
+            while waiting and len(self._flying) < self.window:
+                task, attempt = waiting.popleft()
+                self._flying[self.executor.submit(run_task, job, task)] = task, attempt
+            finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in finished:
+                self._collect(future, waiting, progress)
+            self._beat(progress)
+
+    def _collect(self, future: Future[TaskCost], waiting: deque[tuple[Task, int]], progress: Progress) -> None:
+        task, attempt = self._flying.pop(future)
+        try:
+            cost = future.result()
+        except Exception as error:
+            if not _is_lost_process(error):
+                raise
+            if attempt == MAX_ATTEMPTS:
+                raise RelumeError(
+                    f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
+                    "or take fewer lights or a smaller size, then bake again; finished parts are kept"
+                ) from error
+            log.warning("a worker process died; task %s is given to another", task)
+            waiting.append((task, attempt + 1))
+            return
+        self.ledger.finish_task(self.job.bake_id, task, cost, attempt)
+        progress.add(task, cost, here=True)
+
+    def _beat(self, progress: Progress) -> None:
+        """Record progress; raise CancelledError where somebody wants this run to end."""
+        if self.stopped() or not self.ledger.beat(self.job.bake_id, self.owner, **progress.fields()):
+            raise CancelledError("the bake was stopped")
+        self.changed()
+
+    def _land(self) -> None:
+        """Wait for the tasks that run and keep what they finished; they would write after us otherwise."""
+        deadline = time.monotonic() + (0 if self.stopped() else 600)
+        while self._flying and time.monotonic() < deadline:
+            finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in finished:
+                task, attempt = self._flying.pop(future)
+                if future.exception() is None:
+                    try:
+                        self.ledger.finish_task(self.job.bake_id, task, future.result(), attempt)
+                    except IntegrityError:  # the bake was deleted
+                        return
+
+    def _sentence(self, error: Exception) -> str:
+        """What went wrong and what to do, in one line."""
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            needed = self.ledger.bake(self.job.bake_id).plan.store_bytes
+            missing = max(1, needed - _size(self._staging)) / 1e6
+            return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"
+        if isinstance(error, RelumeError):
+            return " ".join(str(error).split())
+        if isinstance(error, MemoryError):
+            return "out of memory; take fewer lights or a smaller size, then bake again; finished parts are kept"
+        if isinstance(error, OSError):
+            return f"a file cannot be read or written ({error.strerror}); see to it, then bake again"
+        return f"a defect: {type(error).__name__}: {str(error)[:200]}; the log has the trace"
+
+    @property
+    def _target(self) -> Path:
+        return bake_path(self.job.data_dir, self.job.bake_id)
+
+    @property
+    def _staging(self) -> Path:
+        return staging_path(self.job.data_dir, self.job.bake_id)
+
+
+def _is_lost_process(error: Exception) -> bool:
+    """Whether a task ended because its process did."""
+    if isinstance(error, BrokenExecutor):
+        return True
+    return type(error).__name__ in ("KilledWorker", "CommClosedError")
+
+
+def _size(store: Path) -> int:
+    return sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
+
+
+def check_published(path: Path) -> bool:
+    """Whether a bake's store is there and can be opened; one that cannot is removed, so that it is baked again."""
+    try:
+        open_store(path)
+    except RelumeError:
+        shutil.rmtree(path, ignore_errors=True)
+        return False
+    return True

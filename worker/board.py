@@ -1,0 +1,115 @@
+"""Tells whoever asked when a bake changes, whichever process runs it."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator
+
+from relume.errors import NotFoundError
+from worker.ledger import Ledger
+from worker.status import BakeStatus
+
+POLL_S = 0.5
+
+
+class Subscription:
+    """Changes of one bake, the state at the time of asking first. Close it, or use it as a context manager."""
+
+    def __init__(self, board: StatusBoard, bake_id: str, first: BakeStatus) -> None:
+        self.bake_id = bake_id
+        self.latest = first
+        self._board = board
+        self._changes: queue.SimpleQueue[BakeStatus | None] = queue.SimpleQueue()
+        self._changes.put(first)
+
+    def get(self, timeout: float | None = None) -> BakeStatus | None:
+        """The next change; None where none came within `timeout` seconds, or the subscription was closed."""
+        try:
+            return self._changes.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+    def __iter__(self) -> Iterator[BakeStatus]:
+        """Changes until the bake is ready, failed or cancelled, or the subscription is closed."""
+        while (status := self._changes.get()) is not None:
+            yield status
+            if status.final:
+                return
+
+    def put(self, status: BakeStatus) -> None:
+        """Hand over a status where it differs from the last."""
+        if status != self.latest:
+            self.latest = status
+            self._changes.put(status)
+
+    def close(self) -> None:
+        """End the subscription; an iterator over it ends too."""
+        self._board.remove(self)
+        self._changes.put(None)
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class StatusBoard:
+    """Reads the ledger for all subscriptions: at once when this process changed it, else every half second."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+        self._lock = threading.Lock()
+        self._subscriptions: set[Subscription] = set()
+        self._wake = threading.Event()
+        self._closed = False
+        self._thread: threading.Thread | None = None
+
+    def subscribe(self, bake_id: str) -> Subscription:
+        """Follow a bake. Raises NotFoundError."""
+        subscription = Subscription(self, bake_id, self._ledger.bake(bake_id))
+        with self._lock:
+            self._subscriptions.add(subscription)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._watch, name="relume-bake-status", daemon=True)
+                self._thread.start()
+        self._wake.set()
+        return subscription
+
+    def remove(self, subscription: Subscription) -> None:
+        """Stop telling a subscription."""
+        with self._lock:
+            self._subscriptions.discard(subscription)
+
+    def changed(self) -> None:
+        """The ledger was changed by this process."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """End all subscriptions and the thread."""
+        self._closed = True
+        self._wake.set()
+        with self._lock:
+            subscriptions, thread = list(self._subscriptions), self._thread
+        for subscription in subscriptions:
+            subscription.close()
+        if thread is not None:
+            thread.join()
+
+    def _watch(self) -> None:
+        while not self._closed:
+            with self._lock:
+                subscriptions = list(self._subscriptions)
+            self._wake.wait(POLL_S if subscriptions else None)
+            self._wake.clear()
+            for bake_id in {subscription.bake_id for subscription in subscriptions}:
+                try:
+                    status = self._ledger.bake(bake_id)
+                except NotFoundError:
+                    for subscription in [s for s in subscriptions if s.bake_id == bake_id]:
+                        subscription.close()
+                    continue
+                for subscription in subscriptions:
+                    if subscription.bake_id == bake_id:
+                        subscription.put(status)

@@ -1,0 +1,55 @@
+"""Refuses a bake that does not fit, before anything is computed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from relume.errors import MemoryBudgetError
+from relume.transfer.base import Plan
+
+REMEDY = "take fewer lights, a smaller size or fewer views at once"
+
+# Left for the server's own work and for the system.
+MEMORY_SHARE = 0.9
+DISK_RESERVE_BYTES = 64 << 20
+
+
+def available_bytes() -> int:
+    """Memory that may be taken now: the system's, or what the control group (a container) still allows."""
+    available = _system_available_bytes()
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit, used = (int((group / name).read_text()) for name in ("memory.max", "memory.current"))
+    except (OSError, ValueError):  # no control group, or "max"
+        return available
+    return min(available, max(0, limit - used))
+
+
+def _system_available_bytes() -> int:
+    """Memory that processes may take without pushing others out; where the system does not tell, all it has."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    except OSError:  # not Linux
+        pass
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
+    """Raise MemoryBudgetError where a plan needs more memory or disk than there is.
+
+    Args:
+        num_processes: worker processes on this machine at once; 0 where they run elsewhere.
+    """
+    memory = int(available_bytes() * MEMORY_SHARE)
+    if plan.peak_bytes * num_processes > memory:
+        what = f"this bake in {num_processes} process(es) of memory"
+        raise MemoryBudgetError(what, plan.peak_bytes * num_processes, memory, REMEDY)
+    free = max(0, shutil.disk_usage(data_dir).free - DISK_RESERVE_BYTES)
+    if plan.store_bytes > free:
+        raise MemoryBudgetError(
+            "the store of this bake on disk", plan.store_bytes, free, f"free some disk, or {REMEDY}"
+        )

@@ -1,0 +1,37 @@
+"""Opens the database: any SQLAlchemy URL; SQLite is set up for several processes that write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.engine import make_url
+
+from worker.models import Base
+
+BUSY_TIMEOUT_MS = 30_000
+
+
+def open_database(url: str) -> Engine:
+    """An engine on `url`, its tables made where they are missing."""
+    parsed = make_url(url)
+    sqlite = parsed.get_backend_name() == "sqlite"
+    if sqlite and parsed.database:
+        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    engine = create_engine(parsed, pool_pre_ping=not sqlite)
+    if sqlite:
+        event.listen(engine, "connect", _set_up_sqlite)
+    Base.metadata.create_all(engine, checkfirst=True)
+    return engine
+
+
+def _set_up_sqlite(connection: Any, _: object) -> None:
+    """Write-ahead log: readers never wait for a writer. Writers wait for each other instead of failing."""
+    for pragma in (
+        f"busy_timeout = {BUSY_TIMEOUT_MS}",
+        "journal_mode = WAL",
+        "synchronous = NORMAL",
+        "foreign_keys = ON",
+    ):
+        connection.execute(f"PRAGMA {pragma}")

@@ -1,0 +1,123 @@
+"""Where tasks run: this process for tiny bakes, a Dask cluster for all others.
+
+A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes about one. So a bake of at
+most `TINY_BAKE_RAYS` runs in this process, one task at a time on the kernels' own threads, and the cluster starts with
+the first larger one.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+import threading
+from concurrent.futures import Executor, ThreadPoolExecutor
+from typing import Any
+
+from relume.errors import PlanError
+from relume.transfer.base import Plan
+
+# About four seconds of tracing on two cores, what starting a cluster costs.
+TINY_BAKE_RAYS = 50_000_000
+CONNECT_S = 10
+
+# One Python thread per process, so one thread for every library below it.
+ONE_THREAD = dict.fromkeys(
+    ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+
+# Our ledger decides about retries; results are a few numbers, so nothing is ever spilled to disk.
+DASK_CONFIG: dict[str, Any] = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
+}
+
+
+def is_tiny(plan: Plan) -> bool:
+    """Whether a bake is done before a cluster would have started."""
+    return plan.num_rays <= TINY_BAKE_RAYS
+
+
+def num_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Executors:
+    """The executors of one service, started when they are first needed."""
+
+    def __init__(self, scheduler: str | None = None, num_workers: int | None = None) -> None:
+        """
+        Args:
+            scheduler: address of a Dask scheduler, tcp://…; None: a cluster of this machine's cores.
+            num_workers: processes of the embedded cluster; None: one per core.
+        """
+        self.scheduler = scheduler
+        self.num_workers = num_workers or num_cores()
+        self._lock = threading.Lock()
+        self._here: ThreadPoolExecutor | None = None
+        self._cluster: Any = None
+        self._client: Any = None
+
+    def here(self) -> Executor:
+        """This process, one task at a time; kernels split each task over their own threads."""
+        with self._lock:
+            if self._here is None:
+                self._here = ThreadPoolExecutor(1, thread_name_prefix="relume-tiny-bake")
+            return self._here
+
+    def cluster(self) -> Executor:
+        """The Dask cluster. Raises PlanError where the scheduler does not answer."""
+        with self._lock:
+            if self._client is None:
+                self._client = self._connect()
+            executor: Executor = self._client.get_executor(pure=False)
+            return executor
+
+    def cluster_threads(self) -> int:
+        """How many tasks the cluster runs at once; at least 1."""
+        with self._lock:
+            counts = self._client.nthreads() if self._client is not None else {}
+        return max(1, int(sum(counts.values())))
+
+    def close(self) -> None:
+        """Stop what was started; running tasks are abandoned, their shards are whole or absent."""
+        with self._lock:
+            if self._here is not None:
+                self._here.shutdown(wait=False, cancel_futures=True)
+            if self._client is not None:
+                self._client.close(timeout=2)
+            if self._cluster is not None:
+                self._cluster.close(timeout=5)
+            self._here = self._client = self._cluster = None
+
+    def _connect(self) -> Any:
+        import dask
+        from distributed import Client
+
+        with dask.config.set(DASK_CONFIG):
+            address = self.scheduler or self._start_cluster()
+            try:
+                return Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+            except (OSError, ValueError) as error:
+                raise PlanError(
+                    f"the scheduler {address} does not answer ({error}); start it, then bake again"
+                ) from None
+
+    def _start_cluster(self) -> Any:
+        from distributed import LocalCluster
+
+        self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=self.num_workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            local_directory=tempfile.gettempdir(),
+            silence_logs=logging.ERROR,
+            env=ONE_THREAD,
+        )
+        return self._cluster

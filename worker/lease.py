@@ -1,0 +1,79 @@
+"""Who runs a bake. Several services may share one ledger; a lease keeps each bake with one of them.
+
+An owner is named host/process/nonce/number. Its lease ends when it stops renewing it, and at once when it ran on this
+host and its process is gone, so that a restart after a crash does not wait.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import socket
+import threading
+import uuid
+from typing import TYPE_CHECKING
+
+from sqlalchemy.exc import SQLAlchemyError
+
+if TYPE_CHECKING:
+    from worker.ledger import Ledger
+
+log = logging.getLogger(__name__)
+
+LEASE_S = 15.0
+HEARTBEAT_S = 1.0
+
+_NONCE = uuid.uuid4().hex
+_numbers = itertools.count()
+
+
+def new_owner() -> str:
+    """A name for a service of this process that no other has."""
+    return f"{socket.gethostname()}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
+
+
+def is_alive(owner: str, heartbeat: float, now: float) -> bool:
+    """Whether an owner still holds its lease, by what can be known from here.
+
+    Args:
+        heartbeat, now: seconds since 1970.
+    """
+    if now - heartbeat > LEASE_S:
+        return False
+    host, pid, nonce, _ = owner.split("/")
+    if host != socket.gethostname():
+        return True
+    if int(pid) == os.getpid():
+        return nonce == _NONCE
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+class LeaseKeeper:
+    """Renews the lease of a bake while it runs, also through long steps such as the check before publishing."""
+
+    def __init__(self, ledger: Ledger, bake_id: str, owner: str) -> None:
+        self._ledger, self._bake_id, self._owner = ledger, bake_id, owner
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._renew, name="relume-lease", daemon=True)
+
+    def __enter__(self) -> LeaseKeeper:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+        self._thread.join()
+
+    def _renew(self) -> None:
+        while not self._done.wait(HEARTBEAT_S):
+            try:
+                self._ledger.keep_lease(self._bake_id, self._owner)
+            except SQLAlchemyError as error:  # a database that is away for some seconds costs no lease
+                log.warning("the lease of bake %s was not renewed: %s", self._bake_id, error)

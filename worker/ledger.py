@@ -1,0 +1,186 @@
+"""The ledger: which bakes exist, how far they are, who runs them. It is the truth; the scheduler is disposable.
+
+    queued ──claim──▶ running ──▶ ready
+      ▲                 │ └─────▶ failed     submitting a failed or cancelled bake again queues it; finished tasks stay
+      └───submit────────┴───────▶ cancelled
+
+Every change is one statement that names the state it expects, so that processes which race cannot both win.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any, cast
+
+from sqlalchemy import CursorResult, Engine, delete, func, or_, select, update
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.errors import NotFoundError
+from relume.transfer.base import Plan, Recipe, Task
+from worker.lease import is_alive
+from worker.models import BakeRow, TaskRow
+from worker.status import BakeState, BakeStatus, TaskCost, bake_id, recipe_from_json, recipe_json
+
+
+class Ledger:
+    """Bakes and their tasks in a database; safe to use from several threads and processes."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self.sessions = sessionmaker(engine, expire_on_commit=False)
+
+    def close(self) -> None:
+        """Close the connections to the database."""
+        self._engine.dispose()
+
+    def submit(self, scene_id: str, recipe: Recipe, plan: Plan) -> str:
+        """Queue a bake and return its id. The same recipe is the same bake; a failed or cancelled one is resumed."""
+        identity, now = bake_id(scene_id, recipe), time.time()
+        row = BakeRow(
+            id=identity,
+            scene_id=scene_id,
+            recipe=recipe_json(recipe),
+            plan=json.dumps(asdict(plan)),
+            state="queued",
+            created=now,
+            queued=now,
+        )
+        if self._get(identity) is None:
+            try:
+                with self.sessions.begin() as session:
+                    session.add(row)
+                return identity
+            except IntegrityError:
+                if self._get(identity) is None:  # not somebody else's same recipe: the scene is gone
+                    raise NotFoundError(f"there is no scene {scene_id}; import it first") from None
+        self.requeue(identity, ("failed", "cancelled"))
+        return identity
+
+    def requeue(self, identity: str, states: Sequence[BakeState]) -> None:
+        """Put a bake that is in one of `states` back into the queue."""
+        self._change(identity, states, state="queued", problem=None, queued=time.time(), seconds_left=None)
+
+    def bake(self, identity: str) -> BakeStatus:
+        """A bake by id. Raises NotFoundError."""
+        row = self._get(identity)
+        if row is None:
+            raise NotFoundError(f"there is no bake {identity[:40]}; queue one first")
+        return _status(row)
+
+    def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
+        """All bakes, or those of a scene; newest first."""
+        query = select(BakeRow).order_by(BakeRow.created.desc(), BakeRow.id)
+        if scene_id is not None:
+            query = query.where(BakeRow.scene_id == scene_id)
+        with self.sessions() as session:
+            return [_status(row) for row in session.scalars(query)]
+
+    def cancel(self, identity: str) -> bool:
+        """Cancel a bake that is queued or running; whoever runs it sees that at its next heartbeat."""
+        return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None)
+
+    def claimable(self) -> list[str]:
+        """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
+        query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
+        with self.sessions() as session:
+            return [row.id for row in session.scalars(query) if not _is_owned(row)]
+
+    def claim(self, identity: str, owner: str) -> bool:
+        """Take the lease of a bake and make it running. False where somebody else has it."""
+        row = self._get(identity)
+        if row is None or _is_owned(row):
+            return False
+        unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
+        return self._change(
+            identity, ("queued", "running"), unchanged, state="running", owner=owner, heartbeat=time.time()
+        )
+
+    def beat(self, identity: str, owner: str, **progress: float | None) -> bool:
+        """Record progress. False where the bake was cancelled or taken over: stop."""
+        mine = BakeRow.owner == owner
+        return self._change(identity, ("running",), mine, heartbeat=time.time(), **progress)
+
+    def keep_lease(self, identity: str, owner: str) -> None:
+        """Renew the lease of a bake in whatever state it is."""
+        self._change(identity, None, BakeRow.owner == owner, heartbeat=time.time())
+
+    def finish(
+        self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
+    ) -> None:
+        """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled."""
+        mine = BakeRow.owner == owner
+        done = {"progress": 1.0} if state == "ready" else {}
+        self._change(
+            identity, ("running",), mine, state=state, problem=problem, bytes=num_bytes, seconds_left=None, **done
+        )
+        self._change(identity, None, mine, owner=None)
+
+    def delete_bakes(self, scene_id: str) -> list[str]:
+        """Forget all bakes of a scene and return their ids."""
+        ids = [status.id for status in self.bakes(scene_id)]
+        with self.sessions.begin() as session:
+            session.execute(delete(TaskRow).where(TaskRow.bake_id.in_(ids)))
+            session.execute(delete(BakeRow).where(BakeRow.id.in_(ids)))
+        return ids
+
+    def finished_tasks(self, identity: str) -> dict[tuple[int, int], TaskCost]:
+        """What the finished tasks of a bake took, by (stage, index)."""
+        with self.sessions() as session:
+            rows = session.scalars(select(TaskRow).where(TaskRow.bake_id == identity))
+            return {(row.stage, row.index): TaskCost(row.rays, row.trace_s, row.seconds) for row in rows}
+
+    def finish_task(self, identity: str, task: Task, cost: TaskCost, attempts: int) -> None:
+        """Record that a task's shards are on disk; once more changes nothing."""
+        row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
+        with self.sessions.begin() as session:
+            session.merge(row)
+
+    def forget_tasks(self, identity: str) -> None:
+        """Start a bake from nothing: its unfinished store is gone or damaged."""
+        with self.sessions.begin() as session:
+            session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
+
+    def rays_per_second(self) -> float | None:
+        """Rate of the bakes so far, rays over wall seconds of tasks in one process; None where there are none."""
+        with self.sessions() as session:
+            rays, seconds = session.execute(select(func.sum(TaskRow.rays), func.sum(TaskRow.seconds))).one()
+        return float(rays) / float(seconds) if seconds else None
+
+    def _get(self, identity: str) -> BakeRow | None:
+        with self.sessions() as session:
+            return session.get(BakeRow, identity)
+
+    def _change(self, identity: str, states: Sequence[BakeState] | None, *conditions: Any, **values: Any) -> bool:
+        statement = update(BakeRow).where(BakeRow.id == identity, *conditions).values(**values)
+        if states is not None:
+            statement = statement.where(BakeRow.state.in_(states))
+        with self.sessions.begin() as session:
+            return cast("CursorResult[Any]", _execute(session, statement)).rowcount == 1
+
+
+def _execute(session: Session, statement: Any) -> Any:
+    return session.execute(statement, execution_options={"synchronize_session": False})
+
+
+def _is_owned(row: BakeRow) -> bool:
+    return row.owner is not None and is_alive(row.owner, row.heartbeat, time.time())
+
+
+def _status(row: BakeRow) -> BakeStatus:
+    return BakeStatus(
+        id=row.id,
+        scene=row.scene_id,
+        state=cast("BakeState", row.state),
+        progress=row.progress,
+        rays_per_second=row.rays_per_second,
+        seconds_left=row.seconds_left,
+        bytes=row.bytes,
+        problem=row.problem,
+        recipe=recipe_from_json(row.recipe),
+        plan=Plan(**json.loads(row.plan)),
+        created=row.created,
+    )

@@ -1,0 +1,31 @@
+"""Where things lie in the data directory. Ids are checked here: no other string becomes part of a path."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from relume.errors import NotFoundError
+
+_ID = re.compile(r"[0-9a-f]{16}")
+
+
+def _checked(identity: str) -> str:
+    if not _ID.fullmatch(identity):
+        raise NotFoundError(f"{identity[:40]!r} is not an id; ids are 16 hexadecimal digits")
+    return identity
+
+
+def scene_path(data_dir: Path, scene_id: str) -> Path:
+    """Folder of a scene. Raises NotFoundError where the id is malformed, as all of these do."""
+    return data_dir / "scenes" / _checked(scene_id)
+
+
+def bake_path(data_dir: Path, bake_id: str) -> Path:
+    """The published store of a bake."""
+    return data_dir / "bakes" / f"{_checked(bake_id)}.zarr"
+
+
+def staging_path(data_dir: Path, bake_id: str) -> Path:
+    """The store of a bake that is not finished."""
+    return data_dir / "bakes" / "staging" / f"{_checked(bake_id)}.zarr"

@@ -1,0 +1,101 @@
+"""The scene registry: scenes/<id>/ on disk, one row each in the ledger's database."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
+
+from relume.errors import NotFoundError
+from relume.scene.archive import save_scene
+from relume.scene.model import Scene
+from worker.ledger import Ledger
+from worker.models import SceneRow
+from worker.paths import bake_path, scene_path, staging_path
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """What lists show of a scene, without reading its arrays.
+
+    Attributes:
+        created: seconds since 1970.
+        views: camera names, in order.
+        materials: {"name", "terms"} each, in the order of material ids.
+    """
+
+    id: str
+    name: str
+    created: float
+    views: tuple[str, ...]
+    materials: tuple[dict[str, Any], ...]
+    warnings: tuple[str, ...]
+    num_triangles: int
+
+
+def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
+    """Keep a scene and return its id; the same content twice is the same scene, its newest name and warnings win."""
+    save_scene(scene, scene_path(data_dir, scene.id))
+    summary = {
+        "views": [camera.name for camera in scene.cameras],
+        "materials": [{"name": material.name, "terms": list(material.terms)} for material in scene.materials],
+        "warnings": list(scene.warnings),
+        "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
+    }
+    row = SceneRow(id=scene.id, name=scene.name, created=time.time(), summary=json.dumps(summary))
+    try:
+        with ledger.sessions.begin() as session:
+            session.add(row)
+    except IntegrityError:
+        with ledger.sessions.begin() as session:
+            if (known := session.get(SceneRow, scene.id)) is not None:
+                known.name, known.summary = scene.name, json.dumps(summary)
+    return scene.id
+
+
+def list_scenes(ledger: Ledger) -> list[SceneRecord]:
+    """All scenes, newest first."""
+    with ledger.sessions() as session:
+        return [_record(row) for row in session.scalars(select(SceneRow).order_by(SceneRow.created.desc()))]
+
+
+def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
+    """A scene by id. Raises NotFoundError."""
+    with ledger.sessions() as session:
+        row = session.get(SceneRow, scene_id)
+    if row is None:
+        raise NotFoundError(f"there is no scene {scene_id[:40]}; import it first")
+    return _record(row)
+
+
+def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
+    """Delete a scene with its bakes and their stores: they are of no use without it. Raises NotFoundError."""
+    get_scene(ledger, scene_id)
+    for status in ledger.bakes(scene_id):
+        ledger.cancel(status.id)
+    for identity in ledger.delete_bakes(scene_id):
+        shutil.rmtree(bake_path(data_dir, identity), ignore_errors=True)
+        shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
+    with ledger.sessions.begin() as session:
+        if (row := session.get(SceneRow, scene_id)) is not None:
+            session.delete(row)
+    shutil.rmtree(scene_path(data_dir, scene_id), ignore_errors=True)
+
+
+def _record(row: SceneRow) -> SceneRecord:
+    summary = json.loads(row.summary)
+    return SceneRecord(
+        id=row.id,
+        name=row.name,
+        created=row.created,
+        views=tuple(summary["views"]),
+        materials=tuple(summary["materials"]),
+        warnings=tuple(summary["warnings"]),
+        num_triangles=summary["num_triangles"],
+    )

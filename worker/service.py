@@ -1,0 +1,216 @@
+"""The bake service: what the server and the command line use. It owns the threads that run bakes; the ledger and the
+stores own everything that must survive them."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+
+from relume.errors import NotFoundError, ParameterError
+from relume.transfer.base import Plan, Recipe, TransferMethod
+from worker.bake import BakeRunner, check_published
+from worker.board import StatusBoard, Subscription
+from worker.budget import check_budget
+from worker.database import open_database
+from worker.executor import Executors, is_tiny
+from worker.lease import new_owner
+from worker.ledger import Ledger
+from worker.paths import bake_path
+from worker.status import BakeStatus, bake_id
+from worker.tasks import Job, scene_of
+
+log = logging.getLogger(__name__)
+
+POLL_S = 1.0
+CLOSE_S = 10.0
+
+
+class BakeService:
+    """Queues, runs and follows bakes. Several services may share a data directory and a ledger."""
+
+    def __init__(
+        self,
+        data_dir: Path,
+        ledger_url: str | None = None,
+        scheduler: str | None = None,
+        num_workers: int | None = None,
+        methods: Mapping[str, TransferMethod] | None = None,
+    ) -> None:
+        """
+        Args:
+            data_dir: folder of scenes and bakes; made where it is missing.
+            ledger_url: SQLAlchemy URL; None: relume.db in the data directory.
+            scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
+            num_workers: processes of the embedded cluster; None: one per core.
+            methods: what can be baked, by name; None: relume's registry.
+        """
+        self.data_dir = data_dir.resolve()
+        self.data_dir.mkdir(parents=True, exist_ok=True)
+        self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
+        self._methods = methods
+        self._executors = Executors(scheduler, num_workers)
+        self._board = StatusBoard(self.ledger)
+        self._owner = new_owner()
+        self._closing = threading.Event()
+        self._wake = threading.Condition()
+        self._threads: list[threading.Thread] = []
+
+    def start(self) -> None:
+        """Start running bakes: those in the queue, and those that a process left behind when it died."""
+        self._remove_strays()
+        for tiny in (True, False):
+            name = "relume-tiny-bakes" if tiny else "relume-bakes"
+            self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
+            self._threads[-1].start()
+
+    def close(self) -> None:
+        """Stop running bakes; an unfinished one continues at the next start."""
+        self._closing.set()
+        self._changed()
+        for thread in self._threads:
+            thread.join(CLOSE_S)
+        self._executors.close()
+        self._board.close()
+        self.ledger.close()
+
+    def __enter__(self) -> BakeService:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def plan(self, scene_id: str, recipe: Recipe) -> Plan:
+        """What a bake would cost, checked against this machine's memory and disk; traces nothing.
+
+        Raises:
+            NotFoundError: there is no such scene.
+            PlanError: the recipe does not fit the scene; MemoryBudgetError: it does not fit the machine.
+            ParameterError: there is no such method.
+        """
+        scene = scene_of(self.data_dir, self._known_scene(scene_id))
+        plan = self._method(recipe.method).plan(scene, recipe)
+        processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
+        check_budget(plan, self.data_dir, processes)
+        return plan
+
+    def submit(self, scene_id: str, recipe: Recipe) -> str:
+        """Queue a bake and return its id; raises what `plan` raises.
+
+        The same recipe is the same bake: one that is queued, running or ready stays as it is, one that failed or was
+        cancelled goes on where it stopped.
+        """
+        identity = bake_id(scene_id, recipe)
+        if self._is_ready(identity):
+            return identity
+        self.ledger.submit(scene_id, recipe, self.plan(scene_id, recipe))
+        self._changed()
+        return identity
+
+    def get(self, bake_id: str) -> BakeStatus:
+        """A bake. Raises NotFoundError."""
+        return self.ledger.bake(bake_id)
+
+    def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
+        """All bakes, or those of a scene; newest first."""
+        return self.ledger.bakes(scene_id)
+
+    def subscribe(self, bake_id: str) -> Subscription:
+        """Follow a bake, whichever process runs it. Raises NotFoundError."""
+        return self._board.subscribe(bake_id)
+
+    def cancel(self, bake_id: str) -> None:
+        """Cancel a bake; finished tasks are kept for a resume. One that is not under way stays as it is."""
+        self.get(bake_id)
+        self.ledger.cancel(bake_id)
+        self._changed()
+
+    def store_path(self, bake_id: str) -> Path:
+        """Where the published store of a bake lies. Raises NotFoundError where the id is malformed."""
+        return bake_path(self.data_dir, bake_id)
+
+    def rays_per_second(self) -> float | None:
+        """Rate of one process in the bakes so far, for estimates; None where there were none."""
+        return self.ledger.rays_per_second()
+
+    def _known_scene(self, scene_id: str) -> str:
+        from worker.scenes import get_scene
+
+        return get_scene(self.ledger, scene_id).id
+
+    def _method(self, name: str) -> TransferMethod:
+        if self._methods is None:
+            from relume.transfer.registry import METHODS
+
+            self._methods = METHODS
+        if name not in self._methods:
+            raise ParameterError("method", name, f"one of {', '.join(sorted(self._methods))}")
+        return self._methods[name]
+
+    def _is_ready(self, identity: str) -> bool:
+        """Whether a bake is finished and its store usable; a lost or damaged store is queued again."""
+        try:
+            state = self.ledger.bake(identity).state
+        except NotFoundError:
+            return False
+        if state != "ready":
+            return False
+        if check_published(self.store_path(identity)):
+            return True
+        self.ledger.forget_tasks(identity)
+        self.ledger.requeue(identity, ("ready",))
+        return False
+
+    def _changed(self) -> None:
+        self._board.changed()
+        with self._wake:
+            self._wake.notify_all()
+
+    def _run_lane(self, tiny: bool) -> None:
+        """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
+        while not self._closing.is_set():
+            try:
+                if not self._run_next(tiny):
+                    with self._wake:
+                        self._wake.wait(POLL_S)
+            except Exception:  # the database may be away for a while; the lane must outlive that
+                log.exception("the bake queue cannot be read; trying again")
+                self._closing.wait(POLL_S)
+
+    def _run_next(self, tiny: bool) -> bool:
+        for identity in self.ledger.claimable():
+            status = self.ledger.bake(identity)
+            if is_tiny(status.plan) == tiny and self.ledger.claim(identity, self._owner):
+                self._run(status, tiny)
+                return True
+        return False
+
+    def _run(self, status: BakeStatus, tiny: bool) -> None:
+        self._board.changed()
+        try:
+            method = self._method(status.recipe.method)
+            executor = self._executors.here() if tiny else self._executors.cluster()
+        except Exception as error:
+            self.ledger.finish(status.id, self._owner, "failed", str(error))
+            self._board.changed()
+            return
+        BakeRunner(
+            ledger=self.ledger,
+            job=Job(self.data_dir, status.id, status.scene, status.recipe, method),
+            owner=self._owner,
+            executor=executor,
+            window=1 if tiny else 2 * self._executors.cluster_threads(),
+            changed=self._board.changed,
+            stopped=self._closing.is_set,
+        ).run()
+
+    def _remove_strays(self) -> None:
+        """Delete unfinished stores that no bake in the ledger will finish."""
+        staging = self.data_dir / "bakes" / "staging"
+        wanted = {status.id for status in self.ledger.bakes() if status.state != "ready"}
+        for folder in staging.glob("*.zarr"):
+            if folder.name.removesuffix(".zarr") not in wanted:
+                shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,75 @@
+"""What the ledger knows about a bake, as everybody outside sees it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from relume.store.schema import SCHEMA_VERSION
+from relume.transfer.base import Plan, Recipe
+
+BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
+FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
+
+
+@dataclass(frozen=True)
+class BakeStatus:
+    """One bake at one moment.
+
+    Attributes:
+        progress: 0 to 1.
+        rays_per_second, seconds_left: None where nothing was measured yet.
+        bytes: size of the published store, 0 before.
+        problem: one sentence with what to do about it, None where all is well.
+        created: seconds since 1970.
+    """
+
+    id: str
+    scene: str
+    state: BakeState
+    progress: float
+    rays_per_second: float | None
+    seconds_left: float | None
+    bytes: int
+    problem: str | None
+    recipe: Recipe
+    plan: Plan
+    created: float
+
+    @property
+    def final(self) -> bool:
+        """Whether nothing more happens by itself."""
+        return self.state in FINAL_STATES
+
+
+@dataclass(frozen=True)
+class TaskCost:
+    """What a finished task took.
+
+    Attributes:
+        trace_s: seconds in the tracing kernels. seconds: all of it, writing included.
+    """
+
+    rays: int
+    trace_s: float
+    seconds: float
+
+
+def recipe_json(recipe: Recipe) -> str:
+    """A recipe as canonical JSON: equal recipes give equal text."""
+    return json.dumps(asdict(recipe), sort_keys=True, separators=(",", ":"))
+
+
+def recipe_from_json(text: str) -> Recipe:
+    """The inverse of `recipe_json`."""
+    document: dict[str, Any] = json.loads(text)
+    width, height = document["size"]
+    return Recipe(str(document["method"]), tuple(document["views"]), (width, height), int(document["num_lights"]))
+
+
+def bake_id(scene_id: str, recipe: Recipe) -> str:
+    """Name of a bake: the first 16 hexadecimal digits of SHA-256 over scene, recipe and schema version."""
+    text = json.dumps([scene_id, recipe_json(recipe), SCHEMA_VERSION])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

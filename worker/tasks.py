@@ -1,0 +1,45 @@
+"""One task in one process: load the scene once, compute, write whole shards."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from relume.scene.archive import load_scene
+from relume.scene.model import Scene
+from relume.store import fill
+from relume.transfer.base import Recipe, Task, TransferMethod
+from worker.paths import scene_path, staging_path
+from worker.status import TaskCost
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a process must know to run any task of a bake; small, it travels with every task.
+
+    Attributes:
+        data_dir: the data directory, at the same path on every machine of a cluster.
+    """
+
+    data_dir: Path
+    bake_id: str
+    scene_id: str
+    recipe: Recipe
+    method: TransferMethod
+
+
+@lru_cache(maxsize=2)
+def scene_of(data_dir: Path, scene_id: str) -> Scene:
+    """A registered scene; a process keeps the last two."""
+    return load_scene(scene_path(data_dir, scene_id))
+
+
+def run_task(job: Job, task: Task) -> TaskCost:
+    """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes."""
+    began = time.perf_counter()
+    scene = scene_of(job.data_dir, job.scene_id)
+    staging = staging_path(job.data_dir, job.bake_id)
+    written = fill.run_task(job.method, scene, job.recipe, staging, task)
+    return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - began)
