@@ -36,6 +36,8 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
     for k, operation in enumerate(patch):
         try:
             changed = _apply(changed, _checked(operation, k))
+        except RecursionError as error:  # jsonpatch copies values recursively
+            raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
         except (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError) as error:
             raise EditError(f"operation {k} cannot be applied: {str(error)[:200] or 'no such path'}") from error
     return complete_changes(changed, default, document)
