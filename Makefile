@@ -45,39 +45,44 @@ lint: $(PROJECT_STAMP)  ## style and types
 	$(BIN)/mypy
 
 client-check: $(CLIENT_STAMP)
-	cd client_web && npm run --silent typecheck && npm test --silent
+	cd client_web && npm run --silent check && npm test --silent
 
 lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
-	printf 'hatchling>=1.27\neditables\n' | $(LOCK_TOOLS)/bin/uv $(LOCK_ARGS) --extra dev pyproject.toml - -o requirements.lock
-	printf 'hatchling>=1.27\neditables\n' | $(LOCK_TOOLS)/bin/uv $(LOCK_ARGS) --constraint requirements.lock pyproject.toml - -o docker/requirements.lock
+	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev pyproject.toml - -o requirements.lock
+	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock pyproject.toml - -o docker/requirements.lock
 
 clean:  ## remove what make made; data and bakes stay
 	rm -rf $(VENV) client_web/node_modules client_web/dist build test-results
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# What `pip install -e .` builds with, so that nothing is fetched beside the lock.
+BUILD_NEEDS := hatchling>=1.27\neditables\n
 # Names, versions and hashes only: where packages come from is each machine's own setting.
-LOCK_ARGS := pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+UV := $(LOCK_TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--no-annotate --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
 
 $(LOCK_TOOLS)/bin/uv:
-	python="$$(.ci/find-python)" && "$$python" -m venv $(LOCK_TOOLS)
-	$(LOCK_TOOLS)/bin/pip install --quiet uv
+	@python="$$(.ci/find-python)" && "$$python" -m venv $(LOCK_TOOLS)
+	@$(LOCK_TOOLS)/bin/pip install --quiet uv
 
 $(PYTHON_STAMP): requirements.lock
-	python="$$(.ci/find-python)" && { [ -x $(BIN)/python ] || "$$python" -m venv $(VENV); }
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
-	touch $@
+	@python="$$(.ci/find-python)" && { [ -x $(BIN)/python ] || "$$python" -m venv $(VENV); }
+	@echo "Installing Python packages into $(VENV) …"
+	@$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	@touch $@
 
 $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
-	touch $@
+	@$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	@touch $@
 
 $(CLIENT_STAMP): client_web/package-lock.json
-	.ci/check-node
-	cd client_web && npm ci --no-audit --no-fund --loglevel=error
-	touch $@
+	@.ci/check-node
+	@echo "Installing the editor's packages …"
+	@cd client_web && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
 
 $(CLIENT_BUILD): $(CLIENT_STAMP) $(CLIENT_SOURCES)
-	cd client_web && npm run --silent build
-	touch $@
+	@echo "Building the editor …"
+	@cd client_web && npm run --silent build
+	@touch $@
