@@ -1,0 +1,83 @@
+"""What the documents claim about names, folders, terms and settings is what the code has."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from relume.brdf.registry import TERMS
+from server.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("docker/*.md")])
+IGNORED_FOLDERS = {"build", "dist", "data", "test-results"}
+
+
+def _read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def _anchor(heading: str) -> str:
+    """GitHub's anchor of a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_somewhere(document: Path) -> None:
+    text = re.sub(r"```.*?```", "", document.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)", text):
+        if target.startswith(("http://", "https://")):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (document.parent / path).resolve() if path else document
+        assert file.exists(), f"{target} is not there"
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+            assert anchor in {_anchor(heading) for heading in headings}, f"{target} has no such heading"
+
+
+def test_folder_map_of_the_readme_matches_ls() -> None:
+    section = _read("README.md").split("## Folders")[1]
+    told = set(re.findall(r"^(\w+)/", section.split("```")[1], flags=re.MULTILINE))
+    there = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith((".", "_"))}
+    assert told == {name for name in there - IGNORED_FOLDERS if not name.endswith(".egg-info")}
+
+
+def test_method_lists_every_term_and_its_curves() -> None:
+    rows = dict(re.findall(r"^\| `(\w+)`[^|]*\|(.*)$", _read("docs/method.md"), flags=re.MULTILINE))
+    for model, term in TERMS.items():
+        assert model in rows, f"docs/method.md has no row for {model}"
+        for curve in term.curves:
+            symbol = {"alpha": r"\gamma_\alpha", "beta": r"\gamma_\beta"}.get(curve.name, "\\" + curve.name)
+            assert symbol in rows[model], f"docs/method.md leaves out {curve.name} of {model}"
+
+
+def test_operations_lists_every_setting_and_no_other() -> None:
+    told = set(re.findall(r"RELUME_[A-Z_]+", _read("docs/operations.md")))
+    from_environment = {"RELUME_THREADS", "RELUME_SHARED_DATA"}
+    assert told == {f"RELUME_{name.upper()}" for name in Settings.model_fields} | from_environment
+
+
+def test_every_decision_is_in_the_index() -> None:
+    index = _read("docs/adr/README.md")
+    for page in ROOT.glob("docs/adr/0*.md"):
+        title = page.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+        assert f"[{title}]({page.name})" in index
+
+
+def test_citations_are_in_the_references() -> None:
+    keys = set(re.findall(r"^@\w+\{(\w+),", _read("docs/references.bib"), flags=re.MULTILINE))
+    cited = {key for page in DOCUMENTS for key in re.findall(r"\[`(\w+)`\]\(", page.read_text(encoding="utf-8"))}
+    assert cited <= keys
+
+
+@pytest.mark.parametrize("name", ["requirements.lock", "docker/requirements.lock"])
+def test_lock_has_a_hash_for_every_package_and_no_address(name: str) -> None:
+    lines = [line for line in _read(name).splitlines() if line and not line.lstrip().startswith("#")]
+    for line in lines:
+        assert re.fullmatch(r"[a-z0-9.-]+==\S+( ; [^\\]+)? \\|    --hash=sha256:[0-9a-f]{64}( \\)?", line), line
+    packages = sum("==" in line and not line.startswith(" ") for line in lines)
+    last_hashes = sum(line.startswith("    --hash") and not line.endswith("\\") for line in lines)
+    assert packages == last_hashes > 50
