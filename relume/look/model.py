@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
 
 Rgb = tuple[float, float, float]
-ToneMap = Literal["agx", "filmic", "linear"]
+ToneMap = Literal["agx", "filmic", "none"]
 
 
 class DrawnCurve(TypedDict):

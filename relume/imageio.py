@@ -1,0 +1,85 @@
+"""Writing pictures: EXR keeps linear radiance, PNG and WebP hold what the screen shows."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.errors import ParameterError, RelumeError, ShapeMismatchError
+from relume.tonemap import tone_map
+
+__all__ = ["to_bytes", "tone_map", "write_image"]
+
+F32 = NDArray[np.float32]
+
+
+def to_bytes(display: F32) -> NDArray[np.uint8]:
+    """Display values in [0, 1], rounded to 0…255. (...)"""
+    return (np.clip(display, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str = "agx") -> None:
+    """Write a picture in the format that its name ends in; the file appears whole or not at all.
+
+    Args:
+        path: ends in .exr (linear radiance, float32; exposure and tone map do not apply), .png or .webp (8 bit).
+        image: linear Rec. 709 radiance, top row first. (height, width, 3) float32
+        exposure: stops. tone_map_name: as for `tone_map`.
+    Raises:
+        ParameterError: another format, or no such tone map. ShapeMismatchError: not an RGB image.
+        RelumeError: the file cannot be written.
+    """
+    write = _WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise ParameterError("the image format", path.suffix, f"a file name ending in {', '.join(_WRITERS)}")
+    if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
+        raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")
+    try:
+        _write_whole(path, lambda unfinished: write(unfinished, image, exposure, tone_map_name))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
+
+
+def _write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    unfinished = path.with_name(f".unfinished-{uuid.uuid4().hex}{path.suffix.lower()}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
+    height, width, _ = image.shape
+    specification = OpenImageIO.ImageSpec(width, height, 3, OpenImageIO.FLOAT)
+    specification.attribute("compression", "zip")
+    specification.attribute("oiio:ColorSpace", "lin_rec709_scene")
+    output = OpenImageIO.ImageOutput.create(str(path))
+    if output is None or not output.open(str(path), specification):
+        raise OSError(OpenImageIO.geterror() if output is None else output.geterror())
+    written = output.write_image(np.ascontiguousarray(image, np.float32))
+    if not output.close() or not written:
+        raise OSError(output.geterror())
+
+
+def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
+    Image.fromarray(to_bytes(tone_map(image, exposure, tone_map_name))).save(path, "PNG")
+
+
+def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
+    Image.fromarray(to_bytes(tone_map(image, exposure, tone_map_name))).save(path, "WEBP", quality=92, method=4)
+
+
+_WRITERS: dict[str, Callable[[Path, F32, float, str], None]] = {
+    ".exr": _write_exr,
+    ".png": _write_png,
+    ".webp": _write_webp,
+}
