@@ -65,8 +65,7 @@ class BakeRunner:
             num_bytes = self._bake()
         except CancelledError:
             self._land()
-            if not self.stopped():
-                self.ledger.finish(identity, self.owner, "cancelled")
+            self.ledger.release(identity, self.owner)
         except Exception as error:  # whatever a method raises must not end the service
             self._land()
             if not isinstance(error, RelumeError | OSError):

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Engine, MetaData, create_engine, event
 from sqlalchemy.engine import make_url
+from sqlalchemy.exc import DBAPIError
 
 from worker.models import Base
 
 BUSY_TIMEOUT_MS = 30_000
+CREATE_ATTEMPTS = 5
 
 
 def open_database(url: str) -> Engine:
@@ -22,8 +24,19 @@ def open_database(url: str) -> Engine:
     engine = create_engine(parsed, pool_pre_ping=not sqlite)
     if sqlite:
         event.listen(engine, "connect", _set_up_sqlite)
-    Base.metadata.create_all(engine, checkfirst=True)
+    create_tables(engine, Base.metadata)
     return engine
+
+
+def create_tables(engine: Engine, metadata: MetaData) -> None:
+    """Make the tables that are missing. Two processes may find them missing at once; the later one looks again."""
+    for attempt in range(CREATE_ATTEMPTS):
+        try:
+            metadata.create_all(engine)
+            return
+        except DBAPIError:
+            if attempt == CREATE_ATTEMPTS - 1:
+                raise
 
 
 def _set_up_sqlite(connection: Any, _: object) -> None:

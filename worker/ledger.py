@@ -117,7 +117,11 @@ class Ledger:
         self._change(
             identity, ("running",), mine, state=state, problem=problem, bytes=num_bytes, seconds_left=None, **done
         )
-        self._change(identity, None, mine, owner=None)
+        self.release(identity, owner)
+
+    def release(self, identity: str, owner: str) -> None:
+        """Give up the lease and leave the state as it is: whoever comes next may claim the bake at once."""
+        self._change(identity, None, BakeRow.owner == owner, owner=None)
 
     def delete_bakes(self, scene_id: str) -> list[str]:
         """Forget all bakes of a scene and return their ids."""

@@ -55,7 +55,7 @@ class BakeService:
         self._board = StatusBoard(self.ledger)
         self._owner = new_owner()
         self._closing = threading.Event()
-        self._wake = threading.Condition()
+        self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
@@ -166,16 +166,16 @@ class BakeService:
 
     def _changed(self) -> None:
         self._board.changed()
-        with self._wake:
-            self._wake.notify_all()
+        for wake in self._wakes.values():
+            wake.set()
 
     def _run_lane(self, tiny: bool) -> None:
         """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
         while not self._closing.is_set():
             try:
+                self._wakes[tiny].clear()
                 if not self._run_next(tiny):
-                    with self._wake:
-                        self._wake.wait(POLL_S)
+                    self._wakes[tiny].wait(POLL_S)
             except Exception:  # the database may be away for a while; the lane must outlive that
                 log.exception("the bake queue cannot be read; trying again")
                 self._closing.wait(POLL_S)

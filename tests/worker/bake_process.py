@@ -1,0 +1,25 @@
+"""A program of its own that bakes the fake method and can be killed: bake_process.py DATA_DIR METHOD_JSON [WORKERS]."""
+
+import json
+import sys
+from pathlib import Path
+
+from fake_method import RECIPE, FakeMethod, tiny_scene
+
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+
+def main() -> None:
+    data_dir, options = Path(sys.argv[1]), json.loads(sys.argv[2])
+    num_workers = int(sys.argv[3]) if len(sys.argv) > 3 else None
+    service = BakeService(data_dir, num_workers=num_workers, methods={"fake": FakeMethod(**options)})
+    scene_id = register_scene(service.data_dir, service.ledger, tiny_scene())
+    with service, service.subscribe(service.submit(scene_id, RECIPE)) as changes:
+        for status in changes:
+            sys.stdout.write(f"{status.state} {status.progress:.3f} {status.problem or ''}\n")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

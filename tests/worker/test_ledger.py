@@ -1,0 +1,141 @@
+"""The ledger names each bake once, lets one owner run it, and keeps what was finished."""
+
+import threading
+from pathlib import Path
+
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+
+from relume.errors import NotFoundError
+from relume.transfer.base import Recipe, Task
+from worker import lease
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import delete_scene, get_scene, list_scenes, register_scene
+from worker.status import TaskCost, bake_id, recipe_from_json, recipe_json
+
+SCENE = tiny_scene()
+PLAN = FakeMethod().plan(SCENE, RECIPE)
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    ledger = Ledger(open_database(f"sqlite:///{tmp_path / 'relume.db'}"))
+    register_scene(tmp_path, ledger, SCENE)
+    return ledger
+
+
+def test_recipe_survives_json_and_names_the_bake() -> None:
+    assert recipe_from_json(recipe_json(RECIPE)) == RECIPE
+    others = [
+        Recipe("fake", ("left", "front"), (16, 32), 24),
+        Recipe("fake", ("front", "left"), (32, 16), 24),
+        Recipe("fake", ("front", "left"), (16, 32), 25),
+        Recipe("direct", ("front", "left"), (16, 32), 24),
+    ]
+    assert len({bake_id(SCENE.id, recipe) for recipe in [RECIPE, *others]} | {bake_id("0" * 16, RECIPE)}) == 6
+
+
+def test_same_recipe_from_many_threads_is_one_bake(ledger: Ledger) -> None:
+    ids: list[str] = []
+    threads = [threading.Thread(target=lambda: ids.append(ledger.submit(SCENE.id, RECIPE, PLAN))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert ids == [bake_id(SCENE.id, RECIPE)] * 8
+    assert [status.state for status in ledger.bakes()] == ["queued"]
+
+
+def test_unknown_scene_cannot_be_baked(ledger: Ledger) -> None:
+    with pytest.raises(NotFoundError):
+        ledger.submit("0" * 16, RECIPE, PLAN)
+
+
+def test_only_one_of_many_claims_a_bake(ledger: Ledger) -> None:
+    identity, won = ledger.submit(SCENE.id, RECIPE, PLAN), []
+
+    def claim() -> None:
+        owner = lease.new_owner()
+        if ledger.claim(identity, owner):
+            won.append(owner)
+
+    threads = [threading.Thread(target=claim) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(won) == 1
+    assert ledger.claimable() == []
+    assert ledger.beat(identity, won[0], progress=0.5)
+    assert not ledger.beat(identity, lease.new_owner(), progress=0.9)
+    assert ledger.bake(identity).progress == 0.5
+
+
+def test_lease_ends_when_it_is_not_renewed(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
+    assert ledger.claim(identity, first)
+    monkeypatch.setattr(lease, "LEASE_S", -1.0)
+    assert ledger.claimable() == [identity]
+    assert ledger.claim(identity, second)
+    monkeypatch.undo()
+    assert not ledger.beat(identity, first)
+    ledger.finish(identity, first, "failed", "too late")
+    assert ledger.bake(identity).state == "running"
+
+
+def test_lease_of_a_dead_process_ends_at_once() -> None:
+    host, _, nonce, number = lease.new_owner().split("/")
+    assert lease.is_alive(lease.new_owner(), 100.0, 101.0)
+    assert not lease.is_alive(f"{host}/{2**22 + 1}/{nonce}/{number}", 100.0, 101.0)
+    assert lease.is_alive(f"{host}x/{2**22 + 1}/{nonce}/{number}", 100.0, 101.0)
+    pid = lease.new_owner().split("/")[1]
+    assert not lease.is_alive(f"{host}/{pid}/another-run-of-this-container/0", 100.0, 101.0)
+
+
+def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -> None:
+    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
+    ledger.claim(identity, owner)
+    ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    assert ledger.cancel(identity)
+    assert not ledger.beat(identity, owner)
+    ledger.finish(identity, owner, "ready")
+    assert ledger.bake(identity).state == "cancelled"
+    assert ledger.submit(SCENE.id, RECIPE, PLAN) == identity
+    assert ledger.bake(identity).state == "queued"
+    assert ledger.finished_tasks(identity) == {(0, 1): TaskCost(5, 0.1, 0.2)}
+
+
+def test_finished_bake_cannot_be_cancelled_and_stays_ready(ledger: Ledger) -> None:
+    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
+    ledger.claim(identity, owner)
+    ledger.finish(identity, owner, "ready", num_bytes=77)
+    assert not ledger.cancel(identity)
+    ledger.submit(SCENE.id, RECIPE, PLAN)
+    status = ledger.bake(identity)
+    assert (status.state, status.bytes, status.progress) == ("ready", 77, 1.0)
+
+
+def test_scenes_are_listed_and_deleted_with_their_bakes(tmp_path: Path, ledger: Ledger) -> None:
+    other = register_scene(tmp_path, ledger, tiny_scene("second"))
+    register_scene(tmp_path, ledger, SCENE)
+    assert {record.id for record in list_scenes(ledger)} == {SCENE.id, other}
+    record = get_scene(ledger, SCENE.id)
+    assert (record.name, record.views, record.num_triangles) == ("triangle", ("front", "left"), 1)
+    assert record.materials[0]["terms"][0]["model"] == "lambert"
+    identity = ledger.submit(SCENE.id, RECIPE, PLAN)
+    ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    delete_scene(tmp_path, ledger, SCENE.id)
+    assert [record.id for record in list_scenes(ledger)] == [other]
+    assert ledger.bakes() == []
+    assert not (tmp_path / "scenes" / SCENE.id).exists()
+    with pytest.raises(NotFoundError):
+        get_scene(ledger, SCENE.id)
+
+
+@pytest.mark.parametrize("identity", ["../../etc", "", "0" * 15, "G" * 16, "0" * 16 + "\n", "x" * 10_000])
+def test_malformed_ids_are_not_found(tmp_path: Path, ledger: Ledger, identity: str) -> None:
+    with pytest.raises(NotFoundError):
+        delete_scene(tmp_path, ledger, identity)
+    with pytest.raises(NotFoundError):
+        ledger.bake(identity)

@@ -1,0 +1,103 @@
+"""Real processes, really killed: the store that comes out is the same, bit for bit."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+
+from relume.store import bake_here
+from worker.database import open_database
+from worker.executor import TINY_BAKE_RAYS
+from worker.ledger import Ledger
+from worker.paths import bake_path
+from worker.status import bake_id
+
+IDENTITY = bake_id(tiny_scene().id, RECIPE)
+LARGE = TINY_BAKE_RAYS + 1
+NUM_TASKS = 2 + 2 * 9
+PROGRAM = Path(__file__).with_name("bake_process.py")
+
+
+def tree_hash(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+        digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return tree_hash(bake_here(FakeMethod(), tiny_scene(), RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
+
+
+def start(data_dir: Path, **method: Any) -> "subprocess.Popen[str]":
+    command = [sys.executable, str(PROGRAM), str(data_dir), json.dumps(method), "2"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def finish(process: "subprocess.Popen[str]") -> list[str]:
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    return output.splitlines()
+
+
+def wait_for(log: Path, num_tasks: int) -> None:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if log.exists() and len(log.read_text().split()) >= num_tasks:
+            return
+        time.sleep(0.02)
+    pytest.fail("the bake did not get under way")
+
+
+def test_worker_killed_during_a_task_is_replaced(tmp_path: Path, expected: str) -> None:
+    log = tmp_path / "log"
+    output = finish(start(tmp_path / "data", num_rays=LARGE, delay_s=0.02, log=str(log), kill="once"))
+    assert output[-1].startswith("ready")
+    assert (tmp_path / "log.died").exists()
+    assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
+
+
+def test_task_that_kills_every_worker_fails_the_bake_clearly(tmp_path: Path) -> None:
+    output = finish(start(tmp_path, num_rays=LARGE, log=str(tmp_path / "log"), kill="always"))
+    assert "worker processes died of the same task" in output[-1]
+    assert output[-1].startswith("failed")
+    assert not bake_path(tmp_path, IDENTITY).exists()
+
+
+@pytest.mark.parametrize("num_rays", [1000, LARGE], ids=["in the service's process", "on a cluster"])
+def test_everything_killed_resumes_where_the_ledger_stands(tmp_path: Path, expected: str, num_rays: int) -> None:
+    log, data_dir = tmp_path / "log", tmp_path / "data"
+    process = start(data_dir, num_rays=num_rays, delay_s=0.1, log=str(log))
+    wait_for(log, 8)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    ledger = Ledger(open_database(f"sqlite:///{data_dir / 'relume.db'}"))
+    assert ledger.bake(IDENTITY).state == "running"
+    done = ledger.finished_tasks(IDENTITY)
+    ledger.close()
+    assert 3 <= len(done) < NUM_TASKS
+    assert not bake_path(data_dir, IDENTITY).exists()
+    before = Counter(log.read_text().split())
+
+    assert finish(start(data_dir, num_rays=num_rays, log=str(log)))[-1].startswith("ready")
+    assert tree_hash(bake_path(data_dir, IDENTITY)) == expected
+    repeated = Counter(log.read_text().split()) - before
+    assert not set(repeated) & {f"{stage}.{index}" for stage, index in done}
+
+
+def test_two_processes_bake_one_recipe_once(tmp_path: Path, expected: str) -> None:
+    log = tmp_path / "log"
+    both = [start(tmp_path / "data", delay_s=0.02, log=str(log)) for _ in range(2)]
+    assert [finish(process)[-1].split()[0] for process in both] == ["ready", "ready"]
+    assert set(Counter(log.read_text().split()).values()) == {1}
+    assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected

@@ -1,0 +1,251 @@
+"""Bakes through the service, in this process, with a quick method: progress, cancel, resume, refusal, damage."""
+
+import hashlib
+import re
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+
+from relume.errors import MemoryBudgetError, NotFoundError, ParameterError
+from relume.store import bake_here, open_store
+from worker import lease
+from worker.scenes import delete_scene, register_scene
+from worker.service import BakeService
+from worker.status import BakeStatus
+
+SCENE = tiny_scene()
+NUM_TASKS = 2 + 2 * 9
+
+
+def open_service(data_dir: Path, **method: Any) -> BakeService:
+    service = BakeService(data_dir, methods={"fake": FakeMethod(**method)})
+    register_scene(service.data_dir, service.ledger, SCENE)
+    return service
+
+
+def follow(service: BakeService, identity: str) -> BakeStatus:
+    with service.subscribe(identity) as changes:
+        return list(changes)[-1]
+
+
+def tree_hash(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+        digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Hash of the store that an undisturbed bake gives."""
+    return tree_hash(bake_here(FakeMethod(), SCENE, RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
+
+
+def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str) -> None:
+    with open_service(tmp_path) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        with service.subscribe(identity) as changes:
+            seen = list(changes)
+        assert seen[-1].state == "ready"
+        assert seen[-1].progress == 1.0
+        assert seen[-1].bytes == sum(f.stat().st_size for f in service.store_path(identity).rglob("*") if f.is_file())
+        assert [s.progress for s in seen] == sorted(s.progress for s in seen)
+        assert tree_hash(service.store_path(identity)) == expected
+        assert service.submit(SCENE.id, RECIPE) == identity
+        assert service.get(identity).state == "ready"
+        assert not list((tmp_path / "bakes" / "staging").iterdir())
+
+
+def test_cancelled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path, expected: str) -> None:
+    log = tmp_path / "log"
+    with open_service(tmp_path, delay_s=0.02, log=str(log)) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        with service.subscribe(identity) as changes:
+            for status in changes:
+                if status.progress > 0.3:
+                    service.cancel(identity)
+        assert status.state == "cancelled"
+        assert not service.store_path(identity).exists()
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+    assert sorted(log.read_text().split()) == sorted(set(log.read_text().split()))
+    assert len(log.read_text().split()) == NUM_TASKS
+
+
+def test_closed_service_leaves_the_bake_for_the_next_start(tmp_path: Path, expected: str) -> None:
+    with open_service(tmp_path, delay_s=0.05) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        with service.subscribe(identity) as changes:
+            while (status := changes.get()) and status.progress < 0.3:
+                pass
+    with open_service(tmp_path) as service:
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+@pytest.mark.parametrize(
+    ("problem", "sentence"),
+    [("disk full", "disk full; free .* MB, then bake again; finished parts are kept"), ("memory", "out of memory")],
+)
+def test_failure_is_one_sentence_and_a_second_try_finishes(
+    tmp_path: Path, expected: str, problem: str, sentence: str
+) -> None:
+    with open_service(tmp_path, problem=problem) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        status = follow(service, identity)
+        assert status.state == "failed"
+        assert status.problem is not None
+        assert len(status.problem.splitlines()) == 1
+        assert re.match(sentence, status.problem)
+        assert not service.store_path(identity).exists()
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with open_service(tmp_path, problem="defect") as service:
+        status = follow(service, service.submit(SCENE.id, RECIPE))
+        assert status.state == "failed"
+        assert "ZeroDivisionError: one over nothing" in (status.problem or "")
+        assert "Traceback" in caplog.text
+        smaller = type(RECIPE)("fake", ("front",), (8, 8), 3)
+        assert follow(service, service.submit(SCENE.id, smaller)).state == "ready"
+
+
+def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    for cost in ({"peak_bytes": 1 << 60}, {"store_bytes": 1 << 60}):
+        with open_service(tmp_path, **cost) as service:
+            with pytest.raises(MemoryBudgetError, match="fewer lights"):
+                service.plan(SCENE.id, RECIPE)
+            with pytest.raises(MemoryBudgetError):
+                service.submit(SCENE.id, RECIPE)
+            assert service.bakes() == []
+
+
+def test_unknown_names_are_refused(tmp_path: Path) -> None:
+    with open_service(tmp_path) as service:
+        with pytest.raises(ParameterError, match="fake"):
+            service.plan(SCENE.id, type(RECIPE)("magic", ("front",), (8, 8), 3))
+        for scene_id in ("0" * 16, "../x"):
+            with pytest.raises(NotFoundError):
+                service.submit(scene_id, RECIPE)
+        for call in (service.get, service.cancel, service.subscribe):
+            with pytest.raises(NotFoundError):
+                call("0" * 16)
+
+
+def test_damaged_store_is_baked_again(tmp_path: Path, expected: str) -> None:
+    with open_service(tmp_path) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        follow(service, identity)
+        (service.store_path(identity) / "views/0/visibility/c/0/0").write_bytes(b"")
+        assert service.submit(SCENE.id, RECIPE) == identity
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_shard_damaged_before_publishing_fails_the_bake_and_the_next_starts_afresh(
+    tmp_path: Path, expected: str
+) -> None:
+    with open_service(tmp_path, problem="disk full") as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        follow(service, identity)
+    shard = next((tmp_path / "bakes" / "staging").glob("*.zarr/views/0/visibility/c/0/0"))
+    shard.write_bytes(b"x" * shard.stat().st_size)
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        status = follow(service, identity)
+        assert status.state == "failed"
+        assert "damaged" in (status.problem or "")
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_lost_staging_store_starts_the_bake_afresh(tmp_path: Path, expected: str) -> None:
+    with open_service(tmp_path, problem="disk full") as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        follow(service, identity)
+    (tmp_path / "bakes" / "staging" / f"{identity}.zarr").rename(tmp_path / "elsewhere")
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_two_services_share_one_bake(tmp_path: Path, expected: str) -> None:
+    log = tmp_path / "log"
+    with (
+        open_service(tmp_path, delay_s=0.01, log=str(log)) as first,
+        open_service(tmp_path, delay_s=0.01, log=str(log)) as second,
+    ):
+        identity = first.submit(SCENE.id, RECIPE)
+        assert second.submit(SCENE.id, RECIPE) == identity
+        assert follow(second, identity).state == follow(first, identity).state == "ready"
+    assert len(log.read_text().split()) == NUM_TASKS
+    assert tree_hash(first.store_path(identity)) == expected
+
+
+def test_scene_deleted_during_its_bake_ends_it(tmp_path: Path) -> None:
+    with open_service(tmp_path, delay_s=0.05) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        with service.subscribe(identity) as changes:
+            while (status := changes.get()) and status.progress < 0.2:
+                pass
+            delete_scene(service.data_dir, service.ledger, SCENE.id)
+            assert list(changes)[-1:] in ([], [changes.latest])
+        register_scene(service.data_dir, service.ledger, SCENE)
+        assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
+
+
+def test_stores_that_nobody_will_finish_are_removed_at_the_start(tmp_path: Path) -> None:
+    stray = tmp_path / "bakes" / "staging" / ("0" * 16 + ".zarr")
+    stray.mkdir(parents=True)
+    with open_service(tmp_path):
+        assert not stray.exists()
+
+
+def test_published_store_of_a_killed_service_is_taken_as_it_is(tmp_path: Path) -> None:
+    service = open_service(tmp_path)
+    identity = service.submit(SCENE.id, RECIPE)
+    service.ledger.claim(identity, "elsewhere/1/nonce/0")
+    bake_here(FakeMethod(), SCENE, RECIPE, service.store_path(identity))
+    service.ledger.keep_lease(identity, "elsewhere/1/nonce/0")
+    service.ledger._change(identity, None, heartbeat=time.time() - 2 * lease.LEASE_S)
+    with service:
+        assert follow(service, identity).state == "ready"
+
+
+def test_closing_ends_every_subscription(tmp_path: Path) -> None:
+    service = open_service(tmp_path)
+    identity = service.submit(SCENE.id, RECIPE)
+    ended = threading.Event()
+
+    def listen() -> None:
+        list(service.subscribe(identity))
+        ended.set()
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    time.sleep(0.1)
+    service.close()
+    thread.join(10)
+    assert ended.is_set()
+
+
+def test_store_reads_back_what_the_method_computed(tmp_path: Path) -> None:
+    with open_service(tmp_path) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        follow(service, identity)
+        store = open_store(service.store_path(identity))
+        dark = store.read("views/1/depth") > 0.7
+        assert dark.any()
+        assert np.array_equal(~store.read("views/1/visibility").any(axis=1), dark)
