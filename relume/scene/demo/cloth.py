@@ -11,7 +11,7 @@ from relume.scene.demo.tray import distance_outside
 F64 = NDArray[np.float64]
 
 THICKNESS = 0.0016  # height of the flat cloth, on which the tray stands
-CLOTH_TURN, CLOTH_CENTRE, CLOTH_SIZE = -13.0, (0.05, 0.0, 0.085), (0.64, 0.46)
+CLOTH_TURN, CLOTH_CENTRE, CLOTH_SIZE = -17.0, (0.05, 0.0, 0.095), (0.66, 0.46)
 STAGE_RADIUS, STAGE_CURVE, STAGE_HEIGHT = 0.80, 0.34, 0.62
 
 
@@ -23,12 +23,12 @@ def smoothstep(t: F64) -> F64:
 
 def fold_height(x: F64, z: F64) -> F64:
     """Height of the cloth over the table: flat under the tray, soft folds that fan out from it."""
-    free = smoothstep((distance_outside(x, z) - 0.030) / 0.10)
+    free = smoothstep((distance_outside(x, z) - 0.024) / 0.075)
     bend = 0.016 * np.sin(11.0 * x + 4.0 * z) + 0.010 * np.sin(17.0 * z - 6.0 * x + 1.3)
     long = np.sin(62.0 * (0.83 * x - 0.56 * z + bend) + 0.6)
     cross = np.sin(47.0 * (0.35 * x + 0.94 * z - 1.4 * bend) + 2.2)
     fine = np.sin(118.0 * (0.62 * x - 0.78 * z + 0.6 * bend) + 0.4)
-    ridges = 0.0105 * (0.5 + 0.5 * long) ** 1.7 + 0.0055 * (0.5 + 0.5 * cross) ** 2.0 + 0.0012 * fine
+    ridges = 0.0150 * (0.5 + 0.5 * long) ** 1.7 + 0.0080 * (0.5 + 0.5 * cross) ** 2.0 + 0.0016 * fine
     return THICKNESS + free * np.maximum(ridges + 0.001, 0.0)
 
 

@@ -18,7 +18,7 @@ def materials() -> tuple[Material, ...]:
                 {
                     "model": "ashikhmin_shirley",
                     "color": [1.0, 1.0, 1.0],
-                    "params": {"nu": 90.0, "nv": 900.0, "f0": 0.055},
+                    "params": {"nu": 160.0, "nv": 1200.0, "f0": 0.055},
                 },
             ),
         ),
@@ -40,11 +40,11 @@ def materials() -> tuple[Material, ...]:
         Material(
             "Pearls",
             (
-                {"model": "lambert", "color": [0.62, 0.55, 0.48]},
+                {"model": "lambert", "color": [0.56, 0.49, 0.42]},
                 {
                     "model": "cook_torrance",
                     "color": [1.0, 0.95, 0.92],
-                    "params": {"sigma": 0.11, "ior": 1.68, "extinction": 0.0},
+                    "params": {"sigma": 0.085, "ior": 1.68, "extinction": 0.0},
                 },
             ),
         ),

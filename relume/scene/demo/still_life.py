@@ -16,8 +16,8 @@ F64 = NDArray[np.float64]
 
 TRAY_Y = cloth.THICKNESS + pearls.GAP
 FLOOR_Y = TRAY_Y + tray.FLOOR + pearls.GAP
-TEAPOT_HEIGHT, TEAPOT_PLACE, TEAPOT_TURN = 0.150, (-0.030, -0.035), -24.0
-BOWL_PLACE = (0.160, 0.062)
+TEAPOT_HEIGHT, TEAPOT_PLACE, TEAPOT_TURN = 0.150, (-0.048, -0.032), -26.0
+BOWL_PLACE = (0.143, 0.050)
 
 
 def meshes() -> tuple[Mesh, ...]:
@@ -40,8 +40,8 @@ def cameras() -> tuple[Camera, ...]:
     """Two views at 4:3, about 55 mm on a full-frame sensor."""
     yfov = float(np.radians(24.0))
     return (
-        look_at("front", (0.10, 0.36, 0.93), (0.022, 0.052, 0.018), yfov),
-        look_at("left", (-0.66, 0.25, 0.72), (0.0, 0.056, 0.01), yfov),
+        look_at("front", (0.09, 0.345, 0.86), (0.012, 0.050, 0.030), yfov),
+        look_at("left", (-0.62, 0.24, 0.66), (0.0, 0.054, 0.02), yfov),
     )
 
 
@@ -70,8 +70,8 @@ def _string() -> tuple[F64, F64]:
     """A graduated string: from behind the bowl, round the pot's foot, over the rim and onto the cloth."""
     corners = np.array(
         [
-            [0.188, -0.020], [0.130, -0.012], [0.105, 0.040], [0.075, 0.088], [0.010, 0.088], [-0.050, 0.108],
-            [-0.075, 0.150], [-0.055, 0.205], [0.010, 0.228], [0.065, 0.214],
+            [0.178, -0.045], [0.120, -0.035], [0.082, 0.020], [0.070, 0.078], [0.018, 0.092], [-0.040, 0.118],
+            [-0.058, 0.170], [-0.020, 0.215], [0.040, 0.212], [0.075, 0.190],
         ]
     )  # fmt: skip
     path = smooth_path(corners)
@@ -91,7 +91,7 @@ def _heap() -> tuple[F64, F64]:
 def _loose() -> tuple[F64, F64]:
     """Three large ones that rolled away."""
     radii = np.array([0.0135, 0.0105, 0.0085])
-    places = ((0.170, 0.212), (0.205, 0.196), (-0.178, 0.096))
+    places = ((0.150, 0.205), (0.182, 0.193), (-0.168, 0.090))
     centres = [(x, pearls.resting_height(ground_height, x, z, r), z) for (x, z), r in zip(places, radii, strict=True)]
     return np.array(centres), radii
 

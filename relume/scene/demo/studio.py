@@ -11,22 +11,22 @@ from relume.scene.model import Environment
 F64 = NDArray[np.float64]
 
 HEIGHT, WIDTH = 256, 512
-CEILING = np.array([0.20, 0.23, 0.29])
-HORIZON = np.array([0.34, 0.30, 0.26])
-FLOOR = np.array([0.10, 0.075, 0.055])
+CEILING = np.array([0.10, 0.115, 0.15])
+HORIZON = np.array([0.15, 0.13, 0.115])
+FLOOR = np.array([0.05, 0.04, 0.03])
 
 
 def studio() -> Environment:
     """The studio as an equirectangular map of 512×256 texels; the picture's front is +Z."""
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)
     radiance = _room(w)
-    radiance += _window(w)[..., None] * np.array([9.6, 9.2, 8.6])
+    radiance += _window(w)[..., None] * np.array([13.0, 12.3, 11.2])
     strip = _panel(w, azimuth=-38.0, elevation=38.0, half_width=5.0, half_height=26.0, softness=1.5)
     radiance += strip[..., None] * np.array([10.0, 11.5, 14.0])
     fill = _panel(w, azimuth=12.0, elevation=12.0, half_width=24.0, half_height=20.0, softness=14.0)
-    radiance += fill[..., None] * np.array([0.75, 0.66, 0.55])
+    radiance += fill[..., None] * np.array([0.42, 0.37, 0.31])
     lamp = _panel(w, azimuth=118.0, elevation=46.0, half_width=1.8, half_height=1.8, softness=0.5)
-    radiance += lamp[..., None] * np.array([760.0, 610.0, 430.0])
+    radiance += lamp[..., None] * np.array([1000.0, 760.0, 500.0])
     return Environment("studio", radiance.astype(np.float32))
 
 

@@ -9,7 +9,7 @@ from relume.scene.demo.surfaces import Surface, closed_grid_surface, grid_faces,
 
 F64 = NDArray[np.float64]
 
-HALF_SIZE = np.array([0.225, 0.152])  # of the flat floor, x and z
+HALF_SIZE = np.array([0.212, 0.140])  # of the flat floor, x and z
 CORNER = 0.055
 FLOOR = 0.006  # height of the floor above the tray's underside
 WALL = 0.0055  # thickness of the rim

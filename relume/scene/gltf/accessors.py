@@ -1,0 +1,128 @@
+"""Accessors as NumPy arrays; every offset, stride and count is checked against the bytes that are there.
+
+glTF 2.0 specification, section 3.6.2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.gltf.container import PACKED_EXTENSIONS, Container
+from relume.scene.gltf.document import Accessor, Sparse
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+MAX_NUMBERS = 240_000_000  # in all accessors that are read: about what a file of the largest size can hold
+
+Array = NDArray[Any]
+
+
+class AccessorReader:
+    """Reads the accessors of one file, each once, within one budget for all of them."""
+
+    def __init__(self, container: Container) -> None:
+        self._container = container
+        self._read: dict[int, Array] = {}
+        self._budget = MAX_NUMBERS
+
+    def integers(self, index: int, what: str) -> Array:
+        """Unsigned scalars, such as vertex indices. (count,)"""
+        accessor = _at(self._container.document.accessors, index, what)
+        if accessor.type != "SCALAR" or accessor.componentType not in (5121, 5123, 5125):
+            raise SceneError(f"{what} are not unsigned scalars; export the scene again")
+        return np.asarray(self._values(index, accessor, what)[:, 0])
+
+    def floats(self, index: int, widths: tuple[int, ...], what: str) -> NDArray[np.float32]:
+        """Vectors; normalised integers scaled to [0, 1] or [-1, 1], other integers taken as they are. (count, width)
+
+        Raises:
+            SceneError: an index, offset, stride, type or count does not fit the data.
+        """
+        accessor = _at(self._container.document.accessors, index, what)
+        if WIDTHS.get(accessor.type) not in widths:
+            raise SceneError(f"{what} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
+        values = self._values(index, accessor, what)
+        if values.dtype.kind == "f" or not accessor.normalized:
+            return np.asarray(values, np.float32)
+        scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
+        return np.asarray(np.maximum(scaled, np.float32(-1)))
+
+    def _values(self, index: int, accessor: Accessor, what: str) -> Array:
+        if index not in self._read:
+            self._budget -= accessor.count * WIDTHS[accessor.type]
+            if self._budget < 0:
+                raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
+            self._read[index] = _read(self._container, accessor, what)
+        return self._read[index]
+
+
+def view_bytes(container: Container, index: int, what: str) -> memoryview:
+    """The bytes of a buffer view."""
+    view = _at(container.document.bufferViews, index, f"the buffer view of {what}")
+    for extension in PACKED_EXTENSIONS:
+        if extension in view.extensions:
+            raise SceneError(f"{what} is packed with {extension}; unpack it: {PACKED_EXTENSIONS[extension]}")
+    content: memoryview = _at(container.buffers, view.buffer, f"the buffer of {what}")
+    if view.byteOffset + view.byteLength > len(content):
+        raise SceneError(f"the buffer view of {what} reaches beyond its buffer; export the scene again")
+    return content[view.byteOffset : view.byteOffset + view.byteLength]
+
+
+def _read(container: Container, accessor: Accessor, what: str) -> Array:
+    """The values as stored, sparse substitutions made. (count, width)"""
+    width, dtype = WIDTHS[accessor.type], np.dtype(DTYPES[accessor.componentType])
+    if accessor.bufferView is None:
+        _check_zeros(container, accessor, width * dtype.itemsize, what)
+        values: Array = np.zeros((accessor.count, width), dtype)
+    else:
+        values = _strided(container, accessor.bufferView, accessor.byteOffset, accessor.count, width, dtype, what)
+    if accessor.sparse is not None:
+        _substitute(container, accessor.sparse, values, what)
+    return values
+
+
+def _strided(
+    container: Container, view_index: int, offset: int, count: int, width: int, dtype: np.dtype[Any], what: str
+) -> Array:
+    content = view_bytes(container, view_index, what)
+    element_bytes = width * dtype.itemsize
+    stride = container.document.bufferViews[view_index].byteStride or element_bytes
+    if stride < element_bytes:
+        raise SceneError(f"{what} have a stride of {stride} for elements of {element_bytes} bytes; export it again")
+    if offset + (count - 1) * stride + element_bytes > len(content):
+        raise SceneError(f"{what} have more elements than its buffer view holds; export the scene again")
+    return np.ndarray((count, width), dtype, content, offset, (stride, dtype.itemsize)).copy()
+
+
+def _substitute(container: Container, sparse: Sparse, values: Array, what: str) -> None:
+    """Puts the sparse values in their places."""
+    num_elements, width = values.shape
+    if sparse.count > num_elements:
+        raise SceneError(f"{what} have more sparse elements than elements; export the scene again")
+    places, kind = sparse.indices, np.dtype(DTYPES[sparse.indices.componentType])
+    indices = _strided(container, places.bufferView, places.byteOffset, sparse.count, 1, kind, f"sparse {what}")
+    if int(indices.max()) >= num_elements:
+        raise SceneError(f"{what} have sparse indices out of range; export the scene again")
+    news = sparse.values
+    values[indices[:, 0]] = _strided(
+        container, news.bufferView, news.byteOffset, sparse.count, width, values.dtype, f"sparse {what}"
+    )
+
+
+def _check_zeros(container: Container, accessor: Accessor, element_bytes: int, what: str) -> None:
+    """An accessor without a view is all zeros but for its sparse part: a few bytes that could claim gigabytes."""
+    if accessor.sparse is None:
+        raise SceneError(f"{what} have no data; export the scene again")
+    held_bytes = sum(len(buffer) for buffer in container.buffers)
+    if accessor.count * element_bytes > 1000 * held_bytes:
+        raise SceneError(f"{what} claim {accessor.count:,} elements and hold almost none; export the scene again")
+
+
+def _at(items: Any, index: int, what: str) -> Any:
+    if index >= len(items):
+        raise SceneError(f"{what} refer to number {index} of {len(items)}; export the scene again")
+    return items[index]

@@ -1,0 +1,152 @@
+"""From bytes to a checked document and its buffers: .glb, or .gltf whose buffers are data URIs.
+
+glTF 2.0 specification, section 4. Nothing outside the file is ever opened.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import unquote_to_bytes
+
+from pydantic import ValidationError
+
+from relume.errors import SceneError
+from relume.scene.gltf.document import Buffer, Document
+
+MAX_FILE_BYTES = 512 << 20
+MAX_JSON_BYTES = 128 << 20
+PACK = "pack everything into one file: gltf-transform copy in.gltf out.glb"
+
+# Required extensions that change what an accessor or image holds, with what undoes them.
+PACKED_EXTENSIONS = {
+    "KHR_draco_mesh_compression": "gltf-transform copy in.glb out.glb",
+    "EXT_meshopt_compression": "gltf-transform copy in.glb out.glb",
+    "KHR_meshopt_compression": "gltf-transform copy in.glb out.glb",
+    "KHR_texture_basisu": "gltf-transform ktxdecompress in.glb out.glb",
+}
+READ_EXTENSIONS = {
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "EXT_texture_webp",
+}
+
+
+@dataclass(frozen=True)
+class Container:
+    """A document and the bytes of its buffers, each at least as long as declared."""
+
+    document: Document
+    buffers: tuple[memoryview, ...]
+
+
+def read_container(data: bytes) -> Container:
+    """Splits and checks a file.
+
+    Raises:
+        SceneError: too large, truncated, not glTF 2, refers to other files, or requires an extension that packs data.
+    """
+    if len(data) > MAX_FILE_BYTES:
+        raise SceneError(f"the scene file has {len(data) >> 20} MB, {MAX_FILE_BYTES >> 20} MB are allowed; simplify it")
+    if data[:4] == b"glTF":
+        json_bytes, binary = _split_glb(data)
+    elif data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        json_bytes, binary = data, None
+    else:
+        raise SceneError("the scene file is neither .glb nor .gltf; export it as binary glTF 2.0 (.glb)")
+    document = parse_document(json_bytes)
+    _check_extensions(document)
+    buffers = [_buffer(i, buffer, binary) for i, buffer in enumerate(document.buffers)]
+    return Container(document, tuple(buffers))
+
+
+def parse_document(json_bytes: bytes) -> Document:
+    """The JSON chunk as a checked model; says where the first fault is."""
+    if len(json_bytes) > MAX_JSON_BYTES:
+        raise SceneError(f"the scene's JSON is larger than {MAX_JSON_BYTES >> 20} MB; export it as .glb")
+    try:
+        content = json.loads(json_bytes.decode("utf-8-sig"), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as problem:
+        raise SceneError(f"the scene's JSON cannot be read ({_first_line(problem)}); export it again") from None
+    try:
+        return Document.model_validate(content)
+    except ValidationError as problem:
+        fault = problem.errors(include_url=False, include_input=False)[0]
+        place = "/".join(str(step)[:40] for step in fault["loc"]) or "the document"
+        raise SceneError(
+            f"the scene's JSON is not valid glTF 2.0 at {place}: {fault['msg']}; export it again"
+        ) from None
+    except RecursionError:
+        raise SceneError("the scene's JSON is nested too deeply; export it again") from None
+
+
+def data_uri(uri: str, what: str) -> bytes:
+    """The content of a data URI.
+
+    Raises:
+        SceneError: the URI points outside the file (nothing is opened) or is damaged.
+    """
+    if uri[:5].lower() != "data:":
+        shown = uri[:60].encode("ascii", "replace").decode()
+        raise SceneError(f"{what} lies outside the file ({shown!r}); {PACK}")
+    head, comma, body = uri.partition(",")
+    try:
+        if head.lower().endswith(";base64"):
+            return base64.b64decode(unquote_to_bytes(body) if "%" in body else body, validate=True)
+        if comma:
+            return unquote_to_bytes(body)
+    except (binascii.Error, ValueError):
+        pass
+    raise SceneError(f"{what} is a damaged data URI; {PACK}")
+
+
+def _split_glb(data: bytes) -> tuple[bytes, memoryview | None]:
+    if len(data) < 20:
+        raise SceneError("the .glb file is truncated in its header; export or download it again")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise SceneError(f"the .glb file has version {version}; export it as glTF 2.0")
+    if length > len(data):
+        raise SceneError(f"the .glb file is truncated: {len(data):,} of {length:,} bytes; download it again")
+    chunks: list[tuple[bytes, memoryview]] = []
+    offset = 12
+    while offset + 8 <= length and len(chunks) < 64:
+        size, kind = struct.unpack_from("<I4s", data, offset)
+        if offset + 8 + size > length:
+            raise SceneError("a chunk of the .glb file is longer than the file; export it again")
+        chunks.append((kind, memoryview(data)[offset + 8 : offset + 8 + size]))
+        offset += 8 + size
+    if not chunks or chunks[0][0] != b"JSON":
+        raise SceneError("the .glb file does not begin with JSON; export it again")
+    binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
+    return bytes(chunks[0][1]), binary
+
+
+def _buffer(i: int, buffer: Buffer, binary: memoryview | None) -> memoryview:
+    if buffer.uri is not None:
+        content = memoryview(data_uri(buffer.uri, f"buffer {i}"))
+    elif i == 0 and binary is not None:
+        content = binary
+    else:
+        raise SceneError(f"buffer {i} has no data; {PACK}")
+    if len(content) < buffer.byteLength:
+        raise SceneError(f"buffer {i} is truncated: {len(content):,} of {buffer.byteLength:,} bytes; export it again")
+    return content[: buffer.byteLength]
+
+
+def _check_extensions(document: Document) -> None:
+    for name in document.extensionsRequired:
+        if name in PACKED_EXTENSIONS:
+            raise SceneError(f"the file is packed with {name}; unpack it: {PACKED_EXTENSIONS[name]}")
+
+
+def _refuse_constant(constant: str) -> Any:
+    raise ValueError(f"{constant} is no JSON number")
+
+
+def _first_line(problem: BaseException) -> str:
+    return (str(problem).partition("\n")[0] or type(problem).__name__)[:120]

@@ -1,0 +1,167 @@
+"""The JSON of a glTF file as bounded, typed models: whatever passes here has sane counts, offsets and numbers.
+
+Only what relume reads is declared; the rest of a document is ignored. Indices are checked where they are followed.
+glTF 2.0 specification, sections 3 and 5.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+MAX_COUNT = 2**32 - 1
+Index = Annotated[int, Field(ge=0, lt=2**31, strict=True)]
+Bytes = Annotated[int, Field(ge=0, lt=2**40, strict=True)]
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e30, le=1e30)]
+Factor = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
+Name = Annotated[str, Field(max_length=65_536)]
+Extensions = dict[str, Any]
+
+
+class Part(BaseModel):
+    """A glTF object; every one may have a name and extensions."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+    name: Name = ""
+    extensions: Extensions = {}
+
+
+class Asset(Part):
+    version: Annotated[str, Field(pattern=r"^2\.\d+$")]
+
+
+class Buffer(Part):
+    uri: str | None = None
+    byteLength: Bytes  # noqa: N815  (glTF's own spelling, here and below)
+
+
+class BufferView(Part):
+    buffer: Index
+    byteOffset: Bytes = 0  # noqa: N815
+    byteLength: Annotated[Bytes, Field(ge=1)]  # noqa: N815
+    byteStride: Annotated[int, Field(ge=4, le=252)] | None = None  # noqa: N815
+
+
+class SparseIndices(Part):
+    bufferView: Index  # noqa: N815
+    byteOffset: Bytes = 0  # noqa: N815
+    componentType: Literal[5121, 5123, 5125]  # noqa: N815
+
+
+class SparseValues(Part):
+    bufferView: Index  # noqa: N815
+    byteOffset: Bytes = 0  # noqa: N815
+
+
+class Sparse(Part):
+    count: Annotated[int, Field(ge=1, le=MAX_COUNT)]
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(Part):
+    bufferView: Index | None = None  # noqa: N815
+    byteOffset: Bytes = 0  # noqa: N815
+    componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]  # noqa: N815
+    normalized: bool = False
+    count: Annotated[int, Field(ge=1, le=MAX_COUNT)]
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    sparse: Sparse | None = None
+
+
+class Image(Part):
+    uri: str | None = None
+    bufferView: Index | None = None  # noqa: N815
+
+
+class Sampler(Part):
+    wrapS: int = 10_497  # noqa: N815
+    wrapT: int = 10_497  # noqa: N815
+
+
+class Texture(Part):
+    sampler: Index | None = None
+    source: Index | None = None
+
+
+class TextureInfo(Part):
+    index: Index
+    texCoord: Annotated[int, Field(ge=0, le=63)] = 0  # noqa: N815
+    scale: Number = 1.0
+
+
+class MetallicRoughness(Part):
+    baseColorFactor: Annotated[list[Factor], Field(min_length=4, max_length=4)] = [1.0, 1.0, 1.0, 1.0]  # noqa: N815
+    baseColorTexture: TextureInfo | None = None  # noqa: N815
+    metallicFactor: Factor = 1.0  # noqa: N815
+    roughnessFactor: Factor = 1.0  # noqa: N815
+    metallicRoughnessTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Material(Part):
+    pbrMetallicRoughness: MetallicRoughness = MetallicRoughness()  # noqa: N815
+    normalTexture: TextureInfo | None = None  # noqa: N815
+    occlusionTexture: TextureInfo | None = None  # noqa: N815
+    emissiveTexture: TextureInfo | None = None  # noqa: N815
+    emissiveFactor: list[Number] = [0.0, 0.0, 0.0]  # noqa: N815
+    alphaMode: str = "OPAQUE"  # noqa: N815
+    doubleSided: bool = False  # noqa: N815
+
+
+class Primitive(Part):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Annotated[int, Field(ge=0, le=6)] = 4
+    targets: list[Any] = []
+
+
+class Mesh(Part):
+    primitives: Annotated[list[Primitive], Field(min_length=1, max_length=65_536)]
+
+
+class Perspective(Part):
+    yfov: Annotated[float, Field(gt=0, lt=3.1, allow_inf_nan=False)]
+
+
+class Camera(Part):
+    type: Literal["perspective", "orthographic"]
+    perspective: Perspective | None = None
+
+
+class Node(Part):
+    children: list[Index] = []
+    matrix: Annotated[list[Number], Field(min_length=16, max_length=16)] | None = None
+    translation: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    rotation: Annotated[list[Number], Field(min_length=4, max_length=4)] = [0.0, 0.0, 0.0, 1.0]
+    scale: Annotated[list[Number], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]
+    mesh: Index | None = None
+    camera: Index | None = None
+    skin: Index | None = None
+
+
+class SceneRoot(Part):
+    nodes: list[Index] = []
+
+
+class Document(Part):
+    """The whole file. Lists longer than relume allows are refused before they are looked at."""
+
+    asset: Asset
+    extensionsUsed: list[Name] = []  # noqa: N815
+    extensionsRequired: list[Name] = []  # noqa: N815
+    accessors: Annotated[list[Accessor], Field(max_length=1_000_000)] = []
+    animations: list[Any] = []
+    buffers: Annotated[list[Buffer], Field(max_length=10_000)] = []
+    bufferViews: Annotated[list[BufferView], Field(max_length=1_000_000)] = []  # noqa: N815
+    cameras: Annotated[list[Camera], Field(max_length=1_000)] = []
+    images: Annotated[list[Image], Field(max_length=10_000)] = []
+    materials: Annotated[list[Material], Field(max_length=1_000)] = []
+    meshes: Annotated[list[Mesh], Field(max_length=100_000)] = []
+    nodes: Annotated[list[Node], Field(max_length=4_096)] = []
+    samplers: Annotated[list[Sampler], Field(max_length=10_000)] = []
+    scene: Index | None = None
+    scenes: Annotated[list[SceneRoot], Field(max_length=10_000)] = []
+    skins: list[Any] = []
+    textures: Annotated[list[Texture], Field(max_length=10_000)] = []

@@ -1,0 +1,144 @@
+"""Primitives as triangles: strips and fans unrolled, degenerate ones dropped, normals made where there are none.
+
+glTF 2.0 specification, section 3.7.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.gltf.accessors import AccessorReader
+from relume.scene.gltf.document import Primitive
+from relume.scene.model import F32, U32
+
+I64 = NDArray[np.int64]
+TRIANGLES, STRIP, FAN = 4, 5, 6
+MAX_COORDINATE = 1e7
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A primitive before its node's transform; arrays as in `relume.scene.model.Mesh`."""
+
+    positions: F32
+    normals: F32
+    tangents: F32
+    uvs: tuple[F32, ...]
+    faces: U32
+
+
+def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warnings: list[str]) -> Geometry | None:
+    """The primitive's triangles with only the vertices they use; None where it has none (a warning says so).
+
+    Raises:
+        SceneError: positions are missing or not finite, or indices are out of range.
+    """
+    if primitive.mode < TRIANGLES:
+        warnings.append(f"{what} is made of points or lines; it is left out")
+        return None
+    if "POSITION" not in primitive.attributes:
+        warnings.append(f"{what} has no positions; it is left out")
+        return None
+    positions = reader.floats(primitive.attributes["POSITION"], (3,), f"positions of {what}")
+    if primitive.indices is None:
+        corners = np.arange(len(positions))
+    else:
+        corners = reader.integers(primitive.indices, f"indices of {what}").astype(np.int64)
+        if int(corners.max()) >= len(positions):
+            raise SceneError(f"{what} has indices beyond its {len(positions):,} vertices; export the scene again")
+    faces = _unroll(corners, primitive.mode)
+    used, faces = _compact(faces)
+    if not _usable(positions[used]):
+        raise SceneError(f"{what} has positions that are not finite; repair the mesh and export it again")
+    faces = _without_degenerate(positions[used], faces, what, warnings)
+    if len(faces) == 0:
+        warnings.append(f"{what} has no triangles; it is left out")
+        return None
+    return _with_attributes(reader, primitive, used, faces, positions, what, warnings)
+
+
+def _with_attributes(
+    reader: AccessorReader,
+    primitive: Primitive,
+    used: I64,
+    faces: I64,
+    positions: F32,
+    what: str,
+    warnings: list[str],
+) -> Geometry:
+    def attribute(name: str, width: int) -> F32 | None:
+        if name not in primitive.attributes:
+            return None
+        values = reader.floats(primitive.attributes[name], (width,), f"{name} of {what}")
+        if len(values) != len(positions):
+            raise SceneError(f"{name} of {what} are not as many as its positions; export the scene again")
+        if not _usable(values[used]):
+            warnings.append(f"{name} of {what} are not all finite; they are not used")
+            return None
+        return values[used]
+
+    normals, tangents = attribute("NORMAL", 3), attribute("TANGENT", 4)
+    uvs = tuple(uv for uv in (attribute("TEXCOORD_0", 2), attribute("TEXCOORD_1", 2)) if uv is not None)
+    if any(name.startswith("COLOR_") for name in primitive.attributes):
+        warnings.append(f"vertex colours of {what} are not used")
+    if primitive.targets:
+        warnings.append(f"morph targets of {what} are not used; it has its basic shape")
+    points = positions[used]
+    if normals is not None and (np.linalg.norm(normals, axis=1) < 1e-6).any():
+        warnings.append(f"some normals of {what} have no length; flat ones are made")
+        normals = None
+    if normals is None:
+        return _flat(points, uvs, faces)
+    tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
+    return Geometry(points, normals, tangents, uvs, faces.astype(np.uint32))
+
+
+def _unroll(corners: NDArray[Any], mode: int) -> I64:
+    """Triangles (n, 3) of a list, strip or fan; corners left over are dropped."""
+    if mode == TRIANGLES:
+        return np.asarray(corners[: len(corners) // 3 * 3].reshape(-1, 3), np.int64)
+    if len(corners) < 3:
+        return np.zeros((0, 3), np.int64)
+    if mode == FAN:
+        hub = np.full(len(corners) - 2, corners[0])
+        return np.stack([corners[1:-1], corners[2:], hub], -1).astype(np.int64)
+    odd = np.arange(len(corners) - 2) % 2
+    i = np.arange(len(corners) - 2)
+    return np.stack([corners[i], corners[i + 1 + odd], corners[i + 2 - odd]], -1).astype(np.int64)
+
+
+def _compact(faces: I64) -> tuple[I64, I64]:
+    """Indices of the vertices that are used, and faces that number those."""
+    used, places = np.unique(faces, return_inverse=True)
+    return used, places.reshape(-1, 3)
+
+
+def _usable(values: F32) -> bool:
+    return bool(np.isfinite(values).all()) and bool((np.abs(values) <= MAX_COORDINATE).all())
+
+
+def _without_degenerate(positions: F32, faces: I64, what: str, warnings: list[str]) -> I64:
+    """Drops triangles without area, measured against their longest edge."""
+    a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
+    edge = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)])
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    solid = (area > 1e-10 * edge) & (edge > 0)
+    if not solid.all():
+        warnings.append(f"{int((~solid).sum()):,} triangles of {what} have no area; they are left out")
+    return np.asarray(faces[solid])
+
+
+def _flat(points: F32, uvs: tuple[F32, ...], faces: I64) -> Geometry:
+    """Every triangle with its own corners and its own normal, as glTF asks where normals are missing."""
+    corners = points[faces]
+    cross = np.cross((corners[:, 1] - corners[:, 0]).astype(np.float64), corners[:, 2] - corners[:, 0])
+    normals = np.repeat(cross / np.linalg.norm(cross, axis=1, keepdims=True), 3, axis=0).astype(np.float32)
+    order = faces.reshape(-1)
+    tangents = np.zeros((len(order), 4), np.float32)
+    own_faces = np.arange(len(order), dtype=np.uint32).reshape(-1, 3)
+    return Geometry(points[order], normals, tangents, tuple(uv[order] for uv in uvs), own_faces)

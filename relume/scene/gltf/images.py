@@ -1,0 +1,115 @@
+"""Images in linear values; nothing is decoded before its header has said that it is small enough.
+
+glTF 2.0 specification, sections 3.8 and 3.9.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings as python_warnings
+
+import numpy as np
+import PIL.Image
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.gltf.accessors import view_bytes
+from relume.scene.gltf.container import Container, data_uri
+
+U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
+MAX_SIDE = 8_192
+MAX_TEXELS = 400_000_000  # of all images of a scene together
+FORMATS = ("PNG", "JPEG", "WEBP")
+WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
+
+_SRGB = np.arange(256) / 255
+SRGB_TO_LINEAR = np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def to_linear(pixels: U8) -> F32:
+    """Linear values of sRGB bytes."""
+    return SRGB_TO_LINEAR[pixels]
+
+
+class ImageReader:
+    """Decodes the images of one file, each once."""
+
+    def __init__(self, container: Container) -> None:
+        self._container = container
+        self._decoded: dict[int, U8] = {}
+        self._texels_left = MAX_TEXELS
+
+    def texture(self, index: int, what: str) -> tuple[U8, tuple[str, str]]:
+        """The bytes (height, width, 3) of a texture and how it wraps along u and v.
+
+        Raises:
+            SceneError: the texture does not exist, lies outside the file, is too large, damaged or of another format.
+        """
+        document = self._container.document
+        if index >= len(document.textures):
+            raise SceneError(f"{what} refers to texture {index} of {len(document.textures)}; export the scene again")
+        texture = document.textures[index]
+        source = texture.source
+        webp = texture.extensions.get("EXT_texture_webp")
+        if isinstance(webp, dict) and isinstance(webp.get("source"), int):
+            source = webp["source"]
+        if source is None:
+            raise SceneError(f"{what} has an image relume cannot read; use PNG, JPEG or WebP (gltf-transform png)")
+        return self._image(source, what), self._wrap(texture.sampler, what)
+
+    def _wrap(self, sampler: int | None, what: str) -> tuple[str, str]:
+        if sampler is None:
+            return "repeat", "repeat"
+        samplers = self._container.document.samplers
+        if sampler >= len(samplers):
+            raise SceneError(f"{what} refers to sampler {sampler} of {len(samplers)}; export the scene again")
+        chosen = samplers[sampler]
+        return WRAPS.get(chosen.wrapS, "repeat"), WRAPS.get(chosen.wrapT, "repeat")
+
+    def _image(self, index: int, what: str) -> U8:
+        images = self._container.document.images
+        if not 0 <= index < len(images):
+            raise SceneError(f"{what} refers to image {index} of {len(images)}; export the scene again")
+        if index not in self._decoded:
+            image = images[index]
+            if image.bufferView is not None:
+                data = bytes(view_bytes(self._container, image.bufferView, what))
+            elif image.uri is not None:
+                data = data_uri(image.uri, what)
+            else:
+                raise SceneError(f"{what} has no data; export the scene again")
+            self._decoded[index] = self._decode(data, what)
+        return self._decoded[index]
+
+    def _decode(self, data: bytes, what: str) -> U8:
+        try:
+            with python_warnings.catch_warnings():
+                # Pillow warns of large images; the check below refuses them.
+                python_warnings.simplefilter("ignore")
+                with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                    self._check_size(*image.size, what)
+                    return _rgb(image)
+        except SceneError:
+            raise
+        except PIL.Image.DecompressionBombError:
+            raise SceneError(f"{what} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
+        except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
+            raise SceneError(f"{what} is damaged or neither PNG, JPEG nor WebP; export the scene again") from None
+
+    def _check_size(self, width: int, height: int, what: str) -> None:
+        if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+            raise SceneError(f"{what} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down")
+        self._texels_left -= width * height
+        if self._texels_left < 0:
+            raise SceneError(f"the scene's images have more than {MAX_TEXELS:,} texels together; scale them down")
+
+
+def _rgb(image: PIL.Image.Image) -> U8:
+    """8-bit RGB; 16-bit grey is scaled, alpha is dropped, not multiplied in."""
+    if image.mode.startswith("I"):
+        grey = np.clip(np.asarray(image, np.int64) // 257, 0, 255).astype(np.uint8)
+        return np.repeat(grey[..., None], 3, axis=2)
+    if image.mode in ("P", "PA"):
+        image = image.convert("RGBA")
+    return np.asarray(image.convert("RGB"), np.uint8)

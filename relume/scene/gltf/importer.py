@@ -1,0 +1,189 @@
+"""glTF to Scene: what relume understands, and one warning for each thing it does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.archive import make_scene
+from relume.scene.checks import MAX_TRIANGLES
+from relume.scene.demo.studio import studio
+from relume.scene.gltf.accessors import AccessorReader
+from relume.scene.gltf.cameras import framing_camera, rigid, slug
+from relume.scene.gltf.container import MAX_FILE_BYTES, READ_EXTENSIONS, Container, read_container
+from relume.scene.gltf.document import Material as GltfMaterial
+from relume.scene.gltf.document import Node, Primitive
+from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, read_primitive
+from relume.scene.gltf.images import ImageReader
+from relume.scene.gltf.materials import MaterialReader, Understood
+from relume.scene.gltf.names import unique_name
+from relume.scene.gltf.nodes import placed_nodes
+from relume.scene.gltf.uvs import made_tangents
+from relume.scene.model import Camera, Environment, Mesh, Scene
+
+F64 = NDArray[np.float64]
+MAX_WARNINGS = 200
+MAX_VERTICES = 3 * MAX_TRIANGLES
+MAX_PLACED = 20_000  # primitives times the nodes that show them
+
+
+def import_gltf(source: str | Path | bytes, name: str, environment: Environment | None = None) -> Scene:
+    """Reads a .glb file, or a .gltf file that holds its data in itself.
+
+    Args:
+        source: a path or the file's bytes.
+        name: what people call the scene.
+        environment: the light; the studio of the built-in scene where None.
+
+    Returns:
+        The scene, nodes applied: one mesh per primitive and node, cameras or one view "front".
+
+    Raises:
+        SceneError: the file cannot be used; the message says why and what to do.
+    """
+    reading = _Reading(read_container(_read_bytes(source)))
+    environment = studio() if environment is None else environment
+    warnings = [*environment.warnings, *reading.warnings]
+    if len(warnings) > MAX_WARNINGS:
+        warnings = [*warnings[:MAX_WARNINGS], f"and {len(warnings) - MAX_WARNINGS:,} more of the kind"]
+    materials = [understood.material for understood in reading.materials]
+    return make_scene(name, reading.meshes, materials, reading.cameras, environment, warnings)
+
+
+def _read_bytes(source: str | Path | bytes) -> bytes:
+    if isinstance(source, bytes):
+        return source
+    try:
+        if Path(source).stat().st_size > MAX_FILE_BYTES:
+            raise SceneError(f"{Path(source).name!r} is larger than {MAX_FILE_BYTES >> 20} MB; simplify the scene")
+        return Path(source).read_bytes()
+    except OSError as problem:
+        raise SceneError(f"{Path(source).name!r} cannot be read ({problem.strerror}); check the path") from None
+
+
+class _Reading:
+    """One file on its way to a scene: walks the nodes, reading meshes and materials when they are first met."""
+
+    def __init__(self, container: Container) -> None:
+        self._document = container.document
+        self._accessors = AccessorReader(container)
+        self.warnings: list[str] = []
+        self._material_reader = MaterialReader(ImageReader(container), self.warnings)
+        self._geometry: dict[tuple[int, int], Geometry | None] = {}
+        self._material_index: dict[int | None, int] = {}
+        self._mesh_names: dict[str, int] = {}
+        self._camera_names: dict[str, int] = {}
+        self._places_left, self._triangles_left, self._vertices_left = MAX_PLACED, MAX_TRIANGLES, MAX_VERTICES
+        self.materials: list[Understood] = []
+        self.meshes: list[Mesh] = []
+        self.cameras: list[Camera] = []
+        self._warn_of_the_rest()
+        for node, to_world in placed_nodes(self._document):
+            self._place(node, to_world)
+        if not self.meshes:
+            raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+        if not self.cameras:
+            self.cameras.append(framing_camera(self.meshes, slug("front", self._camera_names)))
+
+    def _place(self, node: Node, to_world: F64) -> None:
+        if node.camera is not None:
+            self._place_camera(node, to_world)
+        if "EXT_mesh_gpu_instancing" in node.extensions:
+            self.warnings.append(f"the instances of node {node.name[:80]!r} are not used; it appears once")
+        if node.mesh is None:
+            return
+        if node.mesh >= len(self._document.meshes):
+            raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
+        if node.skin is not None:
+            self.warnings.append(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose")
+        mesh = self._document.meshes[node.mesh]
+        self._places_left -= len(mesh.primitives)
+        if self._places_left < 0:
+            raise SceneError(f"the scene shows more than {MAX_PLACED:,} meshes; join them (gltf-transform join)")
+        for i, primitive in enumerate(mesh.primitives):
+            name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
+            self._place_primitive((node.mesh, i), primitive, name, to_world)
+
+    def _place_primitive(self, key: tuple[int, int], primitive: Primitive, name: str, to_world: F64) -> None:
+        if key not in self._geometry:
+            self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
+        geometry = self._geometry[key]
+        if geometry is None:
+            return
+        self._triangles_left -= len(geometry.faces)
+        self._vertices_left -= len(geometry.positions)
+        if min(self._triangles_left, self._vertices_left) < 0:
+            raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
+        material = self._material(primitive.material)
+        placed = _placed(geometry, self.materials[material], to_world, name, material)
+        if placed is None:
+            self.warnings.append(f"mesh {name!r} is scaled to nothing or out of range; it is left out")
+        else:
+            self.meshes.append(placed)
+
+    def _material(self, index: int | None) -> int:
+        if index not in self._material_index:
+            if index is not None and index >= len(self._document.materials):
+                raise SceneError(f"material {index} does not exist; export the scene again")
+            material = GltfMaterial(name="default") if index is None else self._document.materials[index]
+            self._material_index[index] = len(self.materials)
+            self.materials.append(self._material_reader.read(material))
+        return self._material_index[index]
+
+    def _place_camera(self, node: Node, to_world: F64) -> None:
+        if node.camera is None or node.camera >= len(self._document.cameras):
+            raise SceneError(f"camera {node.camera} does not exist; export the scene again")
+        camera = self._document.cameras[node.camera]
+        name = camera.name or node.name or "camera"
+        frame = rigid(to_world)
+        if camera.perspective is None or camera.type != "perspective":
+            self.warnings.append(f"camera {name[:80]!r} is not a perspective one; it is left out")
+        elif frame is None:
+            self.warnings.append(f"camera {name[:80]!r} is scaled to nothing; it is left out")
+        else:
+            self.cameras.append(Camera(slug(name, self._camera_names), frame, camera.perspective.yfov))
+
+    def _warn_of_the_rest(self) -> None:
+        document = self._document
+        if document.animations:
+            self.warnings.append(f"{len(document.animations)} animations are not used; everything has its rest pose")
+        if "KHR_lights_punctual" in document.extensions or "KHR_lights_punctual" in document.extensionsUsed:
+            self.warnings.append("the file's lights are not used; the environment is the only light")
+        for extension in document.extensionsRequired:
+            if extension not in READ_EXTENSIONS:
+                self.warnings.append(f"the file requires {extension[:60]}, which is not understood; it may look wrong")
+
+
+def _placed(geometry: Geometry, understood: Understood, to_world: F64, name: str, material: int) -> Mesh | None:
+    """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
+    linear = to_world[:3, :3]
+    determinant = float(np.linalg.det(linear))
+    positions = geometry.positions @ linear.T + to_world[:3, 3]
+    if abs(determinant) < 1e-30 or np.abs(positions).max() > MAX_COORDINATE:
+        return None
+    faces = geometry.faces if determinant > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
+    normals = _unit(geometry.normals @ np.linalg.inv(linear))
+    tangents = np.zeros((len(positions), 4))
+    tangents[:, :3] = _unit(geometry.tangents[:, :3] @ linear.T)
+    tangents[:, 3] = geometry.tangents[:, 3] * np.sign(determinant)
+    placed = Mesh(
+        name,
+        positions.astype(np.float32),
+        normals.astype(np.float32),
+        tangents.astype(np.float32),
+        understood.uv_use.apply(geometry.uvs, len(positions)),
+        faces,
+        material,
+    )
+    if understood.material.normal_map is None or placed.tangents.any():
+        return placed
+    made = made_tangents(placed.positions, placed.normals, placed.uvs, faces)
+    return Mesh(name, placed.positions, placed.normals, made, placed.uvs, faces, material)
+
+
+def _unit(vectors: F64) -> F64:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1))

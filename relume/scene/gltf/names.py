@@ -1,0 +1,23 @@
+"""Names that are safe to show, to point at and to tell apart."""
+
+from __future__ import annotations
+
+import re
+
+UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def unique_name(wanted: str, taken: dict[str, int]) -> str:
+    """At most 80 characters, none that JSON Pointers or terminals mind, and not taken before."""
+    plain = UNREADABLE.sub("", wanted[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
+    return numbered(plain or "unnamed", " ", taken)
+
+
+def numbered(plain: str, separator: str, taken: dict[str, int]) -> str:
+    """`plain`, or with the first free number from 2; `taken` holds the last number tried for each name."""
+    name = plain
+    while name in taken:
+        taken[plain] += 1
+        name = f"{plain}{separator}{taken[plain]}"
+    taken[name] = 1
+    return name

@@ -1,0 +1,78 @@
+"""The node tree as a flat list of (node, world transform).
+
+glTF 2.0 specification, section 3.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.scene.gltf.document import Document, Node
+
+F64 = NDArray[np.float64]
+MAX_DEPTH = 64
+MAX_NODES = 4_096
+
+
+def placed_nodes(document: Document) -> Iterator[tuple[Node, F64]]:
+    """Every node of the default scene (of all root nodes where no scene is given) with its transform to world (4, 4).
+
+    Raises:
+        SceneError: a node is its own ancestor, has two parents, does not exist, or lies too deep.
+    """
+    seen: set[int] = set()
+    stack = [(index, np.eye(4), 1) for index in reversed(_roots(document))]
+    while stack:
+        index, parent, depth = stack.pop()
+        if index >= len(document.nodes):
+            raise SceneError(f"node {index} does not exist, there are {len(document.nodes)}; export the scene again")
+        if index in seen:
+            raise SceneError(f"node {index} is reached twice; nodes must form a tree, export the scene again")
+        if depth > MAX_DEPTH:
+            raise SceneError(f"nodes are nested more than {MAX_DEPTH} deep; flatten the scene")
+        seen.add(index)
+        node = document.nodes[index]
+        to_world = parent @ local_transform(node)
+        if not np.isfinite(to_world).all() or np.abs(to_world).max() > 1e12:
+            raise SceneError(f"the transform of node {index} is out of range; export the scene again")
+        yield node, to_world
+        stack.extend((child, to_world, depth + 1) for child in reversed(node.children[: MAX_NODES + 1]))
+
+
+def local_transform(node: Node) -> F64:
+    """The node's matrix, or translation · rotation · scale. (4, 4)"""
+    if node.matrix is not None:
+        return np.array(node.matrix, np.float64).reshape(4, 4).T
+    transform = np.eye(4)
+    transform[:3, :3] = _rotation(np.array(node.rotation, np.float64)) * np.array(node.scale, np.float64)
+    transform[:3, 3] = node.translation
+    return transform
+
+
+def _rotation(quaternion: F64) -> F64:
+    """Rotation of a quaternion (x, y, z, w), normalised first; one of no length turns nothing."""
+    length = np.linalg.norm(quaternion)
+    if not 1e-12 < length < 1e12:
+        return np.eye(3)
+    x, y, z, w = quaternion / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _roots(document: Document) -> list[int]:
+    if document.scenes:
+        chosen = document.scene or 0
+        if chosen >= len(document.scenes):
+            raise SceneError(f"scene {chosen} does not exist, there are {len(document.scenes)}; export it again")
+        return document.scenes[chosen].nodes[: MAX_NODES + 1]
+    children = {child for node in document.nodes for child in node.children}
+    return [index for index in range(len(document.nodes)) if index not in children]
