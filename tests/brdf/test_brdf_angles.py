@@ -1,0 +1,51 @@
+"""Angles: values known by hand, and the kernel against its NumPy twin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from brdf_closed_forms import directions
+
+from relume.brdf.angles import angle_at
+from relume.brdf.evaluate import angles_numpy
+from relume.brdf.term import Angle
+
+
+def direction(theta, phi=0.0):
+    theta, phi = np.radians(theta), np.radians(phi)
+    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
+@pytest.mark.parametrize(
+    ("angle", "wi", "wo", "degrees"),
+    [
+        (Angle.THETA_I, direction(30), direction(70), 30),
+        (Angle.THETA_O, direction(30), direction(70), 70),
+        (Angle.THETA_H, direction(30), direction(70), 50),
+        (Angle.THETA_D, direction(30), direction(70), 20),
+        (Angle.THETA_H, direction(40), direction(40, 180), 0),
+        (Angle.THETA_D, direction(40), direction(40, 180), 40),
+        (Angle.THETA_R, direction(40), direction(40, 180), 0),
+        (Angle.THETA_R, direction(25), direction(40, 180), 15),
+        (Angle.ALPHA, direction(30), direction(70), 50),  # half vector along the tangent: all of θh is γα
+        (Angle.BETA, direction(30), direction(70), 0),
+        (Angle.ALPHA, direction(30, 90), direction(70, 90), 0),
+        (Angle.BETA, direction(30, 90), direction(70, 90), 50),
+        (Angle.ALPHA, direction(50, 45), direction(50, 45), np.degrees(np.arccos(np.cos(np.radians(50)) ** 0.5))),
+    ],
+)
+def test_angle_of_known_directions(angle, wi, wo, degrees):
+    assert np.degrees(angles_numpy(angle, wi, wo)) == pytest.approx(degrees, abs=2e-6)
+
+
+@pytest.mark.parametrize("angle", list(Angle))
+def test_kernel_equals_its_numpy_twin(angle):
+    rng = np.random.default_rng(8)
+    wi, wo = (directions(rng, 3000, 1e-3).astype(np.float32) for _ in range(2))
+    kernel = np.array([angle_at(int(angle), *i, *o) for i, o in zip(wi, wo, strict=True)])
+    twin = angles_numpy(angle, wi, wo)
+    assert twin.min() >= 0
+    assert twin.max() <= np.pi / 2
+    # float32 cannot tell an arc cosine near one better than the root of its rounding, 3e-4
+    np.testing.assert_allclose(kernel, twin, atol=5e-4)
+    np.testing.assert_allclose(np.cos(kernel), np.cos(twin), atol=1e-6)

@@ -1,0 +1,219 @@
+"""Every registered term against its paper's closed form, and against what physics asks of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from brdf_closed_forms import CLOSED_FORMS, complex_fresnel, directions
+
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.fresnel import fresnel
+from relume.brdf.registry import TERMS, describe
+from relume.brdf.term import Angle
+
+MODELS = sorted(TERMS)
+
+
+def random_params(model, rng):
+    """Parameters over their whole range, evenly as their sliders move."""
+    params = {}
+    for p in TERMS[model].parameters:
+        scale = np.geomspace if p.scale == "log" else np.linspace
+        params[p.name] = float(rng.choice(scale(p.minimum, p.maximum, 101)))
+    return params
+
+
+def directional_albedo(document, theta_o, num=300):
+    """∫ f cos θi dωi by Gauss-Legendre in cos θi and even steps in φ."""
+    x, w = np.polynomial.legendre.leggauss(num)
+    mu = 0.5 * (x + 1)
+    phi = (np.arange(2 * num) + 0.5) * np.pi / num
+    s = np.sqrt(1 - mu * mu)[:, None]
+    wi = np.stack([s * np.cos(phi), s * np.sin(phi), np.broadcast_to(mu[:, None], (num, 2 * num))], axis=-1)
+    wo = np.array([np.sin(theta_o), 0.0, np.cos(theta_o)])
+    return float(np.sum(eval_brdf(document, wi, wo)[..., 0] * (mu * 0.5 * w)[:, None]) * np.pi / num)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_term_equals_the_closed_form_of_its_paper(model):
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        params = random_params(model, rng)
+        wi, wo = directions(rng, 500), directions(rng, 500)
+        expected = CLOSED_FORMS[model](wi, wo, **params)
+        value = eval_brdf({"model": model, "params": params, "color": [1.0, 0.5, 0.0]}, wi, wo)
+        scale = expected.max() * 1e-12 + 1e-300  # where a lobe has died away, only its absolute size counts
+        np.testing.assert_allclose(value[:, 0], expected, rtol=1e-7, atol=scale)
+        np.testing.assert_allclose(value[:, 1], 0.5 * expected, rtol=1e-7, atol=scale)
+        assert not value[:, 2].any()
+
+
+def test_every_term_has_a_closed_form_to_be_compared_with():
+    assert set(CLOSED_FORMS) == set(TERMS)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_term_is_reciprocal(model):
+    rng = np.random.default_rng(4)
+    wi, wo = directions(rng, 1000, 1e-4), directions(rng, 1000, 1e-4)
+    document = {"model": model, "params": random_params(model, rng)}
+    np.testing.assert_allclose(eval_brdf(document, wi, wo), eval_brdf(document, wo, wi), rtol=1e-9)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_quotient_is_zero_below_the_horizon_and_above_zero_over_it(model):
+    quotient = TERMS[model].quotient
+    rng = np.random.default_rng(5)
+    for dtype in (np.float32, np.float64):
+        wi, wo = (directions(rng, 300).astype(dtype).T for _ in range(2))
+        down = wi * np.array([[1], [1], [-1]], dtype)
+        assert quotient(*wi, *wo).dtype == dtype
+        assert (quotient(*wi, *wo) > 0).all()
+        for a, b in ((down, wo), (wo, down), (down, down)):
+            assert not quotient(*a, *b).any()
+        level = np.array([1, 0, 0], dtype)
+        assert quotient(*level, *wo[:, 0]) == 0
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_quotient_in_float32_is_finite_and_right_near_grazing(model):
+    quotient = TERMS[model].quotient
+    cosines = np.float32([1e-45, 1e-38, 1e-20, 1e-7, 1e-6, 1e-4, 1e-2, 0.5, 1.0])
+    for phi in (0.0, 1.0, np.pi):  # opposite grazing directions have hardly a half vector
+        ci, co = np.meshgrid(cosines, cosines)
+        si, so = np.sqrt(1 - ci * ci), np.sqrt(1 - co * co)
+        wi = (si, np.zeros_like(si), ci)
+        wo = (so * np.float32(np.cos(phi)), so * np.float32(np.sin(phi)), co)
+        value = quotient(*wi, *wo)
+        assert np.isfinite(value).all()
+        assert (value >= 0).all()
+    rng = np.random.default_rng(6)
+    wi, wo = directions(rng, 2000, 1e-3), directions(rng, 2000, 1e-3)
+    single = quotient(*wi.astype(np.float32).T, *wo.astype(np.float32).T)
+    np.testing.assert_allclose(single, quotient(*wi.T, *wo.T), rtol=2e-3)
+
+
+def test_lambert_passes_the_white_furnace():
+    for theta_o in np.radians([0.0, 45.0, 89.0]):
+        assert directional_albedo({"model": "lambert"}, theta_o, 50) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("theta_o", np.radians([0.0, 35.0, 60.0, 80.0, 89.0]))
+@pytest.mark.parametrize(
+    "document",
+    [
+        *({"model": "ggx", "params": {"roughness": r, "f0": 1.0}} for r in (0.25, 0.5, 1.0)),
+        *(
+            {"model": "ashikhmin_shirley", "params": {"nu": nu, "nv": nv, "f0": 1.0}}
+            for nu, nv in ((1, 1), (10, 200), (500, 5), (1000, 1000))
+        ),
+        *({"model": "cook_torrance", "params": {"sigma": s, "ior": 5, "extinction": 10}} for s in (0.1, 0.4, 1.0)),
+    ],
+    ids=lambda d: f"{d['model']}-{'-'.join(map(str, d['params'].values()))}",
+)
+def test_term_reflects_no_more_than_arrives(document, theta_o):
+    assert directional_albedo(document, theta_o) <= 1.01
+
+
+@pytest.mark.parametrize("exponent", [3.0, 10.0, 100.0])
+def test_blinn_phong_reflects_at_most_four_times_its_colour(exponent):
+    # Nguyen's normalisation makes ∫ D cos θh dωh = 1 and leaves out the 1/(4 wo·h) that turns dωh into dωi. At normal
+    # incidence θi = 2 θh, and the integral can be done by hand.
+    c = np.cos(np.pi / 4)
+    s = exponent
+    by_hand = 4 * (s + 2) * (2 * (1 - c ** (s + 4)) / (s + 4) - (1 - c ** (s + 2)) / (s + 2))
+    document = {"model": "blinn_phong", "params": {"exponent": s}}
+    assert directional_albedo(document, 0.0) == pytest.approx(by_hand, rel=1e-9)
+    for theta_o in np.radians([0.0, 30.0, 60.0, 85.0]):
+        assert directional_albedo(document, theta_o) <= 4 * 1.01
+
+
+def hemisphere_integral(curve, params, power):
+    """∫ f(θ) cos^power θ dω, finely."""
+    edges = np.concatenate([[0], np.geomspace(1e-6, np.pi / 2, 400)])
+    x, w = np.polynomial.legendre.leggauss(16)
+    theta = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1 + x)
+    weight = 0.5 * np.diff(edges)[:, None] * w
+    values = curve.generator(theta, params) * np.cos(theta) ** power * np.sin(theta)
+    return 2 * np.pi * float(np.sum(values * weight))
+
+
+@pytest.mark.parametrize("width", [0.03, 0.1, 0.3, 1.0])
+def test_facet_distributions_project_onto_the_surface_they_cover(width):
+    ggx = TERMS["ggx"].curve("theta_h")
+    assert hemisphere_integral(ggx, {"roughness": width}, 1) == pytest.approx(1.0, rel=1e-8)
+    beckmann = TERMS["cook_torrance"].curve("theta_h")  # its D is written without 1/π
+    assert hemisphere_integral(beckmann, {"sigma": width}, 1) == pytest.approx(np.pi, rel=1e-8)
+    blinn = TERMS["blinn_phong"].curve("theta_h")
+    assert hemisphere_integral(blinn, {"exponent": 1 / width**2}, 1) == pytest.approx(1.0, rel=1e-8)
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.05, 0.2, 1.0])
+def test_cook_torrance_peak_is_f0_over_four_pi_sigma_squared(sigma):
+    n = np.array([0.0, 0.0, 1.0])
+    value = eval_brdf({"model": "cook_torrance", "params": {"sigma": sigma, "ior": 1.5}}, n, n)
+    np.testing.assert_allclose(value, 0.04 / (4 * np.pi * sigma**2), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("ior", "extinction"), [(1.0, 0.0), (1.33, 0.0), (5.0, 0.0), (0.2, 3.9), (1.5, 7.3), (1.0, 10.0)]
+)
+def test_fresnel_equals_the_complex_amplitudes(ior, extinction):
+    cosine = np.linspace(1e-4, 1.0, 2001)  # below, the amplitudes lose their digits
+    expected = complex_fresnel(cosine, ior, extinction)
+    np.testing.assert_allclose(fresnel(cosine, ior, extinction), expected, atol=1e-11)
+
+
+def test_fresnel_at_the_ends():
+    assert fresnel(np.array([1.0]), 1.5, 0.0)[0] == pytest.approx(0.04)
+    np.testing.assert_array_equal(fresnel(np.array([0.0, 1e-9, 0.5]), 1.0, 0.0), 0.0)  # no boundary, no reflection
+    assert fresnel(np.array([0.0]), 1.5, 2.0)[0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_declaration_is_complete_and_consistent(model):
+    term = TERMS[model]
+    assert term.model == model
+    assert term.texture in ("diffuse", "specular")
+    names = [p.name for p in term.parameters]
+    assert len(set(names)) == len(names)
+    for p in term.parameters:
+        assert p.minimum <= p.default <= p.maximum
+        assert p.scale in ("linear", "log")
+        assert p.scale == "linear" or p.minimum > 0
+        assert p.label
+        assert p.help
+    assert {name for curve in term.curves for name in curve.parameters} == set(names)
+    angles = [curve.angle for curve in term.curves]
+    assert len(set(angles)) == len(angles)
+    for curve in term.curves:
+        assert curve.name == curve.angle.name.lower()
+        assert curve.num_bands & (curve.num_bands - 1) == 0
+        ends = {p.name: (p.minimum, p.maximum) for p in term.parameters}
+        for end in (0, 1):
+            value = curve.generator(
+                np.linspace(0, np.pi / 2, 1001), {name: ends[name][end] for name in curve.parameters}
+            )
+            assert np.isfinite(value).all()
+            assert (value >= 0).all()
+
+
+def test_description_is_json_for_every_term():
+    listed = json.loads(json.dumps(describe()))
+    assert [entry["model"] for entry in listed] == list(TERMS)
+    ggx = next(entry for entry in listed if entry["model"] == "ggx")
+    assert [(c["name"], c["angle"], c["bands"], c["outgoing"]) for c in ggx["curves"]] == [
+        ("theta_h", "theta_h", 256, False),
+        ("theta_d", "theta_d", 64, False),
+        ("theta_i", "theta_i", 64, False),
+        ("theta_o", "theta_o", 64, True),
+    ]
+    roughness = ggx["parameters"][0]
+    assert set(roughness) == {"name", "label", "minimum", "maximum", "default", "unit", "scale", "help"}
+    assert (roughness["minimum"], roughness["maximum"]) == (0.03, 1.0)
+
+
+def test_outgoing_is_the_view_angle_alone():
+    assert [c.name for t in TERMS.values() for c in t.curves if c.angle is Angle.THETA_O] == ["theta_o"]
