@@ -1,0 +1,111 @@
+"""`relume bake`: queues a bake and follows it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Data, SceneName, Scheduler, Size, parse_size
+
+if TYPE_CHECKING:
+    from relume.transfer.base import Recipe
+    from server.settings import Settings
+    from worker.scenes import SceneRecord
+    from worker.service import BakeService
+    from worker.status import BakeStatus
+
+
+def bake(
+    scene: SceneName,
+    method: Annotated[str, typer.Option(help="Transfer method.")] = "direct",
+    view: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="View to bake, several times for several; else all.")
+    ] = None,
+    size: Size = None,
+    lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: 2000]")] = None,
+    watch: Annotated[
+        bool, typer.Option(help="Bake here and show it; --no-watch leaves it to a running server and returns.")
+    ] = True,
+    scheduler: Scheduler = None,
+    data: Data = None,
+) -> int:
+    """Queue a bake and follow it. The same recipe twice is the same bake; an interrupted one goes on where it stopped.
+
+    This process bakes, unless a server on the same data folder is quicker to take it. Ctrl-C asks whether to keep going
+    in the background or to cancel.
+    """
+    from cli.house import find_scene, open_bakes, open_settings
+
+    settings = open_settings(data, scheduler=scheduler)
+    service = open_bakes(settings)
+    try:
+        record = find_scene(service.ledger, scene)
+        identity = service.submit(record.id, _recipe(record, method, view, size, lights))
+        if not watch:
+            typer.echo(identity)
+            return 0
+        service.start()
+        return _watch(service, settings, identity, record.name)
+    finally:
+        service.close()
+
+
+def _recipe(record: SceneRecord, method: str, views: list[str] | None, size: str | None, lights: int | None) -> Recipe:
+    from relume.errors import ParameterError
+    from relume.transfer.base import Recipe
+    from worker.presets import PRESETS
+
+    unknown = sorted(set(views or ()) - set(record.views))
+    if unknown:
+        raise ParameterError("--view", unknown[0], "one of " + ", ".join(record.views)[:400])
+    if lights is not None and lights < 1:
+        raise ParameterError("--lights", lights, "a number of at least 1")
+    preset = PRESETS["good"]
+    chosen = tuple(dict.fromkeys(views or record.views))
+    return Recipe(method, chosen, parse_size(size) if size else preset.size, lights or preset.num_lights)
+
+
+def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:
+    from cli.follow import follow
+
+    began = time.monotonic()
+    with service.subscribe(identity) as changes:
+        try:
+            status = follow(changes, label)
+        except KeyboardInterrupt:
+            return _interrupted(service, settings, identity)
+    return _report(status, time.monotonic() - began)
+
+
+def _report(status: BakeStatus, seconds: float) -> int:
+    """Say how it ended; the id alone goes to stdout."""
+    if status.state != "ready":
+        typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
+        return 1
+    typer.echo(status.id)
+    typer.echo(f"{status.bytes / 1e6:,.1f} MB in {seconds:.1f} s", err=True)
+    return 0
+
+
+def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:
+    """Ask what Ctrl-C was meant to do."""
+    keep = sys.stdin.isatty() and typer.confirm("\nKeep baking in the background? (no cancels the bake)", default=True)
+    if not keep:
+        service.cancel(identity)
+        typer.echo("cancelled; finished parts are kept, the same command goes on with them", err=True)
+        return 130
+    service.close()
+    command = [sys.executable, "-m", "cli.background", str(settings.data), settings.database_url]
+    subprocess.Popen(  # noqa: S603
+        [*command, settings.scheduler or "", identity],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    typer.echo(f"{identity} goes on in the background; the same command shows it again", err=True)
+    return 0

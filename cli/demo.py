@@ -1,0 +1,90 @@
+"""`relume demo`: the built-in scene, baked, served, in the browser."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Data
+from cli.serve import Port, address, check_port
+
+if TYPE_CHECKING:
+    from server.settings import Settings
+
+WAIT_FOR_SERVER_S = 60.0
+
+
+def demo(
+    data: Data = None,
+    port: Port = None,
+    browser: Annotated[bool, typer.Option(help="Open the editor in a browser.")] = True,
+) -> None:
+    """Bake the built-in scene if it is not there, serve it, and open the editor."""
+    from cli.house import open_settings
+    from server.app import serve
+
+    settings = open_settings(data, port=port)
+    check_port(settings.host, settings.port)
+    threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()
+    serve(settings)
+
+
+def _bake(settings: Settings, browser: bool) -> None:
+    """Queue the demo's bake for the server that is starting, and show here what the browser shows too."""
+    from cli.main import sentence
+
+    try:
+        identity = _queue_and_follow(settings, browser)
+        typer.echo(f"bake {identity} is ready: {address(settings.host, settings.port)}   Ctrl-C ends", err=True)
+    except Exception as error:  # the server lives on, so this must be said here
+        typer.echo(f"relume: {sentence(error)}", err=True)
+
+
+def _queue_and_follow(settings: Settings, browser: bool) -> str:
+    from cli.follow import follow
+    from cli.house import open_bakes
+    from relume.errors import PlanError
+    from relume.scene.demo import demo_scene
+    from relume.transfer.base import Recipe
+    from worker.presets import PRESETS
+    from worker.scenes import register_scene
+
+    service = open_bakes(settings)
+    try:
+        scene, preset = demo_scene(), PRESETS["good"]
+        register_scene(service.data_dir, service.ledger, scene)
+        recipe = Recipe("direct", tuple(camera.name for camera in scene.cameras), preset.size, preset.num_lights)
+        identity = service.submit(scene.id, recipe)
+        _wait_for_server(settings)
+        if browser:
+            _open_browser(address(settings.host, settings.port))
+        with service.subscribe(identity) as changes:
+            status = follow(changes, scene.name)
+        if status.state != "ready":
+            raise PlanError(f"the bake {status.state}: {status.problem or 'somebody stopped it'}")
+        return identity
+    finally:
+        service.close()
+
+
+def _wait_for_server(settings: Settings) -> None:
+    """Return when the server accepts connections, at the latest after a minute."""
+    deadline = time.monotonic() + WAIT_FOR_SERVER_S
+    while time.monotonic() < deadline:
+        try:
+            socket.create_connection((settings.host, settings.port), timeout=1).close()
+        except OSError:
+            time.sleep(0.1)
+        else:
+            return
+
+
+def _open_browser(url: str) -> None:
+    import webbrowser
+
+    if not webbrowser.open(url):
+        typer.echo(f"open {url} in a browser", err=True)

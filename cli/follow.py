@@ -1,0 +1,33 @@
+"""Shows a bake's progress in the terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+from worker.board import Subscription
+from worker.status import BakeStatus
+
+
+def follow(changes: Subscription, label: str) -> BakeStatus:
+    """Show progress until the bake ends, and return its last status. KeyboardInterrupt passes through."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[detail]}"))
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task(label, total=1.0, detail="")
+        while not (status := changes.latest).final:
+            progress.update(bar, completed=status.progress, detail=detail(status))
+            changes.get(timeout=0.5)
+    return status
+
+
+def detail(status: BakeStatus) -> str:
+    """State, rate and time left, in words."""
+    if status.state == "queued":
+        return "waiting"
+    parts = []
+    if status.rays_per_second:
+        parts.append(f"{status.rays_per_second / 1e6:.1f} M rays/s")
+    if status.seconds_left is not None:
+        parts.append(f"{status.seconds_left:.0f} s left")
+    return ", ".join(parts) or "starting"

@@ -1,0 +1,78 @@
+"""The `relume` command. Each subcommand is a file of its own; what is heavy is imported when a command runs."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import traceback
+from collections.abc import Sequence
+
+import typer
+from typer.exceptions import TyperException
+
+from cli import bake, bench, demo, import_scene, reference, render, serve, worker
+
+app = typer.Typer(
+    name="relume",
+    help="Edit materials and lights in the finished picture, with its real shadows, while you drag a curve.",
+    epilog="Data lie in the folder that RELUME_DATA names, else in your user data folder. "
+    "Every command takes --verbose: then a failure shows its trace.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("demo")(demo.demo)
+app.command("import")(import_scene.import_scene)
+app.command("bake")(bake.bake)
+app.command("render")(render.render)
+app.command("serve")(serve.serve)
+app.command("worker")(worker.worker)
+app.command("reference")(reference.reference)
+app.command("bench")(bench.bench)
+
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run one command and return its exit code; a failure is one line on stderr."""
+    verbose = "--verbose" in arguments
+    logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, format="%(levelname)s %(name)s: %(message)s")
+    try:
+        result = app([a for a in arguments if a != "--verbose"], prog_name="relume", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except typer.Exit as done:
+        return done.exit_code
+    except Exception as error:
+        if verbose:
+            traceback.print_exc()
+        typer.echo(f"relume: {sentence(error)}", err=True)
+        return error.exit_code if isinstance(error, TyperException) else 1
+    return result if isinstance(result, int) else 0
+
+
+def sentence(error: Exception) -> str:
+    """What went wrong, in one line."""
+    from relume.errors import RelumeError
+
+    if isinstance(error, TyperException):
+        text = error.format_message() or "nothing to do; see relume --help"
+    elif isinstance(error, RelumeError):
+        text = str(error)
+    elif isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    elif isinstance(error, MemoryError):
+        text = "out of memory; take a smaller size or fewer lights"
+    else:
+        text = f"{type(error).__name__}: {str(error) or 'a defect'}; --verbose shows the trace"
+    return " ".join(text.split())
+
+
+def run() -> None:
+    """Entry point of the console script."""
+    sys.exit(main(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,52 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from relume.errors import ParameterError
+
+Data = Annotated[
+    Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
+]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Id of a scene, the start of one, or its name.")]
+View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View; the first one where not given.")]
+Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")]
+LookFile = Annotated[
+    Path | None, typer.Option("--look", metavar="LOOK.json", help="Look document, may be partial; else the default.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="tcp://…", help="Dask scheduler to bake on; else processes of this machine."),
+]
+
+MAX_LOOK_BYTES = 16 << 20
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height from "640x480". Raises ParameterError."""
+    match = re.fullmatch(r"([1-9]\d{0,4})[x×]([1-9]\d{0,4})", text)
+    if match is None:
+        raise ParameterError("--size", text, "width and height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def read_look(path: Path | None) -> dict[str, object]:
+    """A look document from a file; an empty one where there is no file. Raises ParameterError, OSError."""
+    import json
+
+    if path is None:
+        return {}
+    with path.open("rb") as file:
+        text = file.read(MAX_LOOK_BYTES + 1)
+    try:
+        document = json.loads(text) if len(text) <= MAX_LOOK_BYTES else None
+    except (ValueError, RecursionError) as error:
+        raise ParameterError("--look", path.name, f"a JSON file; {error}") from None
+    if not isinstance(document, dict):
+        raise ParameterError("--look", path.name, f"a JSON object of at most {MAX_LOOK_BYTES >> 20} MB")
+    return document

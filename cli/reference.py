@@ -1,0 +1,56 @@
+"""`relume reference`: brute-force truth, for error figures."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.options import Data, LookFile, SceneName, Size, View, parse_size, read_look
+from cli.render import Output
+
+
+def reference(
+    scene: SceneName,
+    output: Output,
+    spp: Annotated[int, typer.Option(metavar="N", min=1, max=1 << 20, help="Samples per pixel.")],
+    look: LookFile = None,
+    view: View = None,
+    size: Size = None,
+    data: Data = None,
+) -> None:
+    """Render by brute force: every texel of the light, visibility traced, nothing baked."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from cli.house import complete_look, find_scene, open_bakes, open_settings
+    from cli.picture import check_output, save
+    from relume.errors import NotFoundError
+    from relume.look import default_look
+    from relume.reference import reference_image
+    from relume.scene.archive import load_scene
+    from worker.paths import scene_path
+    from worker.presets import PRESETS
+
+    check_output(output)
+    partial, pixels = read_look(look), parse_size(size) if size else PRESETS["good"].size
+    service = open_bakes(open_settings(data))
+    try:
+        record = find_scene(service.ledger, scene)
+    finally:
+        service.close()
+    if view is not None and view not in record.views:
+        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
+    loaded = load_scene(scene_path(service.data_dir, record.id))
+    document = complete_look(partial, default_look(loaded.materials))
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("reference", total=1.0)
+        image = reference_image(
+            loaded,
+            view or record.views[0],
+            document,
+            pixels,
+            spp,
+            lambda fraction: progress.update(bar, completed=fraction),
+        )
+    save(output, image, document)

@@ -1,0 +1,32 @@
+"""`relume render`: one exact frame without a server."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import Data, LookFile, SceneName, View, read_look
+
+Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")]
+
+
+def render(scene: SceneName, output: Output, look: LookFile = None, view: View = None, data: Data = None) -> None:
+    """Render one exact frame of a baked scene."""
+    from cli.house import complete_look, find_bake, find_scene, open_bakes, open_settings
+    from cli.picture import check_output, save
+    from relume.transfer.direct import open_transfer
+    from relume.transfer.render import render_image
+
+    check_output(output)
+    partial = read_look(look)
+    service = open_bakes(open_settings(data))
+    try:
+        record = find_scene(service.ledger, scene)
+        bake, view_name = find_bake(service, record, view)
+        transfer = open_transfer(service.store_path(bake.id))
+        document = complete_look(partial, transfer.default_look)
+        save(output, render_image(transfer, view_name, document), document)
+    finally:
+        service.close()

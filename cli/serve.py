@@ -1,0 +1,52 @@
+"""`relume serve`: the server."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import Scheduler
+
+DataOrUrl = Annotated[
+    str | None,
+    typer.Option(
+        "--data",
+        metavar="DIR|URL",
+        help="Data folder; or the SQLAlchemy URL of the database, the folder then being RELUME_DATA.",
+    ),
+]
+Host = Annotated[str | None, typer.Option(help="Address to listen on. [default: 127.0.0.1]")]
+Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen on. [default: 8420]")]
+
+
+def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
+    """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
+    from cli.house import open_settings
+    from server.app import serve as run_server
+
+    is_url = data is not None and "://" in data
+    folder = None if data is None or is_url else Path(data)
+    settings = open_settings(folder, database=data if is_url else None, host=host, port=port, scheduler=scheduler)
+    check_port(settings.host, settings.port)
+    typer.echo(f"relume listens on {address(settings.host, settings.port)}", err=True)
+    run_server(settings)
+
+
+def check_port(host: str, port: int) -> None:
+    """Raise ParameterError where the address cannot be listened on."""
+    from relume.errors import ParameterError
+
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        socket.create_server((host, port), family=family).close()
+    except OSError as error:
+        raise ParameterError("--port", port, f"one that is free on {host} ({error.strerror})") from None
+
+
+def address(host: str, port: int) -> str:
+    """What to type into a browser on this machine."""
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
+    return f"http://{shown}:{port}/"
