@@ -34,10 +34,6 @@ CLOSE_NOT_READY = 4409
 CLOSE_DAMAGED = 4410
 
 
-class NotFoundError(RelumeError):
-    """Nothing of that name is here."""
-
-
 class NotReadyError(RelumeError):
     """It is here, but it is not in the state that the call needs."""
 
@@ -79,7 +75,7 @@ class Row:
 
 # The first row whose exception fits is taken: subclasses stand before their bases.
 TABLE: Sequence[tuple[type[Exception], Row]] = (
-    (NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
+    (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
@@ -149,6 +145,12 @@ def problem_response(problem: Problem, headers: Mapping[str, str] | None = None)
 def message_problem(error: ValidationError) -> Problem:
     """The body for a session message that does not have the declared form."""
     return validation_problem(error.errors(include_url=False, include_context=False, include_input=False), status=400)
+
+
+OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
+    "4XX": {"description": "Refused", "content": {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}},
+    "5XX": {"description": "Failed", "content": {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}},
+}
 
 
 def install(app: FastAPI) -> None:

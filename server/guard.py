@@ -6,7 +6,7 @@ Pure ASGI, so that streaming and WebSockets pass without a detour. A page of ano
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -53,8 +53,9 @@ class Guard:
         allowed_origins: Sequence[str],
         max_body_bytes: int,
         max_upload_bytes: int,
+        count: Callable[[str, int], None],
     ) -> None:
-        self._app = app
+        self._app, self._count = app, count
         self._allowed_hosts, self._allowed_origins = allowed_hosts, allowed_origins
         self._max_body_bytes, self._max_upload_bytes = max_body_bytes, max_upload_bytes
 
@@ -63,6 +64,8 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
+        if scope["type"] == "http":
+            send = self._dressed(scope, send)
         refusal = self._refusal(scope)
         if refusal is not None:
             await _refuse(refusal, scope, receive, send)
@@ -86,6 +89,19 @@ class Guard:
             return ForbiddenOriginError("the Host or Origin header cannot be read; send a proper one")
         return None
 
+    def _dressed(self, scope: Scope, send: Send) -> Send:
+        """Adds the safe headers to whatever is answered, and counts it."""
+
+        async def dressed(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._count(scope["method"], message["status"])
+                headers = MutableHeaders(scope=message)
+                for name, value in SECURITY_HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        return dressed
+
     def _limit(self, scope: Scope) -> int:
         return self._max_upload_bytes if scope["path"] == "/api/scenes" else self._max_body_bytes
 
@@ -105,19 +121,15 @@ class Guard:
                 raise self._too_large(scope)
             return message
 
-        async def dressed(message: Message) -> None:
+        async def unless_over(message: Message) -> None:
             nonlocal is_started
             if is_over and not is_started:
                 return
-            if message["type"] == "http.response.start":
-                is_started = True
-                headers = MutableHeaders(scope=message)
-                for name, value in SECURITY_HEADERS.items():
-                    headers.setdefault(name, value)
+            is_started = True
             await send(message)
 
         try:
-            await self._app(scope, counted, dressed)
+            await self._app(scope, counted, unless_over)
         except TooLargeError:
             if is_started:
                 raise

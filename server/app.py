@@ -1,0 +1,83 @@
+"""Puts the server together: `create_app(settings)`."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import FastAPI
+
+from server import errors
+from server.guard import Guard
+from server.live.library import open_library
+from server.metrics import Metrics
+from server.routes import bakes, client, health, looks, models, renders, scenes, session
+from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
+from server.settings import Settings
+
+ROUTE_GROUPS = (scenes, models, bakes, renders, looks, session, health)
+
+
+def create_app(
+    settings: Settings | None = None,
+    *,
+    open_library: OpenLibrary = open_library,
+    open_bakes: OpenBakes = open_bakes,
+) -> FastAPI:
+    """The ASGI app; opens its data at startup and closes it at shutdown.
+
+    Args:
+        settings: None: from the environment.
+        open_library, open_bakes: what sessions and bakes stand on; tests put stand-ins here.
+    """
+    settings = settings or Settings()
+    metrics = Metrics()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with open_services(settings, metrics, open_library, open_bakes) as services:
+            app.state.services = services
+            yield
+            del app.state.services
+
+    app = FastAPI(
+        title="relume",
+        summary="Edit materials and lights in the finished picture.",
+        version=version("relume"),
+        openapi_url="/api/openapi.json",
+        docs_url=None,  # the documentation pages load scripts from other sites
+        redoc_url=None,
+        lifespan=lifespan,
+        responses=errors.OPENAPI_RESPONSES,
+    )
+    errors.install(app)
+    app.add_middleware(
+        Guard,
+        allowed_hosts=[*settings.allowed_hosts, settings.host],
+        allowed_origins=settings.allowed_origins,
+        max_body_bytes=settings.max_body_bytes,
+        max_upload_bytes=settings.max_upload_bytes,
+        count=metrics.count_request,
+    )
+    for group in ROUTE_GROUPS:
+        app.include_router(group.router)
+    app.mount("/", client.Client(settings.client))
+    return app
+
+
+def serve(settings: Settings) -> None:
+    """Run the server until it is stopped; blocks."""
+    import uvicorn
+
+    uvicorn.run(
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        loop="uvloop",
+        ws_max_size=64 * 1024,
+        ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
+        log_level="warning",  # the access log would show resume tokens
+        server_header=False,
+        timeout_graceful_shutdown=5,
+    )

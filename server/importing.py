@@ -1,0 +1,93 @@
+"""Imports an uploaded scene in a process of its own, with limits: a hostile file can end that process, not the server.
+
+`python -m server.importing` reads one `Order` as JSON from stdin and writes one line of JSON to stdout:
+{"scene": id} or {"problem": sentence}.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from relume.errors import RelumeError, SceneError
+
+MAX_OUTPUT_BYTES = 64 * 1024
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to import.
+
+    Attributes:
+        environment: path of the environment map, or None.
+        name: of the scene.
+        seconds: of processor and wall. max_bytes: of address space.
+    """
+
+    data: str
+    database: str
+    scene: str
+    environment: str | None
+    name: str
+    seconds: int
+    max_bytes: int
+
+
+def import_in_process(order: Order) -> str:
+    """Import and register; returns the scene's id. Blocks.
+
+    Raises:
+        SceneError: the file cannot be used, or reading it took too much.
+    """
+    command = [sys.executable, "-m", "server.importing"]
+    # No thread pools in a short-lived process: each thread would reserve address space that counts against the limit.
+    environ = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    told = json.dumps(asdict(order)).encode()
+    limits = f"{order.seconds} s or {order.max_bytes / 1e9:.1f} GB"
+    try:
+        done = subprocess.run(  # noqa: S603
+            command, input=told, capture_output=True, timeout=order.seconds, check=False, env=environ
+        )
+        answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
+    except (subprocess.TimeoutExpired, ValueError, IndexError):
+        raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the scene") from None
+    if "problem" in answer:
+        raise SceneError(answer["problem"])
+    return str(answer["scene"])
+
+
+def main() -> int:
+    """The process itself."""
+    order = Order(**json.loads(sys.stdin.buffer.read()))
+    resource.setrlimit(resource.RLIMIT_AS, (order.max_bytes, order.max_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (order.seconds, order.seconds))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        answer = {"scene": _import(order)}
+    except RelumeError as error:
+        answer = {"problem": str(error)}
+    except MemoryError:
+        answer = {"problem": f"the import needs more than {order.max_bytes / 1e9:.1f} GB; simplify the scene"}
+    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+    return 0
+
+
+def _import(order: Order) -> str:
+    from relume.light.environment import read_environment
+    from relume.scene.gltf import import_gltf
+    from worker.database import open_database
+    from worker.ledger import Ledger
+    from worker.scenes import register_scene
+
+    environment = None if order.environment is None else read_environment(order.environment, "Environment")
+    scene = import_gltf(order.scene, order.name, environment)
+    return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,50 @@
+"""Tells a session that a finer bake of its scene goes on or is ready, so that the editor can swap it in."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+
+from server.live.wire import Wire
+from server.protocol import BakeMessage
+from worker.status import BakeStatus
+
+POLL_S = 0.5
+
+
+class BakeNews:
+    """Looks into the ledger, which other processes write too."""
+
+    def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]]) -> None:
+        self._list_bakes = list_bakes
+
+    async def tell(self, wire: Wire, bake: str, scene: str) -> None:
+        """Run for as long as the session does; says each change once."""
+        told: dict[str, BakeMessage] = {}
+        while True:
+            for news in self._news(bake, await asyncio.to_thread(self._list_bakes, scene)):
+                if told.get(news.bake) != news:
+                    told[news.bake] = news
+                    await wire.send(news)
+            await asyncio.sleep(POLL_S)
+
+    @staticmethod
+    def _news(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:
+        own = next((status for status in statuses if status.id == bake), None)
+        return [
+            BakeMessage(
+                bake=status.id,
+                replaces=bake,
+                state=status.state,
+                progress=round(status.progress, 3),
+                seconds_left=None if status.seconds_left is None else round(status.seconds_left, 1),
+            )
+            for status in statuses
+            if own is not None and status.state in ("running", "ready") and _detail(status) > _detail(own)
+        ]
+
+
+def _detail(status: BakeStatus) -> int:
+    """Pixels times lights: what makes a bake finer."""
+    width, height = status.recipe.size
+    return width * height * status.recipe.num_lights

@@ -1,0 +1,84 @@
+"""What a session needs of the library: a transfer, a picture, and how to get them. Tests put stand-ins here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Tile = tuple[int, int, int, int]
+F32 = NDArray[np.float32]
+
+
+class View(Protocol):
+    """A baked view."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    def material_ids(self) -> NDArray[np.uint16]:
+        """(height, width); 65535 is background."""
+        ...
+
+
+class Transfer(Protocol):
+    """An opened bake."""
+
+    @property
+    def scene_id(self) -> str: ...
+    @property
+    def default_look(self) -> dict[str, Any]: ...
+    @property
+    def material_names(self) -> Sequence[str]: ...
+    @property
+    def views(self) -> Mapping[str, Any]: ...
+
+
+class Advance(Protocol):
+    """What one step changed."""
+
+    @property
+    def tiles(self) -> Sequence[Tile]: ...
+    @property
+    def exact(self) -> bool: ...
+    @property
+    def changed(self) -> bool: ...
+
+
+class Picture(Protocol):
+    """One live picture; used from one thread at a time."""
+
+    def set_look(self, look: Any) -> None: ...
+    def waiting(self) -> str | None: ...
+    def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None: ...
+    def touch(self, pointer: str) -> None: ...
+    def advance(self, max_coefficients: int | None) -> Advance: ...
+    def all_tiles(self) -> Sequence[Tile]: ...
+    def encode(self, tiles: Sequence[Tile], form: Any, /) -> bytes: ...
+    def image(self) -> F32: ...
+    def probe(self, x: int, y: int) -> Mapping[str, Any]: ...
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
+
+
+@dataclass(frozen=True)
+class Library:
+    """How transfers are opened and pictures made; one per app.
+
+    Attributes:
+        open_transfer: path of a published store -> transfer; heavy.
+        make_picture: (transfer, view name) -> picture, its caches shared; heavy.
+        render: (transfer, view name, complete look, size or None) -> (H, W, 3) linear radiance; heavy.
+        cache_used_bytes: what the frozen caches hold now.
+    """
+
+    open_transfer: Callable[[Path], Transfer]
+    make_picture: Callable[[Any, str], Picture]
+    render: Callable[[Any, str, Any, tuple[int, int] | None], F32]
+    cache_used_bytes: Callable[[], int]

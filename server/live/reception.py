@@ -1,0 +1,126 @@
+"""The receiving half of a session: reads messages, checks them, and notes what the client wants."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from pydantic import ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from relume.errors import ParameterError, ProtocolError, RelumeError
+from server import protocol
+from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
+from server.live.edits import LookDesk
+from server.live.frame_loop import FrameLoop
+from server.live.pointers import find_curve, focus_of
+from server.live.ports import Transfer
+from server.live.window import Window
+from server.live.wire import Wire
+from server.live.wishes import Wishes
+from server.metrics import Metrics
+
+MAX_BAD_MESSAGES = 50
+
+
+class Reception:
+    """Runs until the client goes or breaks the rules too often."""
+
+    def __init__(
+        self,
+        *,
+        websocket: WebSocket,
+        wire: Wire,
+        wishes: Wishes,
+        window: Window,
+        desk: LookDesk,
+        frame_loop: FrameLoop,
+        transfer: Transfer,
+        metrics: Metrics,
+    ) -> None:
+        self._websocket, self._wire, self._wishes, self._window = websocket, wire, wishes, window
+        self._desk, self._frame_loop, self._transfer, self._metrics = desk, frame_loop, transfer, metrics
+        self._num_bad = 0
+
+    async def run(self) -> None:
+        """Receive for ever.
+
+        Raises:
+            WebSocketDisconnect: the client is gone.
+            ProtocolError: the session must end; carries the close code.
+        """
+        while True:
+            text = _text_of(await self._websocket.receive())
+            if text is None:
+                await self._bad(ProtocolError("messages are JSON text; send text frames", 1003))
+                continue
+            try:
+                message = protocol.CLIENT_MESSAGE.validate_json(text)
+            except ValidationError as error:
+                await self._bad(message_problem(error))
+                continue
+            try:
+                self._take(message)
+            except RelumeError as error:
+                revision = message.revision if isinstance(message, protocol.EditMessage) else None
+                await self._wire.refuse(error, revision)
+            self._wishes.news.set()
+
+    async def _bad(self, problem: Exception | protocol.Problem) -> None:
+        """A message that no client of ours sends: said each time, forgiven a number of times."""
+        self._num_bad += 1
+        if self._num_bad > MAX_BAD_MESSAGES:
+            raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
+        await self._wire.refuse(problem)
+
+    def _take(self, message: protocol.ClientMessage) -> None:
+        match message:
+            case protocol.EditMessage():
+                self._edit(message)
+            case protocol.AckMessage():
+                self._window.acknowledged(message.frame, time.perf_counter())
+            case protocol.ViewMessage():
+                self._check_view(message.name)
+                self._wishes.view = message.name
+            case protocol.StreamMessage():
+                self._wishes.form, self._wishes.quality = message.format, message.quality
+            case protocol.ProbeMessage():
+                if message.view not in (None, self._frame_loop.view):
+                    raise ParameterError("view", message.view, f"{self._frame_loop.view!r}, the view that is shown")
+                self._wishes.probe = message
+            case protocol.BrushMessage():
+                find_curve(message.curve, self._desk.document)
+                self._wishes.brush = message
+            case protocol.TouchMessage():
+                find_curve(message.curve, self._desk.document)
+                self._wishes.touch = message.curve
+                self._focus(frozenset({message.curve}))
+
+    def _edit(self, message: protocol.EditMessage) -> None:
+        try:
+            self._wishes.target = self._desk.apply(message)
+        except RelumeError:
+            self._metrics.edits.labels("refused").inc()
+            raise
+        self._metrics.edits.labels("applied").inc()
+        self._focus(focus_of(message.patch, self._desk.document))
+
+    def _focus(self, curves: frozenset[str]) -> None:
+        if curves:
+            self._wishes.focus = curves
+            self._frame_loop.moved_on_to(curves)
+
+    def _check_view(self, name: str) -> None:
+        if name not in self._transfer.views:
+            raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+
+
+def _text_of(message: Any) -> str | None:
+    """The text of a received message; None for a binary one."""
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message.get("code", 1005))
+    text: str | None = message.get("text")
+    size_bytes = len(message.get("bytes") or b"") if text is None else len(text.encode(errors="surrogatepass"))
+    if size_bytes > protocol.MAX_MESSAGE_BYTES:
+        raise ProtocolError(f"messages have at most {protocol.MAX_MESSAGE_BYTES} bytes; send less", CLOSE_TOO_BIG)
+    return text

@@ -1,0 +1,137 @@
+"""One live session from hello to the last word: puts the parts together and ends them together."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from relume.errors import RelumeError
+from server.errors import close_code_of, problem_of
+from server.live.bake_news import BakeNews
+from server.live.edits import LookDesk
+from server.live.frame_loop import FrameLoop
+from server.live.ports import Library, Transfer
+from server.live.reception import Reception
+from server.live.resume import ResumeStore
+from server.live.threads import Threads
+from server.live.window import Window
+from server.live.wire import Wire
+from server.live.wishes import Wishes
+from server.metrics import Metrics
+from server.protocol import HelloMessage, ViewInfo
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class House:
+    """What all sessions share."""
+
+    library: Library
+    threads: Threads
+    metrics: Metrics
+    resumes: ResumeStore
+    bake_news: BakeNews
+    ack_seconds: float
+
+
+async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfer, resume: str | None) -> None:
+    """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
+    kept = house.resumes.take(resume, bake, time.monotonic()) if resume else None
+    default: dict[str, Any] = transfer.default_look
+    desk = LookDesk(default, kept.document if kept else default, kept.revision if kept else 0)
+    wire = Wire(websocket, house.ack_seconds)
+    token = ResumeStore.new_token()
+    house.metrics.sessions.inc()
+    try:
+        await wire.send(_hello(bake, transfer, desk, token, kept is not None))
+        await _serve_parts(house, websocket, wire, bake, transfer, desk)
+    except WebSocketDisconnect:
+        log.debug("session of bake %s: the client left", bake)
+    except RelumeError as error:
+        await wire.close(close_code_of(error), problem_of(error).detail)
+    except Exception as error:
+        log.exception("session of bake %s ends by a defect", bake)
+        await wire.close(close_code_of(error), problem_of(error).detail)
+    finally:
+        house.metrics.sessions.dec()
+        house.resumes.keep(token, bake, desk.document, desk.revision, time.monotonic())
+
+
+def _hello(bake: str, transfer: Transfer, desk: LookDesk, token: str, resumed: bool) -> HelloMessage:
+    views = [ViewInfo(name=view.name, width=view.width, height=view.height) for view in transfer.views.values()]
+    return HelloMessage(
+        session=secrets.token_hex(8),
+        bake=bake,
+        scene=transfer.scene_id,
+        look=desk.document,
+        revision=desk.revision,
+        resumed=resumed,
+        view=views[0].name,
+        views=views,
+        materials=list(transfer.material_names),
+        resume=token,
+    )
+
+
+async def _serve_parts(
+    house: House, websocket: WebSocket, wire: Wire, bake: str, transfer: Transfer, desk: LookDesk
+) -> None:
+    """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
+    wishes, window = Wishes(), Window(house.ack_seconds)
+    frame_loop = FrameLoop(
+        wire=wire,
+        wishes=wishes,
+        window=window,
+        desk=desk,
+        library=house.library,
+        transfer=transfer,
+        threads=house.threads,
+        metrics=house.metrics,
+        view=next(iter(transfer.views)),
+    )
+    reception = Reception(
+        websocket=websocket,
+        wire=wire,
+        wishes=wishes,
+        window=window,
+        desk=desk,
+        frame_loop=frame_loop,
+        transfer=transfer,
+        metrics=house.metrics,
+    )
+    parts = [
+        asyncio.create_task(reception.run()),
+        asyncio.create_task(frame_loop.run()),
+        asyncio.create_task(house.bake_news.tell(wire, bake, transfer.scene_id)),
+    ]
+    try:
+        done, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
+        for part in done:
+            part.result()
+    finally:
+        await _end(parts)
+
+
+async def _end(parts: Sequence[asyncio.Task[None]]) -> None:
+    """Cancel the parts and see them end, even while being cancelled: a thread may still use the picture."""
+    cancelled: asyncio.CancelledError | None = None
+    for part in parts:
+        part.cancel()
+    while not all(part.done() for part in parts):
+        try:
+            await asyncio.wait(parts)
+        except asyncio.CancelledError as error:
+            cancelled = error
+    for part in parts:
+        if not part.cancelled():
+            part.exception()  # one that lost the race to end the session is not told
+    if cancelled is not None:
+        raise cancelled

@@ -1,0 +1,54 @@
+"""What the client wants and has not got yet: one slot of each kind, the newest wins, so memory stays bounded."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import Literal
+
+from server.live.painter import Target
+from server.protocol import BrushMessage, ProbeMessage
+
+
+@dataclass
+class Wishes:
+    """Filled by the receiving side, emptied by the frame loop; both on the event loop.
+
+    Attributes:
+        focus: the curves that the user edited or opened last.
+    """
+
+    target: Target | None = None
+    view: str | None = None
+    touch: str | None = None
+    probe: ProbeMessage | None = None
+    brush: BrushMessage | None = None
+    form: Literal["hdr", "jpeg", "auto"] = "auto"
+    quality: int = 80
+    focus: frozenset[str] = frozenset()
+    news: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def take_target(self) -> Target | None:
+        """Empty the look's slot."""
+        taken, self.target = self.target, None
+        return taken
+
+    def take_view(self) -> str | None:
+        """Empty the view's slot."""
+        taken, self.view = self.view, None
+        return taken
+
+    def take_touch(self) -> str | None:
+        """Empty the touched curve's slot."""
+        taken, self.touch = self.touch, None
+        return taken
+
+    def take_probe(self) -> ProbeMessage | None:
+        """Empty the probe's slot."""
+        taken, self.probe = self.probe, None
+        return taken
+
+    def take_brush(self) -> BrushMessage | None:
+        """Empty the brush's slot."""
+        taken, self.brush = self.brush, None
+        return taken

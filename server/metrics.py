@@ -1,0 +1,39 @@
+"""What the server counts and times, as Prometheus sees it; one registry per app."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
+
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"})
+LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.060, 0.100, 0.250, 1.0, 4.0)
+
+
+class Metrics:
+    """The figures by name."""
+
+    def __init__(self) -> None:
+        self.registry = registry = CollectorRegistry()
+        self.sessions = Gauge("relume_sessions", "Live sessions", registry=registry)
+        self.frames = Counter("relume_frames", "Frames sent", ["kind", "format"], registry=registry)
+        self.frame_bytes = Counter("relume_frame_bytes", "Bytes of frames sent", registry=registry)
+        self.edits = Counter("relume_edits", "Edits received", ["outcome"], registry=registry)
+        self.bakes = Counter("relume_bakes", "Bakes submitted", registry=registry)
+        self.requests = Counter("relume_http_requests", "HTTP requests", ["method", "status"], registry=registry)
+        self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame handed over")
+        self.update = self._histogram("relume_frame_update_seconds", "Updating the picture")
+        self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
+        self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
+        self._cache = Gauge("relume_frozen_cache_bytes", "Bytes in the frozen caches", registry=registry)
+
+    def watch_cache(self, used_bytes: Callable[[], int]) -> None:
+        """Where the size of the frozen caches is read from."""
+        self._cache.set_function(used_bytes)
+
+    def count_request(self, method: str, status: int) -> None:
+        """One HTTP response; a method that nobody knows must not become a label of its own."""
+        self.requests.labels(method if method in METHODS else "other", str(status)).inc()
+
+    def _histogram(self, name: str, text: str) -> Histogram:
+        return Histogram(name, text, buckets=LATENCY_S, registry=self.registry)

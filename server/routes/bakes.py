@@ -1,0 +1,154 @@
+"""/api/bakes: plan, queue, follow and cancel bakes; the material ids of a baked view."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import JSONResponse
+from PIL import Image
+from sse_starlette import EventSourceResponse, ServerSentEvent
+
+from relume.errors import NotFoundError, ParameterError
+from relume.transfer.base import Plan, Recipe
+from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, Preset, RecipeBody
+from server.errors import NotReadyError
+from server.services import Services, Shared
+from worker.scenes import get_scene
+from worker.status import BakeStatus, bake_id
+
+router = APIRouter(prefix="/api/bakes", tags=["bakes"])
+
+PRESETS: dict[Preset, tuple[tuple[int, int], int]] = {
+    "preview": ((320, 240), 300),
+    "good": ((640, 480), 2000),
+    "final": ((1024, 768), 4000),
+}
+EVENT_POLL_S = 0.5
+
+
+@router.post("", status_code=202, responses={200: {"model": DryRunBody}, 202: {"model": BakeBody}})
+def submit_bake(request: BakeRequest, services: Shared) -> JSONResponse:
+    """Queue a bake, or with `dry_run` only say what it would cost; the same recipe twice is the same bake."""
+    recipe = _recipe(request, services)
+    if request.dry_run:
+        plan = services.bakes.plan(request.scene, recipe)
+        dry = DryRunBody(id=bake_id(request.scene, recipe), recipe=_recipe_body(recipe), plan=_plan(plan, services))
+        return JSONResponse(dry.model_dump())
+    identity = services.bakes.submit(request.scene, recipe)
+    services.metrics.bakes.inc()
+    body = bake_body(services.bakes.get(identity), services)
+    return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{identity}"})
+
+
+@router.get("")
+def list_bakes(services: Shared, scene: Annotated[Id | None, Query()] = None) -> list[BakeBody]:
+    """All bakes, or those of a scene; newest first."""
+    return [bake_body(status, services) for status in services.bakes.bakes(scene)]
+
+
+@router.get("/{bake}")
+def get_bake(bake: Id, services: Shared) -> BakeBody:
+    """State, progress, rate and time left."""
+    return bake_body(services.bakes.get(bake), services)
+
+
+@router.get("/{bake}/events", response_class=EventSourceResponse)
+async def bake_events(bake: Id, services: Shared) -> EventSourceResponse:
+    """Every change as a server-sent event `bake` with the same body as GET; ends with the bake."""
+    await run_in_threadpool(services.bakes.get, bake)
+    return EventSourceResponse(_events(bake, services), headers={"Cache-Control": "no-store"})
+
+
+async def _events(bake: str, services: Services) -> AsyncIterator[ServerSentEvent]:
+    told: BakeStatus | None = None
+    while told is None or not told.final:
+        try:
+            status = await run_in_threadpool(services.bakes.get, bake)
+        except NotFoundError:  # deleted with its scene
+            return
+        if status != told:
+            told = status
+            yield ServerSentEvent(bake_body(status, services).model_dump_json(), event="bake")
+        else:
+            await asyncio.sleep(EVENT_POLL_S)
+
+
+@router.delete("/{bake}", status_code=204)
+def cancel_bake(bake: Id, services: Shared) -> Response:
+    """Cancel; what was finished is kept for a resume."""
+    services.bakes.cancel(bake)
+    return Response(status_code=204)
+
+
+@router.get(
+    "/{bake}/views/{view}/materials.png", response_class=Response, responses={200: {"content": {"image/png": {}}}}
+)
+async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> Response:
+    """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
+    await run_in_threadpool(ready_bake, services, bake)
+    async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
+        if view not in transfer.views:
+            raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
+        png = await run_in_threadpool(_png, transfer.views[view])
+    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=31536000, immutable"})
+
+
+def _png(view: Any) -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(view.material_ids()).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def ready_bake(services: Services, bake: str) -> BakeStatus:
+    """A bake that can be opened. Raises NotFoundError, NotReadyError."""
+    status = services.bakes.get(bake)
+    if status.state != "ready":
+        raise NotReadyError(f"the bake is {status.state}; wait until it is ready")
+    return status
+
+
+def _recipe(request: BakeRequest, services: Services) -> Recipe:
+    """What is baked: the preset, what the request names beside it, every view where none is named."""
+    known = get_scene(services.bakes.ledger, request.scene).views
+    unknown = sorted(set(request.views or ()) - set(known))
+    if unknown:
+        raise ParameterError("views", unknown[0], "some of " + ", ".join(known)[:400])
+    size, num_lights = PRESETS[request.preset or "good"]
+    views = tuple(dict.fromkeys(request.views or known))
+    return Recipe(request.method, views, request.size or size, request.lights or num_lights)
+
+
+def bake_body(status: BakeStatus, services: Services) -> BakeBody:
+    """A bake as the API shows it."""
+    return BakeBody(
+        id=status.id,
+        scene=status.scene,
+        state=status.state,
+        progress=status.progress,
+        rays_per_second=status.rays_per_second,
+        seconds_left=status.seconds_left,
+        bytes=status.bytes,
+        problem=status.problem,
+        recipe=_recipe_body(status.recipe),
+        plan=_plan(status.plan, services),
+    )
+
+
+def _recipe_body(recipe: Recipe) -> RecipeBody:
+    return RecipeBody(method=recipe.method, views=list(recipe.views), size=recipe.size, lights=recipe.num_lights)
+
+
+def _plan(plan: Plan, services: Services) -> PlanBody:
+    rate = services.bakes.rays_per_second()
+    return PlanBody(
+        view_samples=plan.num_view_samples,
+        rays=plan.num_rays,
+        store_bytes=plan.store_bytes,
+        peak_bytes=plan.peak_bytes,
+        seconds=plan.num_rays / rate if rate else None,
+    )

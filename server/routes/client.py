@@ -1,0 +1,46 @@
+"""Serves the built editor: hashed assets for ever, the page always fresh, the page for every route of the editor."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath
+
+from starlette.exceptions import HTTPException
+from starlette.responses import HTMLResponse, Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+FOR_EVER = "public, max-age=31536000, immutable"
+NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>relume</title>
+<p>The server runs; the editor is not built yet. Build it and reload:</p>
+<pre>cd client_web &amp;&amp; npm ci &amp;&amp; npm run build</pre></html>"""
+
+
+class Client(StaticFiles):
+    """The editor's files under /; what is no file and has no suffix is a route of the editor."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(directory=folder, check_dir=False)
+        self._index = folder / "index.html"
+
+    async def check_config(self) -> None:
+        """A missing folder is no error: it is said in the page."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """A file, or the page."""
+        if path == "api" or path.startswith("api/"):
+            raise HTTPException(404, "there is no such call; see /api/openapi.json")
+        if scope["method"] not in ("GET", "HEAD"):
+            raise HTTPException(405, "only GET here", {"Allow": "GET, HEAD"})
+        if not self._index.is_file():
+            return HTMLResponse(NOT_BUILT, status_code=503, headers={"Cache-Control": "no-store"})
+        try:
+            if "\0" in path:
+                raise HTTPException(404)
+            response = await super().get_response("index.html" if path == "." else path, scope)
+        except HTTPException as error:
+            if error.status_code != 404 or PurePosixPath(path).suffix:
+                raise
+            response = await super().get_response("index.html", scope)
+        is_asset = path.startswith("assets/") and response.status_code in (200, 304)
+        response.headers["Cache-Control"] = FOR_EVER if is_asset else "no-cache"
+        return response

@@ -1,0 +1,66 @@
+"""/api/looks: saved looks. A change names the version it changes (If-Match); a new one may say If-None-Match: *."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume.errors import ParameterError
+from server.bodies import LookEntry
+from server.looks import SavedLook, check_name, parse_document
+from server.services import Shared
+
+router = APIRouter(prefix="/api/looks", tags=["looks"])
+Etags = Annotated[str | None, Header(max_length=4096)]
+LOOK_BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": {"type": "object"}}}}}
+
+
+@router.get("")
+def list_looks(services: Shared) -> list[LookEntry]:
+    """Names and versions, newest first."""
+    return [
+        LookEntry(
+            name=look.name,
+            etag=look.etag,
+            modified=datetime.fromtimestamp(look.modified, UTC).isoformat(),
+            bytes=len(look.document.encode()),
+        )
+        for look in services.looks.list()
+    ]
+
+
+@router.get("/{name}", responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}, 304: {}})
+def get_look(name: str, services: Shared, if_none_match: Etags = None) -> Response:
+    """One look, with its version as ETag."""
+    look = services.looks.get(check_name(name))
+    headers = _headers(look)
+    if if_none_match is not None and look.etag in [etag.strip() for etag in if_none_match.split(",")]:
+        return Response(status_code=304, headers=headers)
+    return Response(look.document, headers=headers, media_type="application/json")
+
+
+@router.put("/{name}", responses={201: {"description": "Created"}, 204: {"description": "Replaced"}},
+            status_code=204, openapi_extra=LOOK_BODY)
+async def put_look(
+    name: str, request: Request, services: Shared, if_match: Etags = None, if_none_match: Etags = None
+) -> Response:
+    """Save a look: 201 where it is new, 204 where it replaces the version that If-Match names."""
+    if if_none_match not in (None, "*"):
+        raise ParameterError("If-None-Match", if_none_match, "* or nothing")
+    name, document = check_name(name), parse_document(await request.body())
+    look, is_new = await run_in_threadpool(services.looks.put, name, document, if_match, if_none_match)
+    return Response(status_code=201 if is_new else 204, headers=_headers(look))
+
+
+@router.delete("/{name}", status_code=204)
+def delete_look(name: str, services: Shared, if_match: Etags = None) -> Response:
+    """Delete the version that If-Match names."""
+    services.looks.delete(check_name(name), if_match)
+    return Response(status_code=204)
+
+
+def _headers(look: SavedLook) -> dict[str, str]:
+    return {"ETag": look.etag, "Cache-Control": "no-cache"}

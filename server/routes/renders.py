@@ -1,0 +1,100 @@
+"""/api/renders: exact pictures of many looks at once."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from relume import look as looks
+from relume.errors import NotFoundError, ParameterError
+from server.bodies import MAX_LOOKS, Id, RenderBody, RenderRequest
+from server.errors import NotReadyError
+from server.live.ports import Transfer
+from server.renders import RenderStatus
+from server.routes.bakes import ready_bake
+from server.services import Shared
+
+router = APIRouter(prefix="/api/renders", tags=["renders"])
+MAX_PIXELS = 16 * 1024 * 1024
+MEDIA_TYPES = {"exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
+
+
+@router.post("", status_code=202)
+async def submit_render(request: RenderRequest, services: Shared, response: Response) -> RenderBody:
+    """Queue a batch; every look is checked first."""
+    if request.size is not None and request.size[0] * request.size[1] > MAX_PIXELS:
+        raise ParameterError("size", list(request.size), f"at most {MAX_PIXELS:,} pixels")
+    await run_in_threadpool(ready_bake, services, request.bake)
+    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        await run_in_threadpool(_check, request, transfer)
+    identity = await run_in_threadpool(services.renders.submit, request)
+    response.headers["Location"] = f"/api/renders/{identity}"
+    return _body(await run_in_threadpool(services.renders.get, identity))
+
+
+def _check(request: RenderRequest, transfer: Transfer) -> None:
+    if request.view not in transfer.views:
+        raise ParameterError("view", request.view, "one of " + ", ".join(transfer.views)[:400])
+    for index, partial in enumerate(request.looks):
+        try:
+            looks.complete(partial, transfer.default_look)
+        except ParameterError as error:
+            raise ParameterError(f"/looks/{index}{error.name}", error.value, error.allowed) from None
+
+
+@router.get("/{render}")
+def get_render(render: Id, services: Shared) -> RenderBody:
+    """State and progress."""
+    return _body(services.renders.get(render))
+
+
+@router.delete("/{render}", status_code=204)
+def delete_render(render: Id, services: Shared) -> Response:
+    """Stop a batch and forget its pictures."""
+    services.renders.delete(render)
+    return Response(status_code=204)
+
+
+@router.get("/{render}/frames/{index}", response_class=FileResponse)
+def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_LOOKS)], services: Shared) -> FileResponse:
+    """One finished picture, counted from 0."""
+    status = services.renders.get(render)
+    if index >= len(status.request.looks):
+        raise NotFoundError(f"this batch has {len(status.request.looks)} frames, counted from 0")
+    path = services.renders.frame_path(status, index)
+    if not path.exists():
+        raise NotReadyError(f"frame {index} is not finished; {_state(status)}")
+    return FileResponse(path, media_type=MEDIA_TYPES[status.request.format], filename=path.name)
+
+
+@router.get("/{render}/archive.zip", response_class=FileResponse)
+def get_archive(render: Id, services: Shared) -> FileResponse:
+    """All pictures in one file, when all are finished."""
+    status = services.renders.get(render)
+    if status.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(status)}")
+    path = services.renders.archive_path(status)
+    return FileResponse(path, media_type="application/zip", filename=f"{render}.zip")
+
+
+def _state(status: RenderStatus) -> str:
+    return f"it failed: {status.problem}" if status.problem else f"it is {status.state}, wait a little"
+
+
+def _body(status: RenderStatus) -> RenderBody:
+    request, total = status.request, len(status.request.looks)
+    return RenderBody(
+        id=status.id,
+        bake=request.bake,
+        view=request.view,
+        format=request.format,
+        size=request.size,
+        state=status.state,
+        done=status.done,
+        total=total,
+        progress=status.done / total,
+        problem=status.problem,
+    )

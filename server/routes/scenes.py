@@ -1,0 +1,131 @@
+"""/api/scenes: import, list, show and delete scenes."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections import defaultdict
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from relume.errors import NotFoundError, ParameterError
+from server.bodies import Id, SceneBody, SceneMaterial, SceneView
+from server.importing import Order, import_in_process
+from server.services import Services, Shared
+from server.thumbnails import thumbnail
+from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
+
+router = APIRouter(prefix="/api/scenes", tags=["scenes"])
+DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
+COPY_BYTES = 1 << 20
+SceneFile = Annotated[UploadFile, File(description="binary glTF, .glb")]
+EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
+SceneName = Annotated[str, Form(max_length=200)]
+
+
+@router.post("", status_code=201)
+async def import_scene(
+    scene: SceneFile, services: Shared, response: Response, environment: EnvironmentFile = None, name: SceneName = ""
+) -> SceneBody:
+    """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
+    identity = await run_in_threadpool(_import, scene, environment, name, services)
+    response.headers["Location"] = f"/api/scenes/{identity}"
+    return await run_in_threadpool(get_one, identity, services)
+
+
+def _import(scene: UploadFile, environment: UploadFile | None, name: str, services: Services) -> str:
+    settings = services.settings
+    if not name.isprintable():
+        raise ParameterError("name", name, "printable characters")
+    with tempfile.TemporaryDirectory(dir=settings.data, prefix="upload-") as folder:
+        order = Order(
+            data=str(settings.data.resolve()),
+            database=settings.database_url,
+            scene=str(_keep(scene, Path(folder) / "scene.glb")),
+            environment=None if environment is None else _keep_environment(environment, Path(folder)),
+            name=name.strip() or _plain_stem(scene.filename),
+            seconds=settings.import_seconds,
+            max_bytes=settings.import_bytes,
+        )
+        return import_in_process(order)
+
+
+def _keep(upload: UploadFile, path: Path) -> Path:
+    """The upload as a file of our own name; its size was bounded while it streamed in."""
+    with path.open("wb") as file:
+        shutil.copyfileobj(upload.file, file, COPY_BYTES)
+    return path
+
+
+def _keep_environment(upload: UploadFile, folder: Path) -> str:
+    """Kept under the suffix that its content says; the uploaded name becomes no part of a path."""
+    start = upload.file.read(4)
+    upload.file.seek(0)
+    return str(_keep(upload, folder / ("environment.exr" if start == b"\x76\x2f\x31\x01" else "environment.hdr")))
+
+
+def _plain_stem(filename: str | None) -> str:
+    """A scene's name from the uploaded file's."""
+    stem = (filename or "").replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+    return "".join(c for c in stem if c.isprintable()).strip()[:80] or "Scene"
+
+
+@router.get("")
+def get_all(services: Shared) -> list[SceneBody]:
+    """All scenes, newest first."""
+    bakes: dict[str, list[str]] = defaultdict(list)
+    ready: dict[str, str] = {}
+    for status in services.bakes.bakes():
+        bakes[status.scene].append(status.id)
+        if status.state == "ready":
+            ready.setdefault(status.scene, status.id)
+    return [_body(record, bakes[record.id], ready) for record in list_scenes(services.bakes.ledger)]
+
+
+@router.get("/{scene}")
+def get_one(scene: Id, services: Shared) -> SceneBody:
+    """One scene."""
+    record = get_scene(services.bakes.ledger, scene)
+    statuses = services.bakes.bakes(scene)
+    ready = [status.id for status in statuses if status.state == "ready"]
+    return _body(record, [status.id for status in statuses], {scene: ready[0]} if ready else {})
+
+
+@router.delete("/{scene}", status_code=204)
+def delete_one(scene: Id, services: Shared) -> Response:
+    """Delete a scene and its bakes."""
+    delete_scene(services.settings.data, services.bakes.ledger, scene)
+    return Response(status_code=204)
+
+
+@router.get("/{scene}/thumbnail.webp", response_class=FileResponse)
+async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> FileResponse:
+    """The scene as its newest bake shows it, unedited; `bake` only makes the address change when it does."""
+    statuses = await run_in_threadpool(services.bakes.bakes, scene)
+    ready = [status for status in statuses if status.state == "ready" and bake in (None, status.id)]
+    if not ready:
+        raise NotFoundError("there is no picture of this scene; bake it first")
+    path = await thumbnail(services, ready[0].id)
+    return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
+
+
+def _body(record: SceneRecord, bakes: list[str], ready: Mapping[str, str]) -> SceneBody:
+    bake = ready.get(record.id)
+    return SceneBody(
+        id=record.id,
+        name=record.name,
+        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
+        materials=[SceneMaterial(name=m["name"], terms=m["terms"]) for m in record.materials],
+        lights=[],
+        warnings=list(record.warnings),
+        triangles=record.num_triangles,
+        thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
+        bakes=bakes,
+    )

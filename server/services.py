@@ -1,0 +1,95 @@
+"""Everything that lives as long as the server: opened at start, closed at the end; routes ask for `Shared`."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from server import tables  # noqa: F401  its tables must be known before the database is opened
+from server.live.bake_news import BakeNews
+from server.live.ports import Library
+from server.live.resume import ResumeStore
+from server.live.session import House
+from server.live.threads import Threads
+from server.live.transfers import TransferPool
+from server.looks import LookShelf
+from server.metrics import Metrics
+from server.renders import RenderQueue
+from server.settings import Settings
+from worker.service import BakeService
+
+
+@dataclass(frozen=True)
+class Services:
+    """What routes use.
+
+    Attributes:
+        session_slots: one is held by each live session.
+    """
+
+    settings: Settings
+    metrics: Metrics
+    bakes: BakeService
+    looks: LookShelf
+    renders: RenderQueue
+    threads: Threads
+    transfers: TransferPool
+    house: House
+    session_slots: threading.BoundedSemaphore
+
+
+OpenLibrary = Callable[[int], Library]
+OpenBakes = Callable[[Settings], BakeService]
+
+
+def open_bakes(settings: Settings) -> BakeService:
+    """relume's own bake service."""
+    return BakeService(settings.data, settings.database_url, settings.scheduler)
+
+
+@asynccontextmanager
+async def open_services(
+    settings: Settings, metrics: Metrics, open_library: OpenLibrary, bakes: OpenBakes
+) -> AsyncIterator[Services]:
+    """Open everything; close it in the reverse order."""
+    settings.data.mkdir(parents=True, exist_ok=True)
+    library = open_library(settings.cache_bytes)
+    metrics.watch_cache(library.cache_used_bytes)
+    threads = Threads()
+    service = await asyncio.to_thread(bakes, settings)
+    renders = RenderQueue(service.ledger.sessions, settings.data, library)
+    house = House(
+        library=library,
+        threads=threads,
+        metrics=metrics,
+        resumes=ResumeStore(settings.resume_seconds),
+        bake_news=BakeNews(service.bakes),
+        ack_seconds=settings.ack_seconds,
+    )
+    transfers = TransferPool(library.open_transfer, threads.long)
+    looks = LookShelf(service.ledger.sessions)
+    await asyncio.to_thread(service.start)
+    renders.start()
+    try:
+        slots = threading.BoundedSemaphore(settings.max_sessions)
+        yield Services(settings, metrics, service, looks, renders, threads, transfers, house, slots)
+    finally:
+        await asyncio.to_thread(renders.close)
+        await asyncio.to_thread(service.close)
+        await asyncio.to_thread(threads.close)
+
+
+def services(connection: HTTPConnection) -> Services:
+    """The app's services, for routes."""
+    found: Services = connection.app.state.services
+    return found
+
+
+Shared = Annotated[Services, Depends(services)]

@@ -1,0 +1,32 @@
+"""Tables that belong to the server, in the same database as the ledger's."""
+
+from __future__ import annotations
+
+from sqlalchemy import Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from worker.models import Base
+
+
+class LookRow(Base):
+    """A saved look. `modified` in seconds since 1970."""
+
+    __tablename__ = "looks"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    etag: Mapped[str]
+    modified: Mapped[float]
+
+
+class RenderRow(Base):
+    """A batch of renders; its pictures lie in renders/<id>/. `request` is the body as JSON."""
+
+    __tablename__ = "renders"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    request: Mapped[str] = mapped_column(Text)
+    state: Mapped[str] = mapped_column(index=True)
+    done: Mapped[int]
+    problem: Mapped[str | None] = mapped_column(Text)
+    created: Mapped[float]

@@ -1,0 +1,197 @@
+"""Stand-ins for the library: a picture whose every pixel is known, a bake method that computes nothing."""
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from relume.errors import CancelledError, EditNotSupportedError
+from relume.look import default_look
+from relume.scene.archive import make_scene
+from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.store import open_store
+from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from server.live.ports import Library
+
+TILE = 64
+SIZE = (160, 96)
+NUM_COEFFICIENTS = 16
+
+
+def tiny_scene(name: str = "triangle") -> Scene:
+    """One triangle of one material with a diffuse and a glossy term, seen from two views."""
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    normals = np.tile(np.array([[0, 0, 1]], np.float32), (3, 1))
+    zeros = np.zeros((3, 4), np.float32)
+    mesh = Mesh("m", positions, normals, zeros, zeros[:, :2].copy(), np.array([[0, 1, 2]], np.uint32), 0)
+    terms = (
+        {"model": "lambert", "color": [0.5, 0.5, 0.5]},
+        {"model": "cook_torrance", "color": [1.0, 1.0, 1.0], "params": {"sigma": 0.2, "ior": 1.5, "extinction": 0.0}},
+    )
+    cameras = [Camera(view, np.eye(4), 0.8) for view in ("front", "left")]
+    return make_scene(
+        name, [mesh], [Material("Paper", terms)], cameras, Environment("gray", np.ones((4, 8, 3), np.float32))
+    )
+
+
+@dataclass(frozen=True)
+class FakeMethod:
+    """One task per bake; it waits for `gate` where there is one."""
+
+    gate: threading.Event | None = None
+    name: str = "direct"
+    stages: tuple[str, ...] = ("samples",)
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        return Plan(recipe.size[0] * recipe.size[1], recipe.num_lights * 100, 1000, 1000)
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        return {"method": self.name, "scene": scene.id, "views": list(recipe.views), "size": list(recipe.size)}
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        return [ArraySpec("values", (4,), "float32", (4,), (4,))]
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        return [Task(0, 0, "", 0, 4)]
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        if self.gate is not None:
+            self.gate.wait(30)
+        return Written({"values": np.arange(4, dtype=np.float32)}, 10, 0.0)
+
+
+@dataclass(frozen=True)
+class FakeView:
+    name: str
+    width: int
+    height: int
+
+    def material_ids(self) -> np.ndarray:
+        ids = np.zeros((self.height, self.width), np.uint16)
+        ids[0, 0] = 65535
+        return ids
+
+
+@dataclass
+class FakeTransfer:
+    """What `open_transfer` gives."""
+
+    scene_id: str
+    views: dict[str, FakeView]
+    method: str = "direct"
+    default_look: dict[str, Any] = field(default_factory=lambda: default_look(tiny_scene().materials))
+    material_names: list[str] = field(default_factory=lambda: ["Paper"])
+
+
+@dataclass
+class FakePicture:
+    """Radiance = lambert colour + sigma, everywhere; reached in steps of coefficients; one curve is frozen at a time."""
+
+    transfer: FakeTransfer
+    view: FakeView
+    control: "Control"
+    look: Any = None
+    spent: int = 0
+    frozen: str = "/materials/Paper/terms/1/curves/theta_h"
+    wanted: str = "/materials/Paper/terms/1/curves/theta_h"
+
+    def __post_init__(self) -> None:
+        self.pixels = np.zeros((self.view.height, self.view.width, 3), np.float32)
+
+    def set_look(self, look: Any) -> None:
+        if look.environment.rotation != 0.0:
+            raise EditNotSupportedError("direct", "the environment's rotation")
+        if look != self.look:
+            self.look, self.spent = look, 0
+        self.control.num_looks += 1
+
+    def touch(self, pointer: str) -> None:
+        self.wanted = pointer
+
+    def waiting(self) -> str | None:
+        return None if self.wanted == self.frozen else f"Paper, {self.wanted.rsplit('/', 1)[-1]}"
+
+    def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
+        wanted = self.wanted
+        self.control.freezing.set()
+        progress(0.5)
+        while not self.control.may_freeze.wait(0.01):
+            if cancelled():
+                self.control.num_cancelled += 1
+                raise CancelledError("stopped")
+        self.frozen = wanted
+
+    def advance(self, max_coefficients: int | None) -> Any:
+        if self.spent >= NUM_COEFFICIENTS:
+            return SimpleNamespace(tiles=[], exact=True, changed=False)
+        budget = NUM_COEFFICIENTS if max_coefficients is None else min(max_coefficients, self.control.max_step)
+        self.spent = min(NUM_COEFFICIENTS, self.spent + budget)
+        target = exact_pixel(self.look)
+        self.pixels += (target - self.pixels) * np.float32(self.spent / NUM_COEFFICIENTS)
+        return SimpleNamespace(tiles=self.all_tiles()[:1], exact=self.spent == NUM_COEFFICIENTS, changed=True)
+
+    def all_tiles(self) -> list[tuple[int, int, int, int]]:
+        width, height = self.view.width, self.view.height
+        return [
+            (x, y, min(TILE, width - x), min(TILE, height - y))
+            for y in range(0, height, TILE)
+            for x in range(0, width, TILE)
+        ]
+
+    def encode(self, tiles: Sequence[tuple[int, int, int, int]], form: str) -> bytes:
+        assert form == "rgb9e5"
+        return b"".join(
+            np.full((h, w), round(float(self.pixels[y, x, 0]) * 1000), "<u4").tobytes() for x, y, w, h in tiles
+        )
+
+    def image(self) -> np.ndarray:
+        return self.pixels
+
+    def probe(self, x: int, y: int) -> dict[str, Any]:
+        return {
+            "material": "Paper",
+            "radiance": [float(c) for c in self.pixels[y, x]],
+            "bands": np.ones((3, 4)),
+            "curve": self.frozen,
+        }
+
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> np.ndarray:
+        return np.full((self.view.height, self.view.width), (to_deg - from_deg) / 90.0, np.float32)
+
+
+@dataclass
+class Control:
+    """What tests set and see."""
+
+    max_step: int = NUM_COEFFICIENTS
+    num_looks: int = 0
+    num_cancelled: int = 0
+    num_opened: int = 0
+    freezing: threading.Event = field(default_factory=threading.Event)
+    may_freeze: threading.Event = field(default_factory=threading.Event)
+
+    def open_library(self, cache_bytes: int) -> Library:
+        return Library(self._open, self._picture, self._render, lambda: 123)
+
+    def _open(self, path: Path) -> FakeTransfer:
+        attributes = open_store(path).attributes
+        width, height = attributes["size"]
+        self.num_opened += 1
+        return FakeTransfer(attributes["scene"], {name: FakeView(name, width, height) for name in attributes["views"]})
+
+    def _picture(self, transfer: FakeTransfer, view: str) -> FakePicture:
+        return FakePicture(transfer, transfer.views[view], self)
+
+    def _render(self, transfer: FakeTransfer, view: str, look: Any, size: tuple[int, int] | None) -> np.ndarray:
+        width, height = size or (transfer.views[view].width, transfer.views[view].height)
+        return np.full((height, width, 3), exact_pixel(look), np.float32)
+
+
+def exact_pixel(look: Any) -> float:
+    """What `FakePicture` shows everywhere when it is exact."""
+    terms = look.materials["Paper"].terms
+    return float(terms[0]["color"][0]) + float(terms[1]["params"]["sigma"])

@@ -1,0 +1,79 @@
+"""A client of live sessions for tests."""
+
+import json
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi.testclient import TestClient
+
+SIGMA = "/materials/Paper/terms/1/params/sigma"
+THETA_H = "/materials/Paper/terms/1/curves/theta_h"
+THETA_D = "/materials/Paper/terms/1/curves/theta_d"
+
+
+@dataclass(frozen=True)
+class Baked:
+    scene: str
+    bake: str
+
+
+@dataclass(frozen=True)
+class Frame:
+    header: dict[str, Any]
+    payload: bytes
+
+
+class Session:
+    """Reads messages by kind; acknowledges frames unless told not to."""
+
+    def __init__(self, websocket: Any, acknowledges: bool) -> None:
+        self.websocket, self.acknowledges = websocket, acknowledges
+
+    def send(self, **message: Any) -> None:
+        self.websocket.send_text(json.dumps(message))
+
+    def edit(self, revision: int, path: str, value: Any, op: str = "replace") -> None:
+        self.send(type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}])
+
+    def receive(self) -> dict[str, Any] | Frame:
+        message = self.websocket.receive()
+        if message["type"] == "websocket.close":
+            raise ConnectionError(message["code"], message.get("reason", ""))
+        if message.get("text") is not None:
+            return json.loads(message["text"])
+        data = message["bytes"]
+        (length,) = struct.unpack_from("<I", data)
+        frame = Frame(json.loads(data[4 : 4 + length]), data[4 + length :])
+        if self.acknowledges:
+            self.send(type="ack", frame=frame.header["frame"])
+        return frame
+
+    def text(self, kind: str) -> dict[str, Any]:
+        while True:
+            message = self.receive()
+            if isinstance(message, dict) and message["type"] == kind:
+                return message
+
+    def frame(self) -> Frame:
+        while True:
+            message = self.receive()
+            if isinstance(message, Frame):
+                return message
+
+    def exact(self, revision: int) -> Frame:
+        while True:
+            frame = self.frame()
+            if frame.header["exact"] and frame.header["revision"] == revision and frame.header["kind"] == "picture":
+                return frame
+
+
+@contextmanager
+def open_session(
+    client: TestClient, bake: str, *, acknowledges: bool = True, query: str = "", **options: Any
+) -> Iterator[Session]:
+    options = {"subprotocols": ["relume.v1"], **options}
+    with client.websocket_connect(f"/api/bakes/{bake}/session{query}", **options) as websocket:
+        yield Session(websocket, acknowledges)

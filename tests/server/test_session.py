@@ -1,0 +1,233 @@
+"""Live sessions over a picture whose pixels are known."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import SIZE, Control
+from session_client import SIGMA, THETA_D, THETA_H, Baked, open_session
+
+from server.protocol import FrameHeader
+
+WIDTH, HEIGHT = SIZE
+
+
+def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        hello = session.receive()
+        assert isinstance(hello, dict)
+        assert hello["type"] == "hello"
+        assert hello["scene"] == baked.scene
+        assert hello["views"] == [{"name": n, "width": WIDTH, "height": HEIGHT} for n in ("front", "left")]
+        assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
+        assert not hello["resumed"]
+        frame = session.frame()
+        FrameHeader.model_validate(frame.header)
+        assert frame.header["revision"] == 0
+        assert frame.header["format"] == "rgb9e5"
+        assert sum(w * h for _, _, w, h in frame.header["tiles"]) == WIDTH * HEIGHT
+        assert len(frame.payload) == 4 * WIDTH * HEIGHT
+        assert frame.header["exact"]
+
+
+def test_an_edit_is_answered_by_a_frame_of_its_revision_with_the_changed_tiles(
+    client: TestClient, baked: Baked
+) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.edit(1, SIGMA, 0.31)
+        frame = session.exact(1)
+        assert frame.header["tiles"] == [[0, 0, 64, 64]]
+        assert np.frombuffer(frame.payload, "<u4").tolist() == [810] * (64 * 64)
+        assert frame.header["ms"]["wait"] >= 0
+
+
+def test_refinement_ends_in_an_exact_frame(client: TestClient, baked: Baked, control: Control) -> None:
+    control.max_step = 3
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.edit(1, SIGMA, 0.5)
+        first = session.frame()
+        assert first.header["revision"] == 1
+        assert not first.header["exact"]
+        last = session.exact(1)
+        assert np.frombuffer(last.payload, "<u4")[0] == 1000
+
+
+def test_edits_without_acknowledgement_are_merged_into_the_newest(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        first = session.frame()
+        session.edit(1, SIGMA, 0.3)
+        second = session.frame()
+        for revision in range(2, 60):
+            session.edit(revision, SIGMA, 0.3 + revision / 1000)
+        session.edit(60, SIGMA, 5.0)  # refused: its answer says that all before it were received
+        assert session.text("problem")["revision"] == 60
+        num_looks = control.num_looks
+        session.send(type="ack", frame=second.header["frame"])
+        third = session.frame()
+        assert [f.header["frame"] for f in (first, second, third)] == [1, 2, 3]
+        assert third.header["revision"] == 59
+        assert control.num_looks == num_looks + 1
+
+
+def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        session.text("hello")
+        session.frame()
+        session.edit(1, SIGMA, 0.3)
+        session.frame()
+        session.edit(2, SIGMA, 0.4)
+        with pytest.raises(ConnectionError) as closed:
+            session.receive()
+        assert closed.value.args[0] == 4408
+        assert "acknowledged" in closed.value.args[1]
+
+
+def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_D)
+        curve = session.text("curve")
+        assert curve["curve"] == THETA_D
+        assert len(curve["bands"]) == 3
+        assert curve["bands"] == curve["generated"]
+        status = session.text("status")
+        assert status["state"] == "freezing"
+        assert status["what"] == "Paper, theta_d"
+        control.may_freeze.set()
+        while session.text("status")["state"] != "ready":
+            pass
+        session.exact(0)
+        session.edit(1, "/materials/Paper/terms/1/params/ior", 2.0)
+        assert session.text("curve")["revision"] == 1
+
+
+def test_moving_on_to_another_curve_cancels_the_freeze(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_D)
+        assert control.freezing.wait(10)
+        session.send(type="touch", curve=THETA_H)
+        session.exact(0)
+        assert control.num_cancelled == 1
+
+
+def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_D)
+        assert control.freezing.wait(10)
+        session.edit(1, "/materials/Paper/terms/1/params/ior", 2.0)
+        session.edit(2, "/materials/Paper/terms/1/params/ior", 2.1)
+        control.may_freeze.set()
+        session.exact(2)
+        assert control.num_cancelled == 0
+
+
+def test_a_look_that_the_bake_cannot_follow_is_taken_back(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.edit(1, "/environment/rotation", 30.0)
+        problem = session.text("problem")
+        assert problem["revision"] == 1
+        assert problem["problem"]["type"] == "urn:relume:problem:edit-not-supported"
+        session.edit(2, SIGMA, 0.4)
+        session.exact(2)
+
+
+def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="probe", view="front", x=3, y=4)
+        probe = session.text("probe")
+        assert (probe["x"], probe["y"], probe["material"]) == (3, 4, "Paper")
+        assert probe["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
+        assert np.shape(probe["bands"]) == (3, 4)
+        session.send(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        frame = session.frame()
+        assert frame.header["kind"] == "brush"
+        assert frame.header["format"] == "r8"
+        assert frame.payload == bytes([128]) * (WIDTH * HEIGHT)
+
+
+def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.edit(1, SIGMA, 0.4)
+        session.exact(1)
+        session.send(type="view", name="left", size=[512, 512])
+        frame = session.exact(1)
+        assert frame.header["view"] == "left"
+        assert len(frame.payload) == 4 * WIDTH * HEIGHT
+
+
+def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="stream", format="jpeg", quality=70)
+        session.edit(1, SIGMA, 0.4)
+        frame = session.exact(1)
+        assert frame.header["format"] == "jpeg"
+        assert frame.header["tiles"] == [[0, 0, WIDTH, HEIGHT]]
+        assert frame.payload[:2] == b"\xff\xd8"
+
+
+def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        token = session.text("hello")["resume"]
+        session.edit(7, SIGMA, 0.4)
+        session.exact(7)
+    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+        hello = session.text("hello")
+        assert hello["resumed"]
+        assert hello["revision"] == 7
+        assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.4
+        session.exact(7)
+        session.edit(8, SIGMA, 0.3)
+        session.exact(8)
+    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+        assert not session.text("hello")["resumed"]
+
+
+def test_whole_look_can_be_replaced(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        look = session.text("hello")["look"]
+        look["materials"]["Paper"]["terms"][1]["params"]["sigma"] = 0.35
+        session.edit(1, "", look)
+        session.exact(1)
+
+
+def test_sessions_share_one_opened_store(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as one, open_session(client, baked.bake) as other:
+        one.exact(0)
+        other.exact(0)
+    assert control.num_opened == 1
+
+
+def test_more_sessions_than_allowed_are_told_so(client: TestClient, baked: Baked) -> None:
+    with (
+        open_session(client, baked.bake),
+        open_session(client, baked.bake),
+        open_session(client, baked.bake),
+        open_session(client, baked.bake) as fourth,
+        pytest.raises(ConnectionError) as closed,
+    ):
+        fourth.receive()
+    assert closed.value.args[0] == 1013
+
+
+def test_frame_message_is_length_header_payload(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        while (message := session.websocket.receive()).get("bytes") is None:
+            pass
+        data = message["bytes"]
+        (length,) = struct.unpack("<I", data[:4])
+        header = json.loads(data[4 : 4 + length])
+        assert len(data) == 4 + length + 4 * sum(w * h for _, _, w, h in header["tiles"])
