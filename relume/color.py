@@ -39,10 +39,11 @@ def rgb9e5_pack(rgb: F32) -> U32:
         Red in the lowest bits, the exponent in the highest. (...) uint32
     """
     clamped = np.fmin(np.fmax(np.asarray(rgb, np.float64), 0.0), RGB9E5_LARGEST)  # fmax takes the number, not the NaN
-    _, exponent = np.frexp(clamped.max(axis=-1))
-    shared = np.maximum(exponent + _BIAS, 0)
-    largest = np.floor(np.ldexp(clamped.max(axis=-1), _BIAS + _MANTISSA_BITS - shared) + 0.5)
-    shared += largest == 2**_MANTISSA_BITS  # rounding up may need one more bit than the mantissa has
+    largest = clamped.max(axis=-1)
+    _, exponent = np.frexp(largest)
+    shared = np.where(largest > 0, np.maximum(exponent + _BIAS, 0), 0)
+    # rounding up may need one more bit than the mantissa has
+    shared += np.floor(np.ldexp(largest, _BIAS + _MANTISSA_BITS - shared) + 0.5) == 2**_MANTISSA_BITS
     mantissas = np.floor(np.ldexp(clamped, (_BIAS + _MANTISSA_BITS - shared)[..., None]) + 0.5).astype(np.uint32)
     packed = mantissas[..., 0] | mantissas[..., 1] << 9 | mantissas[..., 2] << 18
     return np.asarray(packed | shared.astype(np.uint32) << 27, np.uint32)

@@ -1,0 +1,359 @@
+"""Completing and checking looks, and patching them; inputs as they come from anybody."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+
+import jsonpatch
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from relume.errors import EditError, ParameterError
+from relume.look import Look, apply_patch, complete, default_look, validate
+from relume.scene.model import Material
+
+MATERIALS = [
+    Material("Teapot", ({"model": "lambert", "color": [0.1, 0.02, 0.02]}, {"model": "cook_torrance"})),
+    Material("a/b~c", ({"model": "ggx", "color": [1, 1, 1], "texture": None, "params": {"f0": [1, 0.8, 0.3]}},)),
+]
+NAN, INF = math.nan, math.inf
+SIGMA = "/materials/Teapot/terms/1/params/sigma"
+CURVES = "/materials/Teapot/terms/1/curves"
+
+
+@pytest.fixture
+def default():
+    return default_look(MATERIALS, ["Key"])
+
+
+def replace(path, value):
+    return [{"op": "replace", "path": path, "value": value}]
+
+
+def test_default_look_has_every_field(default):
+    assert default["materials"]["Teapot"]["terms"][1] == {
+        "model": "cook_torrance",
+        "color": [1.0, 1.0, 1.0],
+        "texture": "specular",
+        "params": {"sigma": 0.2, "ior": 1.5, "extinction": 0.0},
+        "curves": {},
+    }
+    assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
+    assert default["environment"] == {"scale": 1.0, "rotation": 0.0}
+    assert default["lights"] == {"Key": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}}
+    assert default["display"] == {"exposure": 0.0, "tone_map": "agx"}
+    assert json.loads(json.dumps(default)) == default
+    assert complete(default, default) == default
+
+
+def test_partial_look_keeps_what_it_does_not_name(default):
+    partial = {
+        "materials": {"Teapot": {"terms": [{"model": "lambert", "color": [0, 1, 0]}]}},
+        "lights": {"Key": {"on": False}},
+        "display": {"exposure": 2},
+    }
+    full = complete(partial, default)
+    assert [t["model"] for t in full["materials"]["Teapot"]["terms"]] == ["lambert"]
+    assert full["materials"]["a/b~c"] == default["materials"]["a/b~c"]
+    assert full["lights"]["Key"] == {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": False}
+    assert full["display"] == {"exposure": 2, "tone_map": "agx"}
+    assert complete({}, default) == default
+
+
+def test_the_contract_s_example_is_valid(default):
+    example = {
+        "materials": {
+            "Teapot": {
+                "terms": [
+                    {"model": "lambert", "color": [0.1, 0.02, 0.02]},
+                    {
+                        "model": "cook_torrance",
+                        "color": [1, 1, 1],
+                        "params": {"sigma": 0.2, "ior": 1.5, "extinction": 0.0},
+                        "curves": {"theta_h": {"points": [[0, 4.0], [12, 1.5], [90, 0]], "channels": "rgb"}},
+                    },
+                ]
+            }
+        },
+        "environment": {"scale": 1.0, "rotation": 0.0},
+        "lights": {"Key": {"scale": 1.0, "color": [1, 1, 1], "on": True}},
+        "display": {"exposure": 0.0, "tone_map": "agx"},
+    }
+    look = validate(example, default)
+    assert isinstance(look, Look)
+    assert look.materials["Teapot"].terms[1]["params"]["sigma"] == 0.2
+    assert look.display.tone_map == "agx"
+    assert look.lights["Key"].on is True
+    with pytest.raises(ValidationError):
+        look.display.exposure = 3.0
+
+
+def test_look_does_not_follow_later_changes_of_its_document(default):
+    document = copy.deepcopy(default)
+    look = validate(document, default)
+    document["materials"]["Teapot"]["terms"][1]["params"]["sigma"] = 0.9
+    document["materials"]["Teapot"]["terms"].clear()
+    assert look.materials["Teapot"].terms[1]["params"]["sigma"] == 0.2
+
+
+def points(count):
+    return [[90 * k / (count - 1), 1.0] for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "pointer", "allowed"),
+    [
+        ("", [], "the look", "an object"),
+        ("", {"material": {}}, "/material", "'materials'"),
+        ("/materials", 3, "/materials", "material"),
+        ("/materials", {"Cup": {}}, "/materials", "'Teapot'"),
+        ("/materials/Teapot", None, "/materials/Teapot", "an object"),
+        ("/materials/Teapot/terms", {}, "/materials/Teapot/terms", "at most 16"),
+        ("/materials/Teapot/terms", [{"model": "lambert"}] * 17, "/materials/Teapot/terms", "at most 16"),
+        ("/materials/Teapot/terms/1", {}, "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/model", "velvet", "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/model", ["ggx"], "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/texture", "bump", "/materials/Teapot/terms/1/texture", "'specular'"),
+        ("/materials/Teapot/terms/1/color", [1, 1], "/materials/Teapot/terms/1/color", "three numbers"),
+        ("/materials/Teapot/terms/1/color", [1, 1, -0.1], "/materials/Teapot/terms/1/color/2", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/color", [1, NAN, 1], "/materials/Teapot/terms/1/color/1", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/color", [True, 1, 1], "/materials/Teapot/terms/1/color/0", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/params", {"roughness": 1}, "/materials/Teapot/terms/1/params/roughness", "'sigma'"),
+        ("/materials/a~1b~0c/terms/0/params/f0", [1, 2, 0], "/materials/a~1b~0c/terms/0/params/f0/1", "[0, 1]"),
+        *((SIGMA, bad, SIGMA, "[0.01, 1]") for bad in (0, 1.5, NAN, INF, -INF, True, None, "0.2", 10**400, [], {})),
+        (CURVES, {"theta_i": {"points": points(3)}}, f"{CURVES}/theta_i", "'theta_h'"),
+        (f"{CURVES}/theta_h", 7, f"{CURVES}/theta_h", "an object"),
+        (f"{CURVES}/theta_h", {}, f"{CURVES}/theta_h", "points or bands"),
+        (f"{CURVES}/theta_h", {"points": points(3), "bands": []}, f"{CURVES}/theta_h", "points or bands"),
+        (f"{CURVES}/theta_h", {"points": points(3), "x": 1}, f"{CURVES}/theta_h/x", "leave it out"),
+        (f"{CURVES}/theta_h", {"points": points(4097)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": points(1_000_000)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1]]}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [0, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
+        (f"{CURVES}/theta_h", {"points": [[3, 1], [2, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [91, 2]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [NAN, 2], [80, 1]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1.0], [5, NAN]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1.0], [5, INF]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, False], [5, 1]]}, f"{CURVES}/theta_h/points/0/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [5, 10**400]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [5]]}, f"{CURVES}/theta_h/points/1", "a point"),
+        (f"{CURVES}/theta_h", {"points": ["ab", "cd"]}, f"{CURVES}/theta_h/points/0", "a point"),
+        (f"{CURVES}/theta_h", {"points": "0123"}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"bands": [1.0] * 255}, f"{CURVES}/theta_h/bands", "256 values"),
+        (f"{CURVES}/theta_h", {"bands": [[1.0] * 256] * 2}, f"{CURVES}/theta_h/bands", "256 values"),
+        (f"{CURVES}/theta_h", {"bands": [1.0] * 255 + [NAN]}, f"{CURVES}/theta_h/bands/255", "[0, 1e+06]"),
+        (
+            f"{CURVES}/theta_h",
+            {"bands": [[1.0] * 256, [1.0] * 256, [1.0] * 9 + [-1.0] * 247]},
+            f"{CURVES}/theta_h/bands/2/9",
+            "[0, 1e+06]",
+        ),
+        *(
+            (f"{CURVES}/theta_h", {"points": points(3), "channels": bad}, f"{CURVES}/theta_h/channels", "letters")
+            for bad in ("", "rgba", "rr", 1, ["r"])
+        ),
+        (f"{CURVES}/theta_h", [], f"{CURVES}/theta_h", "one to three"),
+        (f"{CURVES}/theta_h", [{"points": points(3), "channels": "r"}] * 4, f"{CURVES}/theta_h", "one to three"),
+        (
+            f"{CURVES}/theta_h",
+            [{"points": points(3), "channels": "rg"}, {"points": points(3), "channels": "gb"}],
+            f"{CURVES}/theta_h/1/channels",
+            "no other object",
+        ),
+        ("/environment/scale", -1, "/environment/scale", "[0, 10000]"),
+        ("/environment/rotation", 1e9, "/environment/rotation", "[-360, 360]"),
+        ("/environment/tilt", 1, "/environment/tilt", "'rotation'"),
+        ("/lights/Moon", {}, "/lights", "'Key'"),
+        ("/lights/Key/on", 1, "/lights/Key/on", "true or false"),
+        ("/display/exposure", 21, "/display/exposure", "[-20, 20]"),
+        ("/display/tone_map", "reinhard", "/display/tone_map", "'agx'"),
+        ("/display/tone_map", {"a": 1}, "/display/tone_map", "'agx'"),
+    ],
+)
+def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path, value, pointer, allowed):
+    before = copy.deepcopy(default)
+    with pytest.raises(ParameterError) as caught:
+        apply_patch(default, [{"op": "add", "path": path, "value": value}], default)
+    assert caught.value.name == pointer
+    assert allowed in caught.value.allowed
+    assert len(str(caught.value)) < 600
+    assert "\n" not in str(caught.value)
+    assert default == before
+    # the same document whole, as a file or a PUT would bring it, is refused likewise
+    document = jsonpatch.apply_patch(default, [{"op": "add", "path": path, "value": value}])
+    with pytest.raises(ParameterError) as caught:
+        validate(document, default)
+    assert caught.value.name == pointer
+
+
+def nested(depth):
+    value = 1
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        None,
+        {"op": "replace"},
+        "replace",
+        [None],
+        ["replace"],
+        [{}],
+        [{"op": "move", "from": "/display", "path": "/x"}],
+        [{"op": "copy", "from": "/display", "path": "/x"}],
+        [{"op": "replace", "value": 1}],
+        [{"op": "replace", "path": SIGMA}],
+        [{"op": "replace", "path": 3, "value": 1}],
+        [{"op": "replace", "path": "materials", "value": 1}],
+        [{"op": "replace", "path": "/x" * 600, "value": 1}],
+        [{"op": "replace", "path": "/a~2", "value": 1}],
+        [{"op": ["replace"], "path": SIGMA, "value": 1}],
+        replace("/materials/Cup/terms/0", {}),
+        replace("/materials/Teapot/terms/7", {"model": "lambert"}),
+        replace("/materials/Teapot/terms/x", {"model": "lambert"}),
+        replace("/materials/Teapot/terms/-1/color", [1, 1, 1]),
+        replace("/materials/Teapot/terms/٣/color", [1, 1, 1]),
+        replace(SIGMA + "/0", 1),
+        replace("/materials/Teapot/terms/0/model/0", "x"),
+        replace(SIGMA, nested(20_000)),
+        [{"op": "add", "path": "/materials/Teapot/terms/9", "value": {"model": "lambert"}}],
+        [{"op": "remove", "path": "/lights/Moon"}],
+        [{"op": "remove", "path": ""}],
+        [{"op": "test", "path": SIGMA, "value": 0.7}],
+        [{"op": "test", "path": "/nowhere", "value": 0.7}],
+        replace(SIGMA, 0.3) * 257,
+    ],
+)
+def test_patch_that_does_not_fit_is_refused_and_nothing_changes(default, patch):
+    before = copy.deepcopy(default)
+    with pytest.raises(EditError) as caught:
+        apply_patch(default, patch, default)
+    assert len(str(caught.value)) < 600
+    assert default == before
+
+
+def test_patch_with_one_bad_operation_changes_nothing(default):
+    before = copy.deepcopy(default)
+    with pytest.raises(EditError):
+        apply_patch(default, [*replace(SIGMA, 0.3), {"op": "remove", "path": "/nothing"}], default)
+    assert default == before
+
+
+def test_patch_shares_what_it_does_not_touch(default):
+    edited = apply_patch(default, replace(SIGMA, 0.31), default)
+    assert edited["materials"]["Teapot"]["terms"][1]["params"]["sigma"] == 0.31
+    assert default["materials"]["Teapot"]["terms"][1]["params"]["sigma"] == 0.2
+    assert edited["materials"]["a/b~c"] is default["materials"]["a/b~c"]
+    assert edited["materials"]["Teapot"]["terms"][0] is default["materials"]["Teapot"]["terms"][0]
+
+
+def test_patch_may_build_on_its_own_operations_without_touching_its_values(default):
+    curve = {"points": [[0, 1], [90, 0]]}
+    patch = [
+        {"op": "add", "path": f"{CURVES}/theta_h", "value": curve},
+        {"op": "add", "path": f"{CURVES}/theta_h/points/1", "value": [45, 0.5]},
+        {"op": "test", "path": f"{CURVES}/theta_h/points/1/0", "value": 45},
+        {"op": "replace", "path": f"{CURVES}/theta_h/points/0/1", "value": 3},
+    ]
+    sent = copy.deepcopy(patch)
+    edited = apply_patch(default, patch, default)
+    assert edited["materials"]["Teapot"]["terms"][1]["curves"]["theta_h"]["points"] == [[0, 3], [45, 0.5], [90, 0]]
+    assert patch == sent
+
+
+def test_what_a_patch_removes_is_the_default_again(default):
+    edited = apply_patch(default, [*replace(SIGMA, 0.7), *replace("/display/exposure", 3)], default)
+    assert edited != default
+    for path in (SIGMA, "/display", "/materials/Teapot"):
+        edited = apply_patch(edited, [{"op": "remove", "path": path}], default)
+    assert edited == default
+
+
+def test_empty_path_replaces_the_whole_look(default):
+    edited = apply_patch(default, replace("/display/exposure", 3), default)
+    assert apply_patch(edited, replace("", {}), default) == default
+    whole = apply_patch(default, replace("", {"environment": {"scale": 2}}), default)
+    assert whole["environment"] == {"scale": 2, "rotation": 0.0}
+
+
+def test_term_may_be_added_moved_down_and_changed_in_model(default):
+    ggx = {"model": "ggx", "color": [1, 0, 0]}
+    edited = apply_patch(default, [{"op": "add", "path": "/materials/Teapot/terms/0", "value": ggx}], default)
+    terms = edited["materials"]["Teapot"]["terms"]
+    assert [t["model"] for t in terms] == ["ggx", "lambert", "cook_torrance"]
+    assert terms[0]["params"] == {"roughness": 0.4, "f0": 0.04}
+    blinn = apply_patch(edited, replace("/materials/Teapot/terms/2", {"model": "blinn_phong"}), default)
+    assert blinn["materials"]["Teapot"]["terms"][2]["params"] == {"exponent": 50.0}
+
+
+def test_curves_of_one_model_are_not_taken_on_trust_for_another(default):
+    bands = replace("/materials/a~1b~0c/terms/0/curves", {"theta_i": {"bands": [1.0] * 64}})
+    edited = apply_patch(default, bands, default)
+    with pytest.raises(ParameterError, match="theta_i"):
+        apply_patch(
+            edited,
+            [
+                *replace("/materials/a~1b~0c/terms/0/model", "blinn_phong"),
+                {"op": "remove", "path": "/materials/a~1b~0c/terms/0/params"},
+            ],
+            default,
+        )
+
+
+NUMBERS = st.one_of(st.floats(0.02, 0.9), st.integers(0, 2), st.just(NAN), st.booleans(), st.none())
+OPERATIONS = st.builds(
+    lambda op, path, value: {"op": op, "path": path, "value": value},
+    st.sampled_from(["add", "replace", "remove", "test"]),
+    st.sampled_from(
+        [
+            SIGMA,
+            CURVES,
+            "/materials/Teapot/terms/0",
+            "/materials/Teapot/terms/-",
+            "/materials/Teapot/terms/1/color",
+            "/display/exposure",
+            "/environment",
+            "/lights/Key/on",
+            f"{CURVES}/theta_d",
+            "",
+        ]
+    ),
+    st.one_of(
+        NUMBERS,
+        st.lists(NUMBERS, min_size=3, max_size=3),
+        st.just({}),
+        st.just({"model": "ggx"}),
+        st.builds(lambda a, b: {"points": [[0, a], [b, 1.0]]}, NUMBERS, st.floats(0, 100)),
+    ),
+)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.lists(st.lists(OPERATIONS, max_size=4), max_size=5))
+def test_patches_in_a_row_equal_plain_json_patch_and_whole_checking(patches):
+    default = default_look(MATERIALS, ["Key"])
+    before = copy.deepcopy(default)
+    document = default
+    for patch in patches:
+        try:
+            edited = apply_patch(document, patch, default)
+        except (EditError, ParameterError):
+            continue
+        assert edited == complete(jsonpatch.apply_patch(document, patch), default)
+        assert edited == complete(json.loads(json.dumps(edited)), default)
+        document = edited
+    assert default == before
+
+
+def test_scene_with_a_bad_term_is_refused_with_its_pointer():
+    with pytest.raises(ParameterError) as caught:
+        default_look([Material("Cup", ({"model": "ggx", "params": {"roughness": 0.0}},))])
+    assert caught.value.name == "/materials/Cup/terms/0/params/roughness"
