@@ -10,7 +10,7 @@ from relume.brdf.term import F64
 def fresnel(cos_theta_d: F64, ior: float, extinction: float) -> F64:
     """Mean of the reflectances parallel and perpendicular, light coming from vacuum.
 
-    Conductor equations (e.g. eqs. 8.22-8.28 of Born & Wolf's optics of metals, in the form of Lagarde 2013); they
+    The exact equations for a conductor as collected by Lagarde 2013 (Memo on Fresnel equations); they
     reduce to the dielectric's when the extinction is zero.
 
     Args:
