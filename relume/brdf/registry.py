@@ -10,7 +10,7 @@ from relume.brdf.blinn_phong import BLINN_PHONG
 from relume.brdf.cook_torrance import COOK_TORRANCE
 from relume.brdf.ggx import GGX
 from relume.brdf.lambert import LAMBERT
-from relume.brdf.term import Angle, Curve, Term
+from relume.brdf.term import Curve, Term
 
 TERMS: dict[str, Term] = {term.model: term for term in (LAMBERT, BLINN_PHONG, COOK_TORRANCE, GGX, ASHIKHMIN_SHIRLEY)}
 
@@ -22,7 +22,7 @@ def _describe_curve(curve: Curve) -> dict[str, Any]:
         "angle": curve.angle.name.lower(),
         "parameters": list(curve.parameters),
         "bands": curve.num_bands,
-        "outgoing": curve.angle is Angle.THETA_O,
+        "outgoing": curve.outgoing,
     }
 
 
