@@ -62,7 +62,7 @@ def tray() -> Surface:
     profile = rim_profile()
     ring = outline[None] + profile[:, None, :1] * outward[None]
     rim_points = np.stack([ring[..., 0], np.broadcast_to(profile[:, 1:], ring.shape[:2]), ring[..., 1]], -1)
-    rim = closed_grid_surface(rim_points[:, ::-1], _seen_from_above(rim_points[:, ::-1]))
+    rim = closed_grid_surface(rim_points, _seen_from_above(rim_points))
     top = _disc(rim_points[0, :-1], upward=True)
     bottom = _disc(rim_points[-1, :-1], upward=False)
     return merged([rim, top, bottom])

@@ -89,11 +89,12 @@ def _with_attributes(
     if primitive.targets:
         warnings.append(f"morph targets of {what} are not used; it has its basic shape")
     points = positions[used]
-    if normals is not None and (np.linalg.norm(normals, axis=1) < 1e-6).any():
-        warnings.append(f"some normals of {what} have no length; flat ones are made")
-        normals = None
     if normals is None:
         return _flat(points, uvs, faces)
+    missing = np.linalg.norm(normals, axis=1) < 1e-6
+    if missing.any():
+        warnings.append(f"{int(missing.sum()):,} normals of {what} have no length; they are made from its triangles")
+        normals = np.where(missing[:, None], _smooth_normals(points, faces), normals)
     tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
     return Geometry(points, normals, tangents, uvs, faces.astype(np.uint32))
 
@@ -131,6 +132,16 @@ def _without_degenerate(positions: F32, faces: I64, what: str, warnings: list[st
     if not solid.all():
         warnings.append(f"{int((~solid).sum()):,} triangles of {what} have no area; they are left out")
     return np.asarray(faces[solid])
+
+
+def _smooth_normals(points: F32, faces: I64) -> F32:
+    """Unit normals averaged over the triangles of each vertex, weighted by area; +Y where they cancel."""
+    corners = points[faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross /= max(float(np.abs(cross).max()), 1e-300)
+    total = np.stack([np.bincount(faces.reshape(-1), np.repeat(cross[:, k], 3), len(points)) for k in range(3)], -1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 1e-12, total / np.maximum(length, 1e-12), (0.0, 1.0, 0.0)).astype(np.float32)
 
 
 def _flat(points: F32, uvs: tuple[F32, ...], faces: I64) -> Geometry:

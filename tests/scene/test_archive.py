@@ -1,0 +1,155 @@
+"""Scenes as folders: what goes in comes out, under the same id, or is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relume.errors import SceneError
+from relume.scene.archive import load_scene, make_scene, save_scene
+from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+
+
+def small_scene(**changes: object) -> Scene:
+    rng = np.random.default_rng(5)
+    mesh = Mesh(
+        "triangle",
+        rng.random((3, 3), np.float32),
+        np.repeat(np.array([[0, 0, 1]], np.float32), 3, axis=0),
+        np.zeros((3, 4), np.float32),
+        rng.random((3, 2), np.float32),
+        np.array([[0, 1, 2]], np.uint32),
+        0,
+    )
+    texture = Texture(rng.random((2, 3, 3), np.float32), ("clamp", "mirror"))
+    normal_map = Texture(rng.random((4, 4, 3), np.float32))
+    lambert = {"model": "lambert", "color": [0.25, 0.5, 0.125], "texture": "diffuse"}
+    material = Material("Clay / grün", (lambert,), {"diffuse": texture}, normal_map, double_sided=False)
+    parts: dict[str, object] = {
+        "name": "small",
+        "meshes": [mesh],
+        "materials": [material],
+        "cameras": [Camera("front", np.eye(4), 0.5)],
+        "environment": Environment("sky", rng.random((2, 4, 3), np.float32)),
+        "warnings": ["one thing"],
+    }
+    return make_scene(**(parts | changes))  # type: ignore[arg-type]
+
+
+def test_archive_round_trip_keeps_everything(tmp_path: Path) -> None:
+    scene = small_scene()
+    save_scene(scene, tmp_path / "scene")
+    loaded = load_scene(tmp_path / "scene")
+    assert (loaded.id, loaded.name, loaded.warnings) == (scene.id, scene.name, scene.warnings)
+    for field in ("positions", "normals", "tangents", "uvs", "faces"):
+        before, after = getattr(scene.meshes[0], field), getattr(loaded.meshes[0], field)
+        assert before.dtype == after.dtype
+        np.testing.assert_array_equal(before, after)
+    before, after = scene.materials[0], loaded.materials[0]
+    assert (after.name, after.terms, after.double_sided) == (before.name, before.terms, before.double_sided)
+    assert after.textures["diffuse"].wrap == ("clamp", "mirror")
+    np.testing.assert_array_equal(after.textures["diffuse"].pixels, before.textures["diffuse"].pixels)
+    assert after.normal_map is not None
+    assert before.normal_map is not None
+    np.testing.assert_array_equal(after.normal_map.pixels, before.normal_map.pixels)
+    np.testing.assert_array_equal(loaded.cameras[0].to_world, scene.cameras[0].to_world)
+    np.testing.assert_array_equal(loaded.environment.radiance, scene.environment.radiance)
+
+
+def test_id_is_hexadecimal_and_repeatable() -> None:
+    identity = small_scene().id
+    assert len(identity) == 16
+    assert int(identity, 16) >= 0
+    assert small_scene().id == identity
+
+
+def test_id_changes_with_content_but_not_with_warnings() -> None:
+    scene = small_scene()
+    brighter = Environment("sky", scene.environment.radiance * np.float32(1.5))
+    moved = dataclasses.replace(scene.meshes[0], positions=scene.meshes[0].positions + np.float32(1e-6))
+    matte = dataclasses.replace(scene.materials[0], terms=({"model": "lambert", "color": [0.25, 0.5, 0.126]},))
+    wider = Camera("front", np.eye(4), 0.6)
+    others = [
+        small_scene(name="other"),
+        small_scene(environment=brighter),
+        small_scene(meshes=[moved]),
+        small_scene(materials=[matte]),
+        small_scene(cameras=[wider]),
+    ]
+    assert len({scene.id, *(other.id for other in others)}) == 6
+    assert small_scene(warnings=[]).id == scene.id
+
+
+def test_saving_again_replaces_the_files_and_leaves_nothing_else(tmp_path: Path) -> None:
+    save_scene(small_scene(), tmp_path)
+    save_scene(small_scene(name="other"), tmp_path)
+    assert load_scene(tmp_path).name == "other"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arrays.npz", "scene.json"]
+
+
+def test_load_refuses_a_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="no scene"):
+        load_scene(tmp_path / "none")
+
+
+@pytest.mark.parametrize("name", ["scene.json", "arrays.npz"])
+@pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
+def test_load_refuses_truncated_files(tmp_path: Path, name: str, keep: float) -> None:
+    save_scene(small_scene(), tmp_path)
+    data = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(data[: int(keep * len(data))])
+    with pytest.raises(SceneError, match="import the scene again"):
+        load_scene(tmp_path)
+
+
+def test_load_refuses_changed_content(tmp_path: Path) -> None:
+    save_scene(small_scene(), tmp_path)
+    document = json.loads((tmp_path / "scene.json").read_text())
+    document["cameras"][0]["yfov"] = 0.7
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    with pytest.raises(SceneError, match="not the one that was saved"):
+        load_scene(tmp_path)
+
+
+def test_load_refuses_pickles_and_compressed_members(tmp_path: Path) -> None:
+    save_scene(small_scene(), tmp_path)
+    np.savez(tmp_path / "arrays.npz", environment=np.array([{"a": 1}], object))
+    with pytest.raises(SceneError):
+        load_scene(tmp_path)
+    with zipfile.ZipFile(tmp_path / "arrays.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("environment.npy", b"\0" * 10_000_000)
+    with pytest.raises(SceneError, match="not written by relume"):
+        load_scene(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "document", [b"[]", b"{}", b'{"format": 2}', b'{"format": 1, "meshes": 3}', b"\xff", b"[" * 100_000]
+)
+def test_load_refuses_documents_of_another_kind(tmp_path: Path, document: bytes) -> None:
+    save_scene(small_scene(), tmp_path)
+    (tmp_path / "scene.json").write_bytes(document)
+    with pytest.raises(SceneError, match="import the scene again"):
+        load_scene(tmp_path)
+
+
+def test_make_scene_refuses_parts_that_do_not_fit() -> None:
+    mesh = small_scene().meshes[0]
+    broken_meshes = [
+        dataclasses.replace(mesh, faces=np.array([[0, 1, 3]], np.uint32)),
+        dataclasses.replace(mesh, faces=np.zeros((0, 3), np.uint32)),
+        dataclasses.replace(mesh, positions=np.full((3, 3), np.nan, np.float32)),
+        dataclasses.replace(mesh, normals=np.zeros((2, 3), np.float32)),
+        dataclasses.replace(mesh, material=1),
+    ]
+    changes: list[dict[str, object]] = [{"meshes": [broken]} for broken in broken_meshes]
+    changes += [{"meshes": []}, {"cameras": []}, {"cameras": [Camera("front", np.eye(4) * 2, 0.5)]}]
+    changes += [{"cameras": [Camera("front", np.eye(4), 0.5)] * 2}, {"cameras": [Camera("front", np.eye(4), 4.0)]}]
+    changes += [{"environment": Environment("sky", np.full((2, 4, 3), value, np.float32))} for value in (-1.0, np.inf)]
+    for change in changes:
+        with pytest.raises(SceneError):
+            small_scene(**change)

@@ -1,0 +1,154 @@
+"""The built-in still life: sound geometry, nothing in the air, nothing inside anything else, the same every time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import cKDTree
+
+from relume.brdf.registry import TERMS
+from relume.light.environment import texel_directions, texel_solid_angles
+from relume.scene.archive import make_scene
+from relume.scene.demo import demo_scene, still_life
+from relume.scene.demo.materials import materials
+from relume.scene.demo.studio import studio
+from relume.scene.demo.teapot import patches, teapot, tessellate
+from relume.scene.model import Mesh
+
+SCENE = demo_scene()
+MESHES = {mesh.name: mesh for mesh in SCENE.meshes}
+
+
+def test_the_scene_is_the_same_every_time() -> None:
+    again = make_scene(SCENE.name, still_life.meshes(), materials(), still_life.cameras(), studio())
+    assert again.id == SCENE.id
+
+
+def test_the_scene_is_small_enough_for_a_quick_bake() -> None:
+    assert 30_000 < sum(len(mesh.faces) for mesh in SCENE.meshes) < 100_000
+
+
+def test_frames_are_orthonormal() -> None:
+    for mesh in SCENE.meshes:
+        tangents = mesh.tangents[:, :3]
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1, atol=1e-5)
+        np.testing.assert_allclose((mesh.normals * tangents).sum(1), 0, atol=1e-5)
+        assert set(np.unique(mesh.tangents[:, 3])) == {1.0}
+
+
+def test_faces_look_where_their_normals_do() -> None:
+    for mesh in SCENE.meshes:
+        corners = mesh.positions[mesh.faces].astype(np.float64)
+        faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        faces /= np.linalg.norm(faces, axis=1, keepdims=True)
+        assert (faces * mesh.normals[mesh.faces].mean(1)).sum(1).min() > 0.3, mesh.name
+
+
+def test_spheres_and_shells_are_closed_and_turned_outwards() -> None:
+    for name in ("Tray", "Bowl", "Pearls"):
+        mesh = MESHES[name]
+        welded = trimesh.Trimesh(np.round(mesh.positions.astype(np.float64), 7), mesh.faces)
+        welded.merge_vertices(merge_norm=True, merge_tex=True)
+        assert welded.is_watertight, name
+        assert welded.is_winding_consistent, name
+        assert welded.volume > 0, name
+
+
+def test_the_teapot_has_thirty_two_patches_of_newells_size() -> None:
+    control = [points for _, points in patches()]
+    assert len(control) == 32
+    box = np.concatenate([tessellate(points, 24).positions for points in control])
+    np.testing.assert_allclose(box.min(0), [-3, -2, 0], atol=2e-3)
+    np.testing.assert_allclose(box.max(0), [3.434, 2, 3.15], atol=2e-3)
+
+
+def test_the_teapots_patches_meet() -> None:
+    edges = [tessellate(points, 8).positions.reshape(9, 9, 3) for _, points in patches()]
+    borders = [np.concatenate([e[0], e[-1], e[:, 0], e[:, -1]]) for e in edges]
+    distance, _ = cKDTree(np.concatenate(borders)).query(np.concatenate(borders[4:12]), k=2)
+    assert distance[:, 1].max() < 1e-12  # every border point of the body's patches has a twin
+
+
+def test_the_teapot_is_newells(shared_data: Path) -> None:
+    lines = (shared_data / "scenes" / "meshes" / "teapot_alec.obj").read_text().splitlines()
+    reference = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
+    ours = np.concatenate([tessellate(points, 60).positions for _, points in patches()])
+    distance, _ = cKDTree(ours * (1, -1, 1)).query(reference[:, [0, 2, 1]])
+    assert distance.max() < 1e-5
+
+
+def test_things_stand_on_what_is_under_them() -> None:
+    pot = teapot(14, still_life.TEAPOT_HEIGHT)
+    assert pot.positions[:, 1].min() == pytest.approx(0, abs=1e-12)
+    floor = MESHES["Tray"].positions
+    inside = np.abs(floor[:, [0, 2]]).max(1) < 0.05
+    tray_floor = floor[inside & (floor[:, 1] > 0.005)][:, 1].max()
+    for name in ("Teapot", "Bowl"):
+        assert 0 < MESHES[name].positions[:, 1].min() - tray_floor < 1e-4, name
+    assert MESHES["Table"].positions[:, 1].min() >= 0
+    assert 0 < MESHES["Cloth"].positions[:, 1].min() < 2e-3
+
+
+def test_pearls_touch_the_ground_but_not_each_other() -> None:
+    balls = _balls(MESHES["Pearls"])
+    assert len(balls) > 50
+    centres, radii = np.array([c for c, _ in balls]), np.array([r for _, r in balls])
+    gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radii[:, None] - radii[None]
+    assert gaps[~np.eye(len(balls), dtype=bool)].min() > 0
+    lowest = centres[:, 1] - radii
+    ground = still_life.ground_height(centres[:, 0], centres[:, 2])
+    assert (lowest >= ground - 1e-6).all()
+
+
+def test_the_teapot_touches_neither_bowl_nor_pearls() -> None:
+    pot = cKDTree(MESHES["Teapot"].positions)
+    for name in ("Bowl", "Pearls"):
+        distance, _ = pot.query(MESHES[name].positions)
+        assert distance.min() > 0.002, name
+
+
+def _balls(mesh: Mesh) -> list[tuple[np.ndarray, float]]:
+    parts = trimesh.Trimesh(mesh.positions, mesh.faces).split(only_watertight=False)
+    return [(p.vertices.mean(0), float(np.linalg.norm(p.vertices - p.vertices.mean(0), axis=1).max())) for p in parts]
+
+
+def test_terms_name_models_parameters_and_textures_that_exist() -> None:
+    for material in SCENE.materials:
+        for term in material.terms:
+            declared = TERMS[term["model"]]
+            for name, value in term.get("params", {}).items():
+                values, parameter = np.atleast_1d(value), declared.parameter(name)
+                assert parameter.minimum <= values.min() <= values.max() <= parameter.maximum
+            if term.get("texture") is not None:
+                assert term["texture"] in material.textures
+
+
+def test_five_models_are_on_show() -> None:
+    shown = {term["model"] for material in SCENE.materials for term in material.terms}
+    assert shown == {"lambert", "ggx", "cook_torrance", "ashikhmin_shirley", "blinn_phong"}
+
+
+def test_the_studio_has_a_large_key_and_a_small_lamp() -> None:
+    radiance = SCENE.environment.radiance.mean(-1).astype(np.float64)
+    power = radiance * texel_solid_angles(*radiance.shape)[:, None]
+    lamp = radiance > 100
+    key = (radiance > 5) & ~lamp
+    solid_angle = np.broadcast_to(texel_solid_angles(*radiance.shape)[:, None], radiance.shape)
+    assert solid_angle[lamp].sum() < 0.01
+    assert solid_angle[key].sum() > 0.15
+    assert 0.1 < power[lamp].sum() / power[key].sum() < 1.5
+    assert (texel_directions(*radiance.shape)[lamp | key][:, 1] > 0).all()
+
+
+def test_the_views_show_the_still_life() -> None:
+    assert [camera.name for camera in SCENE.cameras] == ["front", "left"]
+    for camera in SCENE.cameras:
+        local = (MESHES["Teapot"].positions - camera.to_world[:3, 3]) @ camera.to_world[:3, :3]
+        half_height = np.tan(camera.yfov / 2)
+        x, y = -local[:, 0] / local[:, 2] / (half_height * 4 / 3), -local[:, 1] / local[:, 2] / half_height
+        assert max(np.abs(x).max(), np.abs(y).max()) < 0.95
+        assert np.ptp(y) > 0.6  # large in the picture

@@ -1,0 +1,113 @@
+"""Equirectangular maps: which way is up, how large a texel is, what is read and what is repaired."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio  # noqa: N813
+import pytest
+
+from relume.errors import SceneError
+from relume.light.environment import (
+    direction_to_uv,
+    read_environment,
+    texel_directions,
+    texel_solid_angles,
+    uv_to_direction,
+)
+
+
+def written(path: Path, pixels: np.ndarray) -> Path:
+    height, width, channels = pixels.shape
+    output = oiio.ImageOutput.create(str(path))
+    assert output is not None
+    assert output.open(str(path), oiio.ImageSpec(width, height, channels, oiio.FLOAT))
+    assert output.write_image(np.ascontiguousarray(pixels, np.float32))
+    output.close()
+    return path
+
+
+def test_directions_follow_the_contract() -> None:
+    # u = atan2(z, x)/2π + ½: the middle column is +X, a quarter further +Z, the left edge -X; the top row is +Y.
+    expected = {(0.5, 0.5): (1, 0, 0), (0.75, 0.5): (0, 0, 1), (0.25, 0.5): (0, 0, -1), (0.0, 0.5): (-1, 0, 0)}
+    for (u, v), direction in expected.items():
+        np.testing.assert_allclose(uv_to_direction(np.float64(u), np.float64(v)), direction, atol=1e-12)
+    assert texel_directions(64, 128)[0, :, 1].min() > 0.99
+
+
+def test_uv_and_direction_are_inverse() -> None:
+    w = texel_directions(32, 64)
+    u, v = direction_to_uv(w)
+    np.testing.assert_allclose(u, np.broadcast_to((np.arange(64) + 0.5) / 64, u.shape), atol=1e-6)
+    np.testing.assert_allclose(v, np.broadcast_to((np.arange(32)[:, None] + 0.5) / 32, v.shape), atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(w, axis=-1), 1, atol=1e-6)
+
+
+def test_solid_angles_cover_the_sphere_and_integrate_cosines() -> None:
+    solid_angle = texel_solid_angles(64, 128)
+    assert solid_angle.sum() * 128 == pytest.approx(4 * np.pi, rel=1e-12)
+    # ∫ max(0, n·w) dw = π for any n
+    w = texel_directions(64, 128).astype(np.float64)
+    for n in ([0, 1, 0], [1, 0, 0], [0.6, 0.0, 0.8], [0.48, -0.6, 0.64]):
+        assert (np.maximum(w @ n, 0) * solid_angle[:, None]).sum() == pytest.approx(np.pi, rel=2e-3)
+
+
+@pytest.mark.parametrize("suffix", [".hdr", ".exr"])
+def test_reads_what_was_written(tmp_path: Path, suffix: str) -> None:
+    pixels = np.random.default_rng(2).uniform(0.5, 1, (16, 32, 3)).astype(np.float32)
+    pixels[3, 7] = (100, 50, 25)
+    path = written(tmp_path / f"sky{suffix}", pixels)
+    for source in (path, str(path), path.read_bytes()):
+        environment = read_environment(source, "sky")
+        assert environment.radiance.dtype == np.float32
+        np.testing.assert_allclose(environment.radiance, pixels, rtol=1 / 64)
+        assert environment.warnings == ()
+
+
+def test_grey_and_alpha_are_understood(tmp_path: Path) -> None:
+    grey = read_environment(written(tmp_path / "grey.exr", np.full((2, 4, 1), 0.5)), "grey")
+    np.testing.assert_array_equal(grey.radiance, np.full((2, 4, 3), 0.5, np.float32))
+    colour = np.broadcast_to(np.array([1.0, 2.0, 3.0, 0.25]), (2, 4, 4))
+    alpha = read_environment(written(tmp_path / "alpha.exr", colour), "alpha")
+    np.testing.assert_array_equal(alpha.radiance[0, 0], [1, 2, 3])
+
+
+def test_texels_that_are_no_light_are_repaired_with_a_warning_each(tmp_path: Path) -> None:
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[0, 0, 1], pixels[1, 1, 0], pixels[2, 2, 2], pixels[3, 3] = np.nan, np.inf, -3.0, 1e30
+    environment = read_environment(written(tmp_path / "broken.exr", pixels), "broken")
+    assert len(environment.warnings) == 3
+    np.testing.assert_array_equal(environment.radiance[0, 0], 0)
+    np.testing.assert_array_equal(environment.radiance[1, 1], 0)
+    np.testing.assert_array_equal(environment.radiance[2, 2], [1, 1, 0])
+    np.testing.assert_array_equal(environment.radiance[3, 3], 1e6)
+    assert (environment.radiance == 1).sum() == 4 * 8 * 3 - 10
+
+
+@pytest.mark.parametrize("shape", [(4, 4, 3), (8, 4, 3), (4, 7, 3)])
+def test_other_aspects_than_two_to_one_are_refused(tmp_path: Path, shape: tuple[int, int, int]) -> None:
+    with pytest.raises(SceneError, match="twice as wide as high"):
+        read_environment(written(tmp_path / "odd.exr", np.ones(shape)), "odd")
+
+
+def test_darkness_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="black everywhere"):
+        read_environment(written(tmp_path / "black.exr", np.zeros((2, 4, 3))), "black")
+
+
+def test_truncated_pixels_are_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).random((64, 128, 3))
+    for suffix in (".hdr", ".exr"):
+        data = written(tmp_path / f"cut{suffix}", noise).read_bytes()
+        with pytest.raises(SceneError):
+            read_environment(data[: len(data) // 2], "cut")
+
+
+def test_real_environments_are_read(shared_data: Path) -> None:
+    files = [path for path in sorted((shared_data / "envmaps").rglob("*")) if path.suffix in (".hdr", ".exr")]
+    assert files
+    for path in files:
+        environment = read_environment(path, path.stem)
+        assert environment.warnings == (), path
+        assert environment.radiance.mean() > 0.01
