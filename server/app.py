@@ -62,7 +62,7 @@ def create_app(
     )
     for group in ROUTE_GROUPS:
         app.include_router(group.router)
-    app.mount("/", client.Client(settings.client))
+    app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
     return app
 
 

@@ -48,7 +48,6 @@ def parse_document(body: bytes) -> str:
     try:
         document: Any = json.loads(body, parse_constant=_refuse_constant)
         text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        text.encode()
     except (ValueError, RecursionError):
         raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
     if not isinstance(document, dict) or not set(document) <= set(PARTS):

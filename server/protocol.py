@@ -96,13 +96,7 @@ class TouchMessage(Message):
 
 
 ClientMessage = Annotated[
-    EditMessage
-    | ViewMessage
-    | AckMessage
-    | StreamMessage
-    | ProbeMessage
-    | BrushMessage
-    | TouchMessage,
+    EditMessage | ViewMessage | AckMessage | StreamMessage | ProbeMessage | BrushMessage | TouchMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)

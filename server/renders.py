@@ -67,9 +67,7 @@ class RenderQueue:
             if len(waiting.all()) >= MAX_QUEUED:
                 raise BusyError(f"{MAX_QUEUED} batches are waiting; try again when some are done")
             text = request.model_dump_json()
-            session.add(
-                RenderRow(id=identity, request=text, state="queued", done=0, problem=None, created=time.time())
-            )
+            session.add(RenderRow(id=identity, request=text, state="queued", done=0, problem=None, created=time.time()))
         self._wake.set()
         return identity
 
@@ -160,9 +158,7 @@ class RenderQueue:
 
     def _note_failure(self, identity: str, problem: str) -> None:
         with self._sessions.begin() as session:
-            session.execute(
-                update(RenderRow).where(RenderRow.id == identity).values(state="failed", problem=problem)
-            )
+            session.execute(update(RenderRow).where(RenderRow.id == identity).values(state="failed", problem=problem))
 
     def _exists(self, identity: str) -> bool:
         with self._sessions() as session:

@@ -42,8 +42,12 @@ def get_look(name: str, services: Shared, if_none_match: Etags = None) -> Respon
     return Response(look.document, headers=headers, media_type="application/json")
 
 
-@router.put("/{name}", responses={201: {"description": "Created"}, 204: {"description": "Replaced"}},
-            status_code=204, openapi_extra=LOOK_BODY)
+@router.put(
+    "/{name}",
+    responses={201: {"description": "Created"}, 204: {"description": "Replaced"}},
+    status_code=204,
+    openapi_extra=LOOK_BODY,
+)
 async def put_look(
     name: str, request: Request, services: Shared, if_match: Etags = None, if_none_match: Etags = None
 ) -> Response:

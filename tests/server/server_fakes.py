@@ -89,7 +89,7 @@ class FakeTransfer:
 
 @dataclass
 class FakePicture:
-    """Radiance = lambert colour + sigma, everywhere; reached in steps of coefficients; one curve is frozen at a time."""
+    """Radiance = lambert colour + sigma, everywhere; reached in steps; one curve is frozen at a time."""
 
     transfer: FakeTransfer
     view: FakeView

@@ -1,0 +1,55 @@
+"""An app over a fake library and real bakes of a fake method, all in a folder of the test."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import SIZE, Control, FakeMethod, tiny_scene
+from session_client import Baked
+
+from relume.transfer.base import Recipe
+from server.app import create_app
+from server.settings import Settings
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+
+@pytest.fixture
+def control() -> Control:
+    return Control()
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(
+        data=tmp_path / "data",
+        client=tmp_path / "dist",
+        allowed_hosts=["testserver"],
+        max_body_bytes=2 * 1024**2,
+        max_upload_bytes=4 * 1024**2,
+        max_sessions=3,
+        ack_seconds=1.0,
+    )
+
+
+def open_fake_bakes(settings: Settings) -> BakeService:
+    return BakeService(settings.data, settings.database_url, methods={"direct": FakeMethod()})
+
+
+@pytest.fixture
+def client(settings: Settings, control: Control) -> Iterator[TestClient]:
+    app = create_app(settings, open_library=control.open_library, open_bakes=open_fake_bakes)
+    with TestClient(app, raise_server_exceptions=False) as client:
+        yield client
+
+
+@pytest.fixture
+def baked(client: TestClient) -> Baked:
+    """A scene and a bake of it that is ready."""
+    bakes: BakeService = client.app.state.services.bakes
+    scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
+    bake = bakes.submit(scene, Recipe("direct", ("front", "left"), SIZE, 10))
+    with bakes.subscribe(bake) as changes:
+        assert list(changes)[-1].state == "ready"
+    return Baked(scene, bake)

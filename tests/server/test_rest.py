@@ -1,0 +1,194 @@
+"""The REST calls, end to end over a fake bake method."""
+
+import io
+import json
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from fastapi.testclient import TestClient
+from PIL import Image
+from server_fakes import SIZE, Control
+from session_client import Baked
+
+from server.app import create_app
+from server.settings import Settings
+
+WIDTH, HEIGHT = SIZE
+
+
+@pytest.fixture(scope="module")
+def glb() -> bytes:
+    """A real file with one box."""
+    data: bytes = trimesh.Scene(trimesh.creation.box()).export(file_type="glb")
+    return data
+
+
+def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
+    for _ in range(500):
+        body: dict[str, Any] = client.get(url).json()
+        if body["state"] in ("ready", "failed"):
+            return body
+        time.sleep(0.02)
+    raise TimeoutError(url)
+
+
+def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: bytes) -> None:
+    created = client.post("/api/scenes", files={"scene": ("Box on table.glb", glb)})
+    assert created.status_code == 201, created.text
+    scene = created.json()
+    assert created.headers["location"] == f"/api/scenes/{scene['id']}"
+    assert scene["name"] == "Box on table"
+    assert scene["triangles"] == 12
+    assert [view["name"] for view in scene["views"]] == ["front"]
+    assert client.get("/api/scenes").json() == [scene]
+    request = {"scene": scene["id"], "preset": "preview"}
+    plan = client.post("/api/bakes", json=request | {"dry_run": True})
+    assert plan.status_code == 200
+    assert plan.json()["recipe"] == {"method": "direct", "views": ["front"], "size": [320, 240], "lights": 300}
+    assert client.get("/api/bakes").json() == []
+    queued = client.post("/api/bakes", json=request)
+    assert queued.status_code == 202
+    assert queued.json()["id"] == plan.json()["id"]
+    bake = wait_until_done(client, queued.headers["location"])
+    assert bake["state"] == "ready"
+    assert client.get("/api/bakes", params={"scene": scene["id"]}).json()[0]["id"] == bake["id"]
+    shown = client.get(f"/api/scenes/{scene['id']}").json()
+    assert shown["bakes"] == [bake["id"]]
+    picture = Image.open(io.BytesIO(client.get(shown["thumbnail"]).content))
+    assert (picture.format, picture.size) == ("WEBP", (320, 240))
+    assert client.delete(f"/api/scenes/{scene['id']}").status_code == 204
+    assert client.get(f"/api/scenes/{scene['id']}").status_code == 404
+    assert client.get("/api/bakes").json() == []
+
+
+def test_same_recipe_twice_is_the_same_bake(client: TestClient, baked: Baked) -> None:
+    request = {"scene": baked.scene, "size": [64, 48], "lights": 20}
+    first, second = (client.post("/api/bakes", json=request).json() for _ in range(2))
+    assert first["id"] == second["id"]
+
+
+def test_bake_events_end_with_the_bake(client: TestClient, baked: Baked) -> None:
+    with client.stream("GET", f"/api/bakes/{baked.bake}/events") as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        lines = [line for line in response.iter_lines() if line]
+    assert lines[0] == "event: bake"
+    assert json.loads(lines[1].removeprefix("data: "))["state"] == "ready"
+    assert len(lines) == 2
+
+
+def test_cancelling_a_finished_bake_leaves_it(client: TestClient, baked: Baked) -> None:
+    assert client.delete(f"/api/bakes/{baked.bake}").status_code == 204
+    assert client.get(f"/api/bakes/{baked.bake}").json()["state"] == "ready"
+
+
+def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:
+    response = client.get(f"/api/bakes/{baked.bake}/views/front/materials.png")
+    ids = np.asarray(Image.open(io.BytesIO(response.content)))
+    assert ids.shape == (HEIGHT, WIDTH)
+    assert ids[0, 0] == 65535
+    assert ids[1, 1] == 0
+    assert client.get(f"/api/bakes/{baked.bake}/views/none/materials.png").status_code == 404
+
+
+def test_models_are_listed(client: TestClient) -> None:
+    models = {model["model"]: model for model in client.get("/api/models").json()}
+    assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]
+
+
+def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked) -> None:
+    looks = [{}, {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.25, 0, 0]}] * 2}}}]
+    looks[1]["materials"]["Paper"]["terms"][1] = {"model": "cook_torrance", "params": {"sigma": 0.5}}
+    request = {"bake": baked.bake, "view": "front", "looks": looks, "format": "png", "size": [32, 16]}
+    queued = client.post("/api/renders", json=request)
+    assert queued.status_code == 202, queued.text
+    url = queued.headers["location"]
+    done = wait_until_done(client, url)
+    assert (done["state"], done["done"], done["total"], done["progress"]) == ("ready", 2, 2, 1.0)
+    frame = client.get(f"{url}/frames/1")
+    assert frame.headers["content-type"] == "image/png"
+    assert Image.open(io.BytesIO(frame.content)).size == (32, 16)
+    assert client.get(f"{url}/frames/2").status_code == 404
+    archive = zipfile.ZipFile(io.BytesIO(client.get(f"{url}/archive.zip").content))
+    assert archive.namelist() == ["0000.png", "0001.png"]
+    assert archive.read("0001.png") == frame.content
+    assert client.delete(url).status_code == 204
+    assert client.get(url).status_code == 404
+
+
+def test_render_continues_after_a_restart(settings: Settings, client: TestClient, baked: Baked) -> None:
+    request = {"bake": baked.bake, "view": "front", "looks": [{}, {}], "format": "exr"}
+    url = client.post("/api/renders", json=request).headers["location"]
+    assert wait_until_done(client, url)["state"] == "ready"
+    services = client.app.state.services
+    services.renders._note(url.rsplit("/", 1)[1], "running", 1)  # as a killed server leaves it
+    status = services.renders.get(url.rsplit("/", 1)[1])
+    services.renders.frame_path(status, 1).unlink()
+    services.renders.archive_path(status).unlink()
+    untouched = services.renders.frame_path(status, 0).stat().st_mtime_ns
+    control = Control()
+    with TestClient(create_app(settings, open_library=control.open_library)) as restarted:
+        assert wait_until_done(restarted, url)["state"] == "ready"
+        assert restarted.get(f"{url}/frames/1").status_code == 200
+    assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched
+
+
+def test_look_is_saved_and_changed_only_by_who_knows_its_version(client: TestClient) -> None:
+    url = "/api/looks/Red%20teapot"
+    look = {"display": {"exposure": 1.5}}
+    created = client.put(url, json=look, headers={"If-None-Match": "*"})
+    assert created.status_code == 201
+    etag = created.headers["etag"]
+    assert client.get(url).json() == look
+    assert client.get(url, headers={"If-None-Match": etag}).status_code == 304
+    assert client.put(url, json=look, headers={"If-None-Match": "*"}).status_code == 412
+    assert client.put(url, json=look).status_code == 428
+    changed = client.put(url, json={"display": {}}, headers={"If-Match": etag})
+    assert changed.status_code == 204
+    assert changed.headers["etag"] != etag
+    assert client.put(url, json=look, headers={"If-Match": etag}).status_code == 412
+    assert [entry["name"] for entry in client.get("/api/looks").json()] == ["Red teapot"]
+    assert client.delete(url).status_code == 428
+    assert client.delete(url, headers={"If-Match": etag}).status_code == 412
+    assert client.delete(url, headers={"If-Match": changed.headers["etag"]}).status_code == 204
+    assert client.get(url).status_code == 404
+
+
+def test_health_and_metrics(client: TestClient) -> None:
+    assert client.get("/livez").json() == {"status": "alive"}
+    assert client.get("/readyz").json() == {"status": "ready"}
+    text = client.get("/metrics").text
+    assert 'relume_http_requests_total{method="GET",status="200"} 2.0' in text
+    assert "relume_frozen_cache_bytes 123.0" in text
+    assert "relume_edit_to_socket_seconds_bucket" in text
+
+
+@pytest.fixture
+def dist(settings: Settings) -> Iterator[Path]:
+    (settings.client / "assets").mkdir(parents=True)
+    (settings.client / "index.html").write_text("<title>editor</title>")
+    (settings.client / "assets" / "main-abc.js").write_text("1")
+    return settings.client
+
+
+def test_editor_is_served_with_its_routes(client: TestClient, dist: Path) -> None:
+    for path in ("/", "/scenes/0123456789abcdef", "/index.html"):
+        page = client.get(path)
+        assert page.text == "<title>editor</title>"
+        assert page.headers["cache-control"] == "no-cache"
+        assert "default-src 'self'" in page.headers["content-security-policy"]
+        assert page.headers["x-content-type-options"] == "nosniff"
+    asset = client.get("/assets/main-abc.js")
+    assert "immutable" in asset.headers["cache-control"]
+    assert client.get("/assets/missing.js").status_code == 404
+
+
+def test_missing_editor_says_how_to_build_it(client: TestClient) -> None:
+    page = client.get("/")
+    assert page.status_code == 503
+    assert "npm run build" in page.text
