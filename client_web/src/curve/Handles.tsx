@@ -1,0 +1,92 @@
+/** The curve's points: each a slider for keyboard and screen reader. */
+import type { Point } from "../protocol";
+import { formatNumber } from "../ui/scale";
+import { valueAt, yFraction } from "./axes";
+import { put } from "./model";
+import { pchip } from "./pchip";
+import { plotX, plotY, type Frame } from "./Plot";
+import { movePoint, removePoint } from "./points";
+import { picked, type Hand } from "./tools";
+
+interface Props {
+  frame: Frame;
+  hand: Hand;
+  points: Point[];
+}
+
+const FINE = 0.1;
+
+/** The generator's value at a point's angle. */
+function generatorAt(hand: Hand, degrees: number): number | null {
+  const ghost = hand.model.ghosts?.[hand.channels[0] ?? 0];
+  return ghost === undefined ? null : pchip(ghost)(degrees);
+}
+
+export function resetPoint(hand: Hand, points: Point[], index: number): void {
+  const value = generatorAt(hand, points[index]?.[0] ?? 0);
+  if (value !== null) put(hand.model, "Reset point", () => movePoint(points, index, points[index]?.[0] ?? 0, value), hand.channels);
+}
+
+export function deletePoint(hand: Hand, points: Point[], index: number): void {
+  put(hand.model, "Delete point", () => removePoint(points, index), hand.channels);
+  picked.value = null;
+}
+
+function nudge(hand: Hand, points: Point[], index: number, dx: number, dy: number): void {
+  const [x, y] = points[index] as Point;
+  const height = Math.max(0, yFraction(hand.axes, y) + dy);
+  put(hand.model, "Move point", () => movePoint(points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height)), hand.channels);
+}
+
+function onKey(event: KeyboardEvent, hand: Hand, points: Point[], index: number): void {
+  const step = event.shiftKey ? FINE : 1;
+  const degrees = Math.max(0.5, 90 / hand.model.info.bands) * step;
+  const moves: Record<string, [number, number]> = {
+    ArrowLeft: [-degrees, 0],
+    ArrowRight: [degrees, 0],
+    ArrowUp: [0, 0.02 * step],
+    ArrowDown: [0, -0.02 * step],
+    PageUp: [0, 0.1],
+    PageDown: [0, -0.1],
+  };
+  const move = moves[event.key];
+  if (move !== undefined) nudge(hand, points, index, ...move);
+  else if (event.key === "Delete" || event.key === "Backspace") deletePoint(hand, points, index);
+  else if (event.key === "r" || event.key === "R") resetPoint(hand, points, index);
+  else if (event.key === "Enter" || event.key === " ") picked.value = { index, carried: !picked.value?.carried };
+  else if (event.key === "Escape" && picked.value !== null) picked.value = null;
+  else return;
+  event.preventDefault();
+  event.stopPropagation();
+}
+
+export function Handles({ frame, hand, points }: Props) {
+  const edited = hand.channels.some((c) => hand.model.channels[c] !== null);
+  return (
+    <g class={`handles ${edited ? "" : "offered"}`}>
+      {points.map(([degrees, value], index) => (
+        <g
+          key={index}
+          data-index={index}
+          role="slider"
+          tabIndex={0}
+          class={picked.value?.index === index ? `handle picked ${picked.value.carried ? "carried" : ""}` : "handle"}
+          aria-label={`Point ${index + 1} of ${points.length}`}
+          aria-orientation="vertical"
+          aria-valuemin={0}
+          aria-valuemax={1e6}
+          aria-valuenow={value}
+          aria-valuetext={`${degrees.toFixed(2)} degrees, value ${formatNumber(value)}`}
+          transform={`translate(${plotX(frame, degrees).toFixed(1)} ${plotY(frame, value).toFixed(1)})`}
+          onFocus={() => {
+            if (picked.value?.index !== index) picked.value = { index, carried: false };
+          }}
+          onKeyDown={(event: KeyboardEvent) => onKey(event, hand, points, index)}
+        >
+          <circle class="reach" r="11" />
+          <circle class="mark" r="4" />
+        </g>
+      ))}
+    </g>
+  );
+}

@@ -1,0 +1,41 @@
+/** One line under the plot: where the pointer is, where a pixel's light comes from, or what to do. */
+import { formatNumber } from "../ui/scale";
+import { valueAt, type Axes } from "./axes";
+import { mainStretch, type CurveModel } from "./model";
+import { tool } from "./settings";
+import { picked, selection, type Spot } from "./tools";
+
+const HINTS = {
+  draw: "Draw over the curve. By keys: use points.",
+  points: "Click to add a point, drag to move it. Delete removes, R resets.",
+  stretch: "Drag across to select a stretch, then drag it up or along.",
+};
+
+interface Props {
+  model: CurveModel;
+  axes: Axes;
+  spot: Spot | null;
+  ready: boolean;
+  blocked: boolean;
+  contributions: number[][] | null;
+}
+
+function words({ axes, spot, ready, blocked, contributions }: Props): string {
+  if (!ready) return "Waiting for the curve from the server…";
+  if (spot !== null && !blocked) {
+    const value = formatNumber(valueAt(axes, Math.max(0, spot.height)));
+    return `${spot.degrees.toFixed(2)}°  ·  ${value}`;
+  }
+  if (contributions !== null) {
+    const main = mainStretch(contributions);
+    return main === null ? "No light reaches this pixel through this curve." : `80 % of this pixel's light comes from ${main[0].toFixed(1)}° to ${main[1].toFixed(1)}°`;
+  }
+  if (blocked) return "Red, green and blue differ: choose one of them, or join them.";
+  if (tool.value === "points" && picked.value?.carried) return "Now click where this point goes. Escape leaves it.";
+  if (tool.value === "stretch" && selection.value !== null) return "↑ ↓ scale, ← → shift, Shift for fine steps.";
+  return HINTS[tool.value];
+}
+
+export function Readout(props: Props) {
+  return <p class="readout">{words(props)}</p>;
+}

@@ -1,0 +1,43 @@
+/** A term's colour: a picker, and the three linear numbers. */
+import type { Rgb } from "../protocol";
+import { NumberField } from "../ui/NumberField";
+import { IconButton } from "../ui/Button";
+import { fromHex, toHex } from "./color";
+
+interface Props {
+  label: string;
+  value: Rgb;
+  initial: Rgb | null;
+  onChange(value: Rgb): void;
+}
+
+const MAXIMUM = 1e4;
+const CHANNELS = ["red", "green", "blue"] as const;
+
+export function ColorField({ label, value, initial, onChange }: Props) {
+  const changed = initial !== null && value.some((v, i) => v !== initial[i]);
+  return (
+    <div class="color">
+      <input
+        type="color"
+        aria-label={`${label}: pick`}
+        title="Pick a colour"
+        value={toHex(value)}
+        onInput={(event) => onChange(fromHex(event.currentTarget.value, value))}
+      />
+      {CHANNELS.map((name, channel) => (
+        <label key={name} class={`channel ${name}`}>
+          <NumberField
+            label={`${label}, ${name}, linear`}
+            value={value[channel] as number}
+            minimum={0}
+            maximum={MAXIMUM}
+            step={0.01}
+            onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
+          />
+        </label>
+      ))}
+      <IconButton icon="reset" label={`Reset ${label}`} disabled={!changed} onClick={() => initial && onChange(initial)} />
+    </div>
+  );
+}

@@ -1,0 +1,79 @@
+/** The selected material: its terms as cards. */
+import { commit, edit } from "../state/edit";
+import { pointer, setAt } from "../state/pointer";
+import { defaultLook, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
+import { IconButton } from "../ui/Button";
+import { TermCard } from "./TermCard";
+import { defaultTerm } from "./terms";
+
+const MAX_TERMS = 8;
+
+function replaceTerms(label: string, material: string, next: unknown): void {
+  if (look.value !== null) commit(label, setAt(look.value, pointer("materials", material, "terms"), next));
+}
+
+function AddTerm({ material }: { material: string }) {
+  return (
+    <select
+      class="add-term"
+      aria-label="Add a term"
+      value=""
+      disabled={terms.value.length >= MAX_TERMS}
+      onChange={(event) => {
+        const model = models.value.find((m) => m.model === event.currentTarget.value);
+        if (model !== undefined) replaceTerms("Add term", material, [...terms.value, defaultTerm(model)]);
+        event.currentTarget.value = "";
+      }}
+    >
+      <option value="">＋ Add a term…</option>
+      {models.value.map((m) => (
+        <option key={m.model} value={m.model}>
+          {m.label}
+        </option>
+      ))}
+    </select>
+  );
+}
+
+export function Inspector() {
+  const material = selectedMaterial.value;
+  if (material === null || terms.value.length === 0) {
+    return (
+      <aside class="panel inspector" aria-label="Inspector">
+        <p class="hint">Click something in the picture, or choose a material on the left, to change how it reflects light.</p>
+      </aside>
+    );
+  }
+  const original = defaultLook.value?.materials[material];
+  return (
+    <aside class="panel inspector" aria-label="Inspector">
+      <header class="panel-head">
+        <h2>{material}</h2>
+        <IconButton
+          icon="reset"
+          label="Reset this material"
+          disabled={original === undefined || original === look.value?.materials[material]}
+          onClick={() => edit("Reset material", pointer("materials", material), original)}
+        />
+      </header>
+      {terms.value.map((term, index) => (
+        <TermCard
+          key={index}
+          material={material}
+          term={term}
+          index={index}
+          onRemove={
+            terms.value.length > 1
+              ? () => {
+                  selectedCurve.value = null;
+                  selectedTerm.value = 0;
+                  replaceTerms("Remove term", material, terms.value.filter((_, i) => i !== index));
+                }
+              : null
+          }
+        />
+      ))}
+      <AddTerm material={material} />
+    </aside>
+  );
+}

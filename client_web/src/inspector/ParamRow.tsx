@@ -1,0 +1,57 @@
+/** One parameter: a slider, or three where red, green and blue were parted. */
+import type { ParameterInfo, ParamValue, Rgb } from "../protocol";
+import { IconButton } from "../ui/Button";
+import { Slider } from "../ui/Slider";
+
+const CHANNELS = [
+  { name: "red", tint: "var(--red)" },
+  { name: "green", tint: "var(--green)" },
+  { name: "blue", tint: "var(--blue)" },
+] as const;
+
+interface Props {
+  info: ParameterInfo;
+  value: ParamValue;
+  initial: ParamValue;
+  onChange(value: ParamValue): void;
+}
+
+function mean(value: ParamValue): number {
+  return typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
+}
+
+export function ParamRow({ info, value, initial, onChange }: Props) {
+  const parted = typeof value !== "number";
+  const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit };
+  const toggle = () => onChange(parted ? mean(value) : [value, value, value]);
+  return (
+    <div class="param">
+      <div class="param-head">
+        <span class="param-label" title={info.help}>
+          {info.label}
+        </span>
+        <IconButton
+          icon={parted ? "unlink" : "link"}
+          label={parted ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`}
+          pressed={parted}
+          onClick={toggle}
+        />
+      </div>
+      {parted ? (
+        CHANNELS.map(({ name, tint }, channel) => (
+          <Slider
+            key={name}
+            {...range}
+            label={`${info.label}, ${name}`}
+            tint={tint}
+            value={value[channel] as number}
+            initial={typeof initial === "number" ? initial : (initial[channel] as number)}
+            onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
+          />
+        ))
+      ) : (
+        <Slider {...range} label={info.label} value={value} initial={mean(initial)} onChange={onChange} />
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,20 @@
+/** Colours of the look (linear Rec. 709, may exceed 1) and the picker's #rrggbb (sRGB, at most 1). */
+import { srgbDecode, srgbEncode } from "../picture/tonemap";
+import type { Rgb } from "../protocol";
+
+/** What a colour above 1 is divided by before it fits the picker. */
+export function strength(color: Rgb): number {
+  return Math.max(1, ...color);
+}
+
+export function toHex(color: Rgb): string {
+  const scale = strength(color);
+  return `#${color.map((v) => Math.round(255 * srgbEncode(v / scale)).toString(16).padStart(2, "0")).join("")}`;
+}
+
+/** The picked colour at the old one's strength; six digits keep the document readable. */
+export function fromHex(hex: string, before: Rgb): Rgb {
+  const scale = strength(before);
+  const channel = (i: number) => srgbDecode(parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16) / 255) * scale;
+  return [0, 1, 2].map((i) => Number(channel(i).toPrecision(6))) as Rgb;
+}

@@ -1,0 +1,23 @@
+/** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
+import type { ModelInfo, Term } from "../protocol";
+
+export function defaultTerm(model: ModelInfo): Term {
+  return {
+    model: model.model,
+    color: model.texture === "diffuse" ? [0.2, 0.2, 0.2] : [0.5, 0.5, 0.5],
+    params: Object.fromEntries(model.parameters.map((info) => [info.name, info.default])),
+    texture: null,
+    curves: {},
+  };
+}
+
+/** The term under another model: colour and texture stay, and parameters of the same name. Drawn curves belong to
+ * the old model's angles and go. */
+export function withModel(term: Term, name: string, models: readonly ModelInfo[]): Term {
+  const model = models.find((m) => m.model === name);
+  if (model === undefined) return term;
+  const params = Object.fromEntries(
+    model.parameters.map((info) => [info.name, term.params?.[info.name] ?? info.default]),
+  );
+  return { ...term, model: name, params, curves: {} };
+}

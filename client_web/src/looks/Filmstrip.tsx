@@ -1,0 +1,126 @@
+/** Saved looks, and the steps of this visit: click one to return to it. */
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { Look } from "../protocol";
+import { commit } from "../state/edit";
+import { defaultLook, history, look, scene } from "../state/store";
+import { IconButton } from "../ui/Button";
+import { completed, markLook, saveLook, sideA } from "./compare";
+import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
+import { historyThumbnail } from "./strip";
+
+const MAX_STEPS = 40;
+const MAX_NAME = 80;
+
+function Name({ saved }: { saved: SavedLook }) {
+  const [editing, setEditing] = useState(false);
+  if (!editing) {
+    return (
+      <button class="tile-name" title="Rename" onClick={() => setEditing(true)}>
+        {saved.name}
+      </button>
+    );
+  }
+  const take = (text: string) => {
+    setEditing(false);
+    const name = text.trim().replace(/[/\\]/g, "-").slice(0, MAX_NAME);
+    if (name !== "" && name !== saved.name) void renameLook(saved, name);
+  };
+  return (
+    <input
+      class="tile-name"
+      aria-label={`New name of ${saved.name}`}
+      maxLength={MAX_NAME}
+      defaultValue={saved.name}
+      ref={(input) => input?.focus()}
+      onBlur={(event) => take(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        event.stopPropagation();
+        if (event.key === "Enter") event.currentTarget.blur();
+        if (event.key === "Escape") setEditing(false);
+      }}
+    />
+  );
+}
+
+function Picture({ image, text }: { image: string | null; text: string }) {
+  return image === null ? <span class="blank">{text.slice(0, 2)}</span> : <img src={image} alt="" draggable={false} />;
+}
+
+function SavedTile({ saved }: { saved: SavedLook }) {
+  const whole = completed(saved.look);
+  const shown = JSON.stringify(whole) === JSON.stringify(look.value);
+  return (
+    <li class={`tile ${shown ? "shown" : ""}`}>
+      <button class="tile-picture" aria-label={`Show ${saved.name}`} aria-pressed={shown} onClick={() => commit(`Show ${saved.name}`, whole)}>
+        <Picture image={thumbnailOf(saved.name)} text={saved.name} />
+        {sideA.value?.label === saved.name && <span class="mark">A</span>}
+      </button>
+      <span class="tile-actions">
+        <button class="icon" title={`Compare with ${saved.name}: keep it as A`} aria-label={`Keep ${saved.name} as A`} onClick={() => void markLook(whole, saved.name)}>
+          A
+        </button>
+        <IconButton icon="save" label={`Save the live look over ${saved.name}`} disabled={shown} onClick={() => look.value && void updateLook(saved, look.value)} />
+        <IconButton icon="trash" label={`Delete ${saved.name}`} onClick={() => void deleteLook(saved)} />
+      </span>
+      <Name saved={saved} />
+    </li>
+  );
+}
+
+function StepTile({ count, label, of }: { count: number; label: string; of: Look | undefined }) {
+  const current = history.cursor.value === count;
+  const undone = count > history.cursor.value;
+  return (
+    <li class={`tile step ${current ? "shown" : ""} ${undone ? "undone" : ""}`}>
+      <button class="tile-picture" aria-label={`Go to step ${count}: ${label}`} aria-current={current ? "step" : undefined} onClick={() => void history.goTo(count)}>
+        <Picture image={historyThumbnail(of)} text={label} />
+      </button>
+      <span class="tile-name" title={label}>
+        {label}
+      </span>
+    </li>
+  );
+}
+
+function Steps() {
+  const strip = useRef<HTMLUListElement>(null);
+  const steps = history.steps.value;
+  useEffect(() => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" }), [history.cursor.value, steps.length]);
+  const first = Math.max(0, steps.length - MAX_STEPS);
+  // steps that are not of the look (a look was deleted) show the picture before them
+  let last: Look | undefined = steps[0]?.before ?? look.value ?? undefined;
+  const tiles = steps.map((step, i) => {
+    last = step.after ?? last;
+    return { count: i + 1, label: step.label, of: last };
+  });
+  return (
+    <ul class="tiles" ref={strip} aria-label="Steps of this visit">
+      {first === 0 && <StepTile count={0} label="Opened" of={steps[0]?.before ?? look.value ?? undefined} />}
+      {tiles.slice(first).map((tile) => (
+        <StepTile key={tile.count} {...tile} />
+      ))}
+    </ul>
+  );
+}
+
+export function Filmstrip() {
+  useEffect(() => void (scene.value !== null && refreshShelf()), [scene.value?.id]);
+  return (
+    <section class="filmstrip" aria-label="Looks">
+      <h2>Looks</h2>
+      <button class="save" onClick={() => void saveLook()} disabled={look.value === null} title="Save the live look (Ctrl+S)">
+        <span class="plus">＋</span>
+        Save look
+      </button>
+      {defaultLook.value !== null && shelf.value.length > 0 && (
+        <ul class="tiles saved" aria-label="Saved looks">
+          {shelf.value.map((saved) => (
+            <SavedTile key={saved.name} saved={saved} />
+          ))}
+        </ul>
+      )}
+      <h2>History</h2>
+      <Steps />
+    </section>
+  );
+}

@@ -1,0 +1,57 @@
+/** Pictures made on the client from what it holds: thumbnails and PNG export. Same tone map as the canvas. */
+import type { Pixels } from "../picture/pixels";
+import { decodeRgb9e5 } from "../picture/rgb9e5";
+import { toDisplay } from "../picture/tonemap";
+import type { Look, Rgb } from "../protocol";
+
+const THUMBNAIL_WIDTH = 144;
+const TAPS = 2;
+
+type Display = Look["display"];
+
+function put(image: ImageData, index: number, radiance: Rgb, display: Display): void {
+  const shown = toDisplay(radiance, display.exposure, display.tone_map);
+  image.data.set([...shown.map((v) => Math.round(255 * v)), 255], 4 * index);
+}
+
+/** The whole picture as it is displayed. */
+export function displayed(pixels: Pixels, display: Display): ImageData {
+  const image = new ImageData(pixels.width, pixels.height);
+  pixels.words.forEach((word, i) => put(image, i, decodeRgb9e5(word), display));
+  return image;
+}
+
+/** Mean of a few samples spread over a thumbnail's pixel. */
+function sample(pixels: Pixels, x: number, y: number, step: number): Rgb {
+  const sum: Rgb = [0, 0, 0];
+  for (let i = 0; i < TAPS * TAPS; i++) {
+    const px = Math.min(pixels.width - 1, Math.floor((x + ((i % TAPS) + 0.5) / TAPS) * step));
+    const py = Math.min(pixels.height - 1, Math.floor((y + (Math.floor(i / TAPS) + 0.5) / TAPS) * step));
+    decodeRgb9e5(pixels.words[py * pixels.width + px] ?? 0).forEach((v, c) => (sum[c] = (sum[c] as number) + v));
+  }
+  return sum.map((v) => v / TAPS ** 2) as Rgb;
+}
+
+function canvasOf(image: ImageData): HTMLCanvasElement {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [image.width, image.height];
+  canvas.getContext("2d")?.putImageData(image, 0, 0);
+  return canvas;
+}
+
+/** A small JPEG as a data URL. */
+export function thumbnail(pixels: Pixels, display: Display): string {
+  const step = pixels.width / THUMBNAIL_WIDTH;
+  const image = new ImageData(THUMBNAIL_WIDTH, Math.max(1, Math.round(pixels.height / step)));
+  for (let y = 0; y < image.height; y++) {
+    for (let x = 0; x < image.width; x++) put(image, y * image.width + x, sample(pixels, x, y, step), display);
+  }
+  return canvasOf(image).toDataURL("image/jpeg", 0.85);
+}
+
+export function pngBlob(pixels: Pixels, display: Display): Promise<Blob> {
+  const canvas = canvasOf(displayed(pixels, display));
+  return new Promise((resolve, reject) => {
+    canvas.toBlob((blob) => (blob === null ? reject(new Error("The picture could not be written as PNG.")) : resolve(blob)), "image/png");
+  });
+}

@@ -1,0 +1,108 @@
+/** Saved looks on the server, each with its version; saving and deleting can be undone. */
+import { signal } from "@preact/signals";
+import { ApiError, json, request } from "../net/api";
+import type { Look, LookEntry } from "../protocol";
+import { history, scene } from "../state/store";
+import { attempt } from "../ui/toasts";
+
+export interface SavedLook {
+  name: string;
+  etag: string;
+  look: Partial<Look>;
+}
+
+export const shelf = signal<SavedLook[]>([]);
+const MAX_READ = 60;
+const path = (name: string) => `/api/looks/${encodeURIComponent(name)}`;
+const thumbnailKey = (name: string) => `relume.look.${scene.value?.id ?? ""}.${name}`;
+
+export function thumbnailOf(name: string): string | null {
+  return localStorage.getItem(thumbnailKey(name));
+}
+
+export function keepThumbnail(name: string, image: string): void {
+  try {
+    localStorage.setItem(thumbnailKey(name), image);
+  } catch {
+    // the strip then shows the name alone
+  }
+}
+
+/** Whether a look speaks only of this scene's materials. */
+function fits(look: Partial<Look>): boolean {
+  const known = new Set(scene.value?.materials.map((material) => material.name));
+  return Object.keys(look.materials ?? {}).every((name) => known.has(name));
+}
+
+async function read(entry: LookEntry): Promise<SavedLook> {
+  const response = await request(path(entry.name));
+  return { name: entry.name, etag: response.headers.get("etag") ?? entry.etag, look: (await response.json()) as Partial<Look> };
+}
+
+export async function refreshShelf(): Promise<void> {
+  await attempt(async () => {
+    const entries = (await (await request("/api/looks")).json()) as LookEntry[];
+    const looks = await Promise.allSettled(entries.slice(0, MAX_READ).map(read));
+    shelf.value = looks.flatMap((result) => (result.status === "fulfilled" && fits(result.value.look) ? [result.value] : []));
+  });
+}
+
+function conflict(error: unknown, name: string): never {
+  if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
+    void refreshShelf();
+    throw new Error(`“${name}” was changed elsewhere meanwhile. Nothing was overwritten; look at the new version first.`);
+  }
+  throw error;
+}
+
+async function write(name: string, look: Partial<Look>, etag: string | null): Promise<void> {
+  const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
+  const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) => conflict(error, name));
+  const saved = { name, etag: response.headers.get("etag") ?? "", look };
+  const known = shelf.value.some((entry) => entry.name === name);
+  shelf.value = known ? shelf.value.map((entry) => (entry.name === name ? saved : entry)) : [...shelf.value, saved];
+}
+
+async function erase(name: string): Promise<void> {
+  const etag = shelf.value.find((entry) => entry.name === name)?.etag ?? "*";
+  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) => conflict(error, name));
+  shelf.value = shelf.value.filter((entry) => entry.name !== name);
+}
+
+async function perform(label: string, redo: () => Promise<void>, undo: () => Promise<void>): Promise<void> {
+  await attempt(async () => {
+    await redo();
+    history.record({ label, redo, undo });
+    history.seal();
+  });
+}
+
+/** The first of "Look 1", "Look 2", … that is free. */
+export function freeName(taken: readonly string[]): string {
+  let n = taken.length + 1;
+  while (taken.includes(`Look ${n}`)) n += 1;
+  return `Look ${n}`;
+}
+
+export function addLook(name: string, look: Look): Promise<void> {
+  return perform(`Save ${name}`, () => write(name, look, null), () => erase(name));
+}
+
+export function deleteLook({ name, look }: SavedLook): Promise<void> {
+  return perform(`Delete ${name}`, () => erase(name), () => write(name, look, null));
+}
+
+export function updateLook({ name, look: before }: SavedLook, look: Look): Promise<void> {
+  const etag = () => shelf.value.find((entry) => entry.name === name)?.etag ?? null;
+  return perform(`Update ${name}`, () => write(name, look, etag()), () => write(name, before, etag()));
+}
+
+export function renameLook({ name, look }: SavedLook, to: string): Promise<void> {
+  const move = async (a: string, b: string) => {
+    await write(b, look, null);
+    const image = thumbnailOf(a);
+    if (image !== null) keepThumbnail(b, image);
+    await erase(a);
+  };
+  return perform(`Rename ${name}`, () => move(name, to), () => move(to, name));
+}

@@ -1,0 +1,33 @@
+import { render } from "preact";
+import { Editor } from "./ui/Editor";
+import { StartPage } from "./start/StartPage";
+import { openScene } from "./state/open";
+import { followPlace, placeFromUrl } from "./state/place";
+import { history, page } from "./state/store";
+import { Toasts } from "./ui/toasts";
+import "./ui/base.css";
+import "./ui/controls.css";
+import "./ui/layout.css";
+import "./start/start.css";
+import "./curve/curve.css";
+
+function App() {
+  return (
+    <>
+      {page.value === "editor" ? <Editor /> : <StartPage />}
+      <Toasts />
+    </>
+  );
+}
+
+function start(): void {
+  const place = placeFromUrl(location.search);
+  if (place.scene !== null) void openScene(place.scene, place);
+  followPlace();
+  // the hand has left the control: the next edit is another step
+  for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());
+  window.addEventListener("popstate", () => location.reload());
+  render(<App />, document.getElementById("app") as HTMLElement);
+}
+
+start();

@@ -1,0 +1,72 @@
+/** REST calls; failures become ApiError with the server's own words (RFC 9457). */
+import type { BakeBody, BakeRequest, DryRunBody, ModelInfo, Problem, RenderBody, RenderRequest, SceneBody } from "../protocol";
+
+export class ApiError extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+  ) {
+    super(message);
+  }
+}
+
+/** What a problem document says, in one sentence. */
+export function problemText(problem: Problem | string | null | undefined, fallback = "The server could not do that."): string {
+  if (problem == null) return fallback;
+  if (typeof problem === "string") return problem;
+  return problem.detail ?? problem.title ?? fallback;
+}
+
+async function failure(response: Response): Promise<ApiError> {
+  const fallback = `The server answered ${response.status} ${response.statusText}.`;
+  const problem = (await response.json().catch(() => null)) as Problem | null;
+  const detail = typeof problem?.detail === "string" ? problem.detail : problem?.title;
+  return new ApiError(detail ?? fallback, response.status);
+}
+
+export async function request(path: string, init: RequestInit = {}): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(path, init);
+  } catch {
+    throw new ApiError("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
+  }
+  if (!response.ok) throw await failure(response);
+  return response;
+}
+
+export function json(method: string, body: unknown, headers: Record<string, string> = {}): RequestInit {
+  return { method, headers: { "content-type": "application/json", ...headers }, body: JSON.stringify(body) };
+}
+
+async function get<T>(path: string): Promise<T> {
+  return (await (await request(path)).json()) as T;
+}
+
+export const listScenes = () => get<SceneBody[]>("/api/scenes");
+export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
+export const listModels = () => get<ModelInfo[]>("/api/models");
+export const getBake = (id: string) => get<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
+
+export const bakesOfScene = (scene: string) => get<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);
+
+export async function deleteScene(id: string): Promise<void> {
+  await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+
+export async function planBake(body: BakeRequest): Promise<DryRunBody> {
+  return (await (await request("/api/bakes", json("POST", { ...body, dry_run: true }))).json()) as DryRunBody;
+}
+
+export async function startBake(body: BakeRequest): Promise<BakeBody> {
+  return (await (await request("/api/bakes", json("POST", body))).json()) as BakeBody;
+}
+
+export async function cancelBake(id: string): Promise<void> {
+  await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+
+export async function startRender(body: RenderRequest): Promise<RenderBody> {
+  return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
+}
+export const getRender = (id: string) => get<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);

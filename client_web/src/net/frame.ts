@@ -1,0 +1,62 @@
+/** Binary frames: uint32 little-endian header length, JSON header, payload. Nothing of it is trusted. */
+import type { FrameHeader, Tile } from "../protocol";
+
+const MAX_HEADER_BYTES = 1 << 20;
+const MAX_SIDE = 16_384;
+const PIXEL_BYTES: Record<string, number> = { rgb9e5: 4, f32: 12, r8: 1 };
+
+export interface Frame {
+  header: FrameHeader;
+  payload: Uint8Array;
+}
+
+export class FrameError extends Error {}
+
+function isCount(value: unknown, maximum: number): value is number {
+  return typeof value === "number" && Number.isInteger(value) && value >= 0 && value <= maximum;
+}
+
+function checkTiles(tiles: unknown, width: number, height: number): asserts tiles is Tile[] {
+  if (!Array.isArray(tiles)) throw new FrameError("a frame came without its list of tiles");
+  for (const tile of tiles) {
+    const [x, y, w, h] = Array.isArray(tile) && tile.length === 4 ? (tile as unknown[]) : [];
+    const inside =
+      isCount(x, width) && isCount(y, height) && isCount(w, width) && isCount(h, height) && x + w <= width && y + h <= height;
+    if (!inside) throw new FrameError("a frame came with a tile outside the picture");
+  }
+}
+
+function readHeader(text: string): FrameHeader {
+  let header: unknown;
+  try {
+    header = JSON.parse(text);
+  } catch {
+    throw new FrameError("a frame's header is not JSON");
+  }
+  if (typeof header !== "object" || header === null) throw new FrameError("a frame's header is not an object");
+  const { frame, revision, width, height, tiles, format } = header as Record<string, unknown>;
+  if (!isCount(width, MAX_SIDE) || !isCount(height, MAX_SIDE) || width === 0 || height === 0) {
+    throw new FrameError("a frame's size is out of range");
+  }
+  if (!isCount(frame, 2 ** 53) || !isCount(revision, 2 ** 53)) throw new FrameError("a frame has no number");
+  if (typeof format !== "string") throw new FrameError("a frame has no format");
+  checkTiles(tiles, width, height);
+  return header as FrameHeader;
+}
+
+/** Raises FrameError where the bytes are not a frame; reads nothing outside `buffer`. */
+export function parseFrame(buffer: ArrayBuffer): Frame {
+  if (buffer.byteLength < 4) throw new FrameError("a frame is too short");
+  const headerBytes = new DataView(buffer).getUint32(0, true);
+  if (headerBytes > MAX_HEADER_BYTES || 4 + headerBytes > buffer.byteLength) {
+    throw new FrameError("a frame's header is longer than the frame");
+  }
+  const header = readHeader(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes)));
+  const payload = new Uint8Array(buffer, 4 + headerBytes);
+  if (header.format === "jpeg") return { header, payload };
+  const perPixel = PIXEL_BYTES[header.format];
+  if (perPixel === undefined) throw new FrameError(`a frame has the unknown format ${String(header.format)}`);
+  const pixels = header.tiles.reduce((sum, [, , w, h]) => sum + w * h, 0);
+  if (pixels * perPixel !== payload.byteLength) throw new FrameError("a frame's tiles and its bytes do not agree");
+  return { header, payload };
+}

@@ -1,0 +1,41 @@
+/** Import of a scene: a multipart upload with progress, which fetch cannot report. */
+import type { SceneBody } from "../protocol";
+import { ApiError } from "./api";
+
+export interface Upload {
+  scene: File;
+  environment: File | null;
+  name: string;
+}
+
+function answer(request: XMLHttpRequest): SceneBody {
+  const body = JSON.parse(request.responseText || "null") as unknown;
+  if (request.status === 201) return body as SceneBody;
+  const { detail, title } = (body ?? {}) as { detail?: unknown; title?: string };
+  throw new ApiError(
+    typeof detail === "string" ? detail : (title ?? `The server answered ${request.status}.`),
+    request.status,
+  );
+}
+
+/** `progress` gets 0…1 of the bytes sent; raises ApiError with the server's words. */
+export function uploadScene(upload: Upload, progress: (fraction: number) => void): Promise<SceneBody> {
+  const form = new FormData();
+  form.append("scene", upload.scene);
+  if (upload.environment !== null) form.append("environment", upload.environment);
+  form.append("name", upload.name);
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.upload.onprogress = (event) => progress(event.total > 0 ? event.loaded / event.total : 0);
+    request.onload = () => {
+      try {
+        resolve(answer(request));
+      } catch (error) {
+        reject(error as Error);
+      }
+    };
+    request.onerror = () => reject(new ApiError("The upload was interrupted; nothing was imported. Try again.", 0));
+    request.open("POST", "/api/scenes");
+    request.send(form);
+  });
+}

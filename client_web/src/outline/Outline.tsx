@@ -1,0 +1,84 @@
+/** What is in the scene: materials to select, and the environment's brightness. */
+import { toHex } from "../inspector/color";
+import type { MaterialLook } from "../protocol";
+import { edit } from "../state/edit";
+import { select } from "../state/select";
+import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial } from "../state/store";
+import { Slider } from "../ui/Slider";
+
+/** A ball in the material's colours: body from its diffuse term, highlight from the rest. */
+function Swatch({ material }: { material: MaterialLook | undefined }) {
+  const terms = material?.terms ?? [];
+  const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
+  const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
+  const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);
+  const light = glossy === undefined ? body : toHex(glossy.color);
+  return <span class="swatch" style={{ background: `radial-gradient(circle at 35% 30%, ${light} 4%, ${body} 48%, #111 130%)` }} />;
+}
+
+function Materials() {
+  const move = (event: KeyboardEvent) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const items = [...(event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=option]")];
+    items[Math.min(items.length - 1, Math.max(0, items.indexOf(document.activeElement as HTMLElement) + step))]?.focus();
+  };
+  const focusable = selectedMaterial.value ?? materialNames.value[0];
+  return (
+    <div class="materials" role="listbox" aria-label="Materials" onKeyDown={move} onPointerLeave={() => (hoveredMaterial.value = null)}>
+      {materialNames.value.map((name) => {
+        const material = look.value?.materials[name];
+        const changed = look.value !== null && JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
+        return (
+          <button
+            key={name}
+            role="option"
+            tabIndex={name === focusable ? 0 : -1}
+            aria-selected={name === selectedMaterial.value}
+            class={name === hoveredMaterial.value ? "hovered" : ""}
+            onPointerEnter={() => (hoveredMaterial.value = name)}
+            onFocus={(event) => (hoveredMaterial.value = event.currentTarget.matches(":focus-visible") ? name : null)}
+            onBlur={() => (hoveredMaterial.value = null)}
+            onClick={() => select(name)}
+          >
+            <Swatch material={material} />
+            <span class="name" title={name}>
+              {name}
+            </span>
+            {changed && <span class="dot" title="Changed" aria-label="changed" />}
+          </button>
+        );
+      })}
+    </div>
+  );
+}
+
+export function Outline() {
+  return (
+    <nav class="panel outline" aria-label="Scene">
+      <header class="panel-head">
+        <h2>Materials</h2>
+        <span class="count">{materialNames.value.length}</span>
+      </header>
+      <Materials />
+      <header class="panel-head">
+        <h2>Environment</h2>
+      </header>
+      <div class="param">
+        <span class="param-label">Brightness</span>
+        <Slider
+          label="Environment brightness"
+          value={look.value?.environment.scale ?? 1}
+          initial={defaultLook.value?.environment.scale ?? 1}
+          minimum={0.01}
+          maximum={100}
+          scale="log"
+          unit="×"
+          onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
+        />
+      </div>
+    </nav>
+  );
+}

@@ -1,0 +1,68 @@
+/** Under the picture: the probed pixel on the left, zoom on the right. */
+import { drawn, falseColour, look, probe } from "../state/store";
+import { formatNumber } from "../ui/scale";
+import { stage } from "./stage";
+import { toDisplay } from "./tonemap";
+import { zoomActual, zoomBy, zoomFactor, zoomFit } from "./zoom";
+
+function Probe() {
+  drawn.value;
+  const at = probe.value;
+  const radiance = at === null ? null : stage.radiance(at.x, at.y);
+  if (at === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
+  const { exposure, tone_map } = look.value?.display ?? { exposure: 0, tone_map: "agx" };
+  const shown = toDisplay(radiance, exposure, tone_map).map((v) => Math.round(255 * v));
+  const [width, height] = stage.size;
+  const material = stage.material(at.x, at.y);
+  return (
+    <span class="probe">
+      <i class="chip" style={{ background: `rgb(${shown.join(" ")})` }} />
+      <span class="where">
+        {at.x}, {at.y}
+        <small>
+          {" "}
+          of {width}×{height}
+        </small>
+      </span>
+      <span class="linear" title="Linear radiance">
+        {radiance.map((v, c) => (
+          <b key={c} class={["red", "green", "blue"][c]}>
+            {formatNumber(v)}
+          </b>
+        ))}
+      </span>
+      <span class="display" title="After exposure and tone mapping, 0 to 255">
+        {shown.map((v) => String(v).padStart(3, "\u2007")).join(" ")}
+      </span>
+      <span class="material">{material ?? "background"}</span>
+    </span>
+  );
+}
+
+export function PictureBar() {
+  drawn.value;
+  return (
+    <div class="picture-bar">
+      <Probe />
+      <span class="spacer" />
+      <button aria-pressed={falseColour.value} title="Luminance in stops, as colours (E)" onClick={() => (falseColour.value = !falseColour.value)}>
+        False colour
+      </button>
+      <button class="icon" aria-label="Zoom out" title="Zoom out (−)" onClick={() => zoomBy(1 / 1.25)}>
+        −
+      </button>
+      <span class="zoom" aria-live="off">
+        {Math.round(100 * zoomFactor())} %
+      </span>
+      <button class="icon" aria-label="Zoom in" title="Zoom in (+)" onClick={() => zoomBy(1.25)}>
+        +
+      </button>
+      <button title="Fit the picture (F)" onClick={zoomFit}>
+        Fit
+      </button>
+      <button title="One to one (1)" onClick={zoomActual}>
+        1:1
+      </button>
+    </div>
+  );
+}

@@ -1,0 +1,49 @@
+/** The line between A (left) and the live picture (right): drag it, or move it by keys. */
+import { drawn, transform, wipe } from "../state/store";
+import { stage } from "./stage";
+import { shownWidth, toScreen } from "./transform";
+
+const STEP = 0.02;
+
+function moveTo(at: number): void {
+  wipe.value = { on: true, at: Math.min(1, Math.max(0, at)) };
+}
+
+export function WipeHandle() {
+  drawn.value;
+  const canvas = stage.canvasSize();
+  const { at } = wipe.value;
+  const [x] = toScreen(transform.value, canvas, at, 0);
+  const move = (event: PointerEvent) => {
+    const element = event.currentTarget as HTMLElement;
+    if (!element.hasPointerCapture(event.pointerId)) return;
+    moveTo(wipe.peek().at + event.movementX / shownWidth(transform.peek(), canvas));
+  };
+  const key = (event: KeyboardEvent) => {
+    const step = STEP * (event.shiftKey ? 0.1 : 1);
+    const next = { ArrowLeft: at - step, ArrowRight: at + step, Home: 0, End: 1 }[event.key];
+    if (next === undefined) return;
+    moveTo(next);
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  return (
+    <div
+      class="wipe"
+      role="slider"
+      tabIndex={0}
+      aria-label="Wipe between A and the live picture"
+      aria-valuemin={0}
+      aria-valuemax={100}
+      aria-valuenow={Math.round(at * 100)}
+      style={{ left: `${x}px` }}
+      onPointerDown={(event) => event.currentTarget.setPointerCapture(event.pointerId)}
+      onPointerMove={move}
+      onKeyDown={key}
+    >
+      <span class="side a">A</span>
+      <span class="knob" />
+      <span class="side b">B</span>
+    </div>
+  );
+}

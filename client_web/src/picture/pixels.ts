@@ -1,0 +1,64 @@
+/** The picture as the client holds it: RGB9_E5 words, kept so that probes, export, thumbnails and a lost GPU context
+ * need no round trip. */
+import type { Tile } from "../protocol";
+import type { Frame } from "../net/frame";
+import { encodeRgb9e5 } from "./rgb9e5";
+
+export interface Pixels {
+  readonly width: number;
+  readonly height: number;
+  /** Row-major, top row first. */
+  readonly words: Uint32Array;
+}
+
+export function emptyPixels(width: number, height: number): Pixels {
+  return { width, height, words: new Uint32Array(width * height) };
+}
+
+export function copyPixels(pixels: Pixels): Pixels {
+  return { ...pixels, words: pixels.words.slice() };
+}
+
+function copyTile(target: Pixels, tile: Tile, words: Uint32Array): void {
+  const [x, y, w, h] = tile;
+  for (let row = 0; row < h; row++) {
+    target.words.set(words.subarray(row * w, (row + 1) * w), (y + row) * target.width + x);
+  }
+}
+
+function wordsFromFloats(bytes: Uint8Array): Uint32Array {
+  const floats = new Float32Array(bytes.slice().buffer);
+  const words = new Uint32Array(floats.length / 3);
+  for (let i = 0; i < words.length; i++) {
+    words[i] = encodeRgb9e5(floats[3 * i] ?? 0, floats[3 * i + 1] ?? 0, floats[3 * i + 2] ?? 0);
+  }
+  return words;
+}
+
+/** Write a frame's tiles into the picture and return each tile's words, ready for upload. */
+export function applyFrame(target: Pixels, frame: Frame): { tile: Tile; words: Uint32Array }[] {
+  const words =
+    frame.header.format === "f32" ? wordsFromFloats(frame.payload) : new Uint32Array(frame.payload.slice().buffer);
+  let offset = 0;
+  return frame.header.tiles.map((tile) => {
+    const count = tile[2] * tile[3];
+    const part = words.subarray(offset, offset + count);
+    offset += count;
+    copyTile(target, tile, part);
+    return { tile, words: part };
+  });
+}
+
+/** A brush frame (how much of each pixel comes from a stretch of the curve) as one image, 255 = all of it. */
+export function brushImage(frame: Frame): Uint8Array {
+  const { width, height, tiles } = frame.header;
+  const values = new Uint8Array(width * height);
+  let offset = 0;
+  for (const [x, y, w, h] of tiles) {
+    for (let row = 0; row < h; row++) {
+      values.set(frame.payload.subarray(offset, offset + w), (y + row) * width + x);
+      offset += w;
+    }
+  }
+  return values;
+}

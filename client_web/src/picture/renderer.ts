@@ -1,0 +1,123 @@
+/** The WebGL2 side of the picture. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
+import type { Tile } from "../protocol";
+import type { Pixels } from "./pixels";
+import { FRAGMENT, VERTEX } from "./shaders";
+import { allocate, makeProgram, makeTexture } from "./textures";
+
+const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uIds"] as const;
+type Unit = (typeof UNITS)[number];
+const TONE_MAP_INDEX: Record<string, number> = { none: 0, linear: 0, agx: 1, filmic: 2 };
+const NEAREST_FROM = 3;
+
+export interface DrawState {
+  /** Left, top, width, height of the picture in device pixels. */
+  place: [number, number, number, number];
+  exposure: number;
+  toneMap: string;
+  falseColour: boolean;
+  wipe: number;
+  hover: number;
+  brush: boolean;
+  displayReferred: boolean;
+  surround: [number, number, number];
+}
+
+export class Renderer {
+  private readonly gl: WebGL2RenderingContext;
+  private program!: WebGLProgram;
+  private textures!: Record<Unit, WebGLTexture>;
+  private uniforms = new Map<string, WebGLUniformLocation | null>();
+  private size: [number, number] = [1, 1];
+
+  constructor(readonly canvas: HTMLCanvasElement) {
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, desynchronized: true });
+    if (gl === null) throw new Error("This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.");
+    this.gl = gl;
+    this.restore();
+  }
+
+  /** Build everything anew, at the start and after the context was lost. */
+  restore(): void {
+    const { gl } = this;
+    this.program = makeProgram(gl, VERTEX, FRAGMENT);
+    this.uniforms.clear();
+    this.textures = Object.fromEntries(
+      UNITS.map((unit) => [unit, makeTexture(gl, unit === "uIds" ? gl.NEAREST : gl.LINEAR)]),
+    ) as Record<Unit, WebGLTexture>;
+    gl.useProgram(this.program);
+    UNITS.forEach((unit, index) => gl.uniform1i(this.uniform(unit), index));
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
+    this.setBrush(1, 1, new Uint8Array(1));
+    this.setIds(1, 1, new Uint16Array([65535]));
+    this.setDisplay(new ImageData(1, 1));
+  }
+
+  private uniform(name: string): WebGLUniformLocation | null {
+    if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.program, name));
+    return this.uniforms.get(name) ?? null;
+  }
+
+  setPicture(pixels: Pixels): void {
+    this.size = [pixels.width, pixels.height];
+    allocate(this.gl, this.textures.uPicture, pixels.width, pixels.height, pixels.words);
+  }
+
+  setReference(pixels: Pixels): void {
+    allocate(this.gl, this.textures.uReference, pixels.width, pixels.height, pixels.words);
+  }
+
+  uploadTiles(tiles: { tile: Tile; words: Uint32Array }[]): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uPicture);
+    for (const { tile, words } of tiles) {
+      const [x, y, w, h] = tile;
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, w, h, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, words);
+    }
+  }
+
+  setDisplay(image: TexImageSource): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uDisplay);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, image);
+  }
+
+  setBrush(width: number, height: number, values: Uint8Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uBrush);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, width, height, 0, gl.RED, gl.UNSIGNED_BYTE, values);
+  }
+
+  setIds(width: number, height: number, ids: Uint16Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uIds);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R16UI, width, height, 0, gl.RED_INTEGER, gl.UNSIGNED_SHORT, ids);
+  }
+
+  draw(state: DrawState): void {
+    const { gl, canvas } = this;
+    if (gl.isContextLost()) return;
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.useProgram(this.program);
+    const magnified = state.place[2] / this.size[0] >= NEAREST_FROM;
+    UNITS.forEach((unit, index) => {
+      gl.activeTexture(gl.TEXTURE0 + index);
+      gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
+      if (unit === "uPicture" || unit === "uReference") {
+        gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
+      }
+    });
+    gl.uniform2f(this.uniform("uCanvas"), canvas.width, canvas.height);
+    gl.uniform4f(this.uniform("uPlace"), ...state.place);
+    gl.uniform2f(this.uniform("uSize"), ...this.size);
+    gl.uniform1f(this.uniform("uGain"), 2 ** state.exposure);
+    gl.uniform1i(this.uniform("uToneMap"), TONE_MAP_INDEX[state.toneMap] ?? 0);
+    gl.uniform1i(this.uniform("uFalseColour"), Number(state.falseColour));
+    gl.uniform1i(this.uniform("uDisplayReferred"), Number(state.displayReferred));
+    gl.uniform1f(this.uniform("uWipe"), state.wipe);
+    gl.uniform1i(this.uniform("uBrushOn"), Number(state.brush));
+    gl.uniform1i(this.uniform("uHover"), state.hover);
+    gl.uniform3f(this.uniform("uSurround"), ...state.surround);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+}

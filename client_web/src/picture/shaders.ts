@@ -1,0 +1,117 @@
+/** One pass: find the picture's pixel, expose, tone-map, then what is laid over it (brush, outline, wipe). */
+
+export const VERTEX = `#version 300 es
+void main() {
+  vec2 p = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+  gl_Position = vec4(p * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+export const FRAGMENT = `#version 300 es
+precision highp float;
+precision highp usampler2D;
+
+uniform sampler2D uPicture;    // linear radiance
+uniform sampler2D uReference;  // the A side of a comparison, linear radiance
+uniform sampler2D uDisplay;    // an image that the server has tone-mapped already
+uniform sampler2D uBrush;      // 0..1: share of each pixel that a stretch of the curve lights
+uniform usampler2D uIds;       // material of each pixel, 65535 = background
+uniform vec2 uCanvas;          // device pixels
+uniform vec4 uPlace;           // left, top, width, height of the picture, device pixels from the top left
+uniform vec2 uSize;            // pixels of the picture
+uniform float uGain;           // 2^exposure
+uniform int uToneMap;          // 0 none, 1 agx, 2 filmic
+uniform bool uFalseColour;
+uniform bool uDisplayReferred;
+uniform float uWipe;           // picture fraction left of which the reference shows
+uniform bool uBrushOn;
+uniform int uHover;            // material to outline, -1 none
+uniform vec3 uSurround;
+out vec4 outColour;
+
+const vec3 ACCENT = vec3(0.941, 0.706, 0.235);
+
+vec3 srgb(vec3 x) {
+  x = clamp(x, 0.0, 1.0);
+  return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), x));
+}
+
+vec3 agx(vec3 x) {
+  const mat3 inset = mat3(0.842479062253094, 0.0423282422610123, 0.0423756549057051, 0.0784335999999992,
+    0.878468636469772, 0.0784336, 0.0792237451477643, 0.0791661274605434, 0.879142973793104);
+  const mat3 outset = mat3(1.19687900512017, -0.0528968517574562, -0.0529716355144438, -0.0980208811401368,
+    1.15190312990417, -0.0980434501171241, -0.0990297440797205, -0.0989611768448433, 1.15107367264116);
+  x = (clamp(log2(max(inset * x, 1e-10)), -12.47393, 4.026069) + 12.47393) / 16.499999;
+  vec3 x2 = x * x, x4 = x2 * x2;
+  x = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
+  return clamp(outset * x, 0.0, 1.0);
+}
+
+vec3 filmic(vec3 x) {
+  return srgb((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
+}
+
+// luminance in stops about middle grey, one colour for every two stops, black and white at the ends
+vec3 falseColour(vec3 x) {
+  float stops = log2(max(dot(x, vec3(0.2126, 0.7152, 0.0722)), 1e-6) / 0.18);
+  if (stops < -6.0) return vec3(0.02);
+  if (stops < -4.0) return vec3(0.22, 0.10, 0.45);
+  if (stops < -2.0) return vec3(0.12, 0.30, 0.75);
+  if (stops < -0.5) return vec3(0.10, 0.60, 0.65);
+  if (stops < 0.5) return vec3(0.45);
+  if (stops < 2.0) return vec3(0.35, 0.70, 0.25);
+  if (stops < 4.0) return vec3(0.95, 0.80, 0.15);
+  if (stops < 6.0) return vec3(0.90, 0.35, 0.10);
+  return vec3(1.0);
+}
+
+vec3 display(vec3 x) {
+  x *= uGain;
+  if (uFalseColour) return falseColour(x);
+  if (uToneMap == 1) return agx(x);
+  if (uToneMap == 2) return filmic(x);
+  return srgb(x);
+}
+
+// shared exponents cannot be mipmapped: four taps across the footprint when the picture is shrunk
+vec3 shown(vec2 uv, bool reference) {
+  vec2 d = max(vec2(0.0), (uSize / uPlace.zw - 1.0)) * 0.25 / uSize;
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < 4; i++) {
+    vec2 at = uv + d * vec2(float(i & 1) * 2.0 - 1.0, float(i >> 1) * 2.0 - 1.0);
+    sum += reference ? texture(uReference, at).rgb : texture(uPicture, at).rgb;
+  }
+  return display(sum * 0.25);
+}
+
+int idAt(vec2 uv) {
+  ivec2 p = clamp(ivec2(uv * uSize), ivec2(0), ivec2(uSize) - 1);
+  return int(texelFetch(uIds, p, 0).r);
+}
+
+bool outlined(vec2 uv) {
+  bool inside = idAt(uv) == uHover;
+  vec2 d = 1.5 / uPlace.zw;
+  for (int i = 0; i < 4; i++) {
+    vec2 o = i < 2 ? vec2(float(i) * 2.0 - 1.0, 0.0) : vec2(0.0, float(i - 2) * 2.0 - 1.0);
+    if ((idAt(uv + o * d) == uHover) != inside) return true;
+  }
+  return false;
+}
+
+void main() {
+  vec2 screen = vec2(gl_FragCoord.x, uCanvas.y - gl_FragCoord.y);
+  vec2 uv = (screen - uPlace.xy) / uPlace.zw;
+  if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
+    outColour = vec4(uSurround, 1.0);
+    return;
+  }
+  bool reference = uv.x < uWipe;
+  vec3 colour = uDisplayReferred && !reference ? texture(uDisplay, uv).rgb : shown(uv, reference);
+  if (uBrushOn && !reference) {
+    float share = texture(uBrush, uv).r;
+    float grey = dot(colour, vec3(0.2126, 0.7152, 0.0722));
+    colour = mix(vec3(grey * 0.45), ACCENT, sqrt(share) * 0.9);
+  }
+  if (uHover >= 0 && outlined(uv)) colour = ACCENT;
+  outColour = vec4(colour, 1.0);
+}`;

@@ -1,0 +1,85 @@
+/** What the server and the editor say to each other: the generated messages, and the look document they carry. */
+import type * as gen from "./protocol.gen";
+
+export type {
+  BakeBody,
+  BakeMessage,
+  BakeRequest,
+  ClientMessage,
+  CurveMessage,
+  DryRunBody,
+  FrameHeader,
+  HelloMessage,
+  LookEntry,
+  PlanBody,
+  ProbeAnswer,
+  Problem,
+  ProblemMessage,
+  RenderBody,
+  RenderRequest,
+  ServerMessage,
+  StatusMessage,
+} from "./protocol.gen";
+export { MAX_MESSAGE_BYTES, SUBPROTOCOL } from "./protocol.gen";
+
+export type Rgb = [number, number, number];
+export type ParamValue = number | Rgb;
+export type Point = [degrees: number, value: number];
+export type Tile = [x: number, y: number, width: number, height: number];
+export type PatchOp = gen.PatchOperation;
+
+export interface CurveOverride {
+  points?: Point[];
+  bands?: number[] | number[][];
+  channels?: string;
+}
+export type CurveEdits = CurveOverride | CurveOverride[];
+
+export interface Term {
+  model: string;
+  color: Rgb;
+  params?: Record<string, ParamValue>;
+  texture?: string | null;
+  curves?: Record<string, CurveEdits>;
+}
+export interface MaterialLook {
+  terms: Term[];
+}
+export interface Look {
+  materials: Record<string, MaterialLook>;
+  environment: { scale: number; rotation: number };
+  lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
+  display: { exposure: number; tone_map: string };
+}
+
+/** A scene, its default terms in look-document form. */
+export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[] }[] };
+
+/** One entry of `GET /api/models`. */
+export interface ParameterInfo {
+  name: string;
+  label: string;
+  minimum: number;
+  maximum: number;
+  default: number;
+  unit: string;
+  scale: "linear" | "log";
+  help: string;
+}
+export interface CurveInfo {
+  name: string;
+  label: string;
+  angle: string;
+  parameters: string[];
+  bands: number;
+  outgoing: boolean;
+}
+export interface ModelInfo {
+  model: string;
+  label: string;
+  help: string;
+  source: string;
+  texture: string | null;
+  parameters: ParameterInfo[];
+  curves: CurveInfo[];
+}

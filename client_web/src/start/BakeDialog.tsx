@@ -1,0 +1,37 @@
+/** After an import, and on request: what a bake will cost. Not modal: the page stays usable. */
+import { useEffect, useRef } from "preact/hooks";
+import type { SceneBody } from "../protocol";
+import type { Preset } from "../state/open";
+import { IconButton } from "../ui/Button";
+import { PresetList } from "./PresetList";
+
+interface Props {
+  scene: SceneBody;
+  onClose(): void;
+  onOpen(preset: Preset): void;
+}
+
+export function BakeDialog({ scene, onClose, onOpen }: Props) {
+  const panel = useRef<HTMLElement>(null);
+  useEffect(() => {
+    panel.current?.focus();
+    panel.current?.scrollIntoView({ block: "nearest" });
+  }, [scene.id]);
+  return (
+    <section class="bake-dialog" ref={panel} tabIndex={-1} aria-label={`Bake ${scene.name}`} onKeyDown={(event) => event.key === "Escape" && onClose()}>
+      <header class="panel-head">
+        <h2>Bake “{scene.name}”</h2>
+        <IconButton icon="close" label="Close" onClick={onClose} />
+      </header>
+      <p>A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.</p>
+      {scene.warnings.length > 0 && (
+        <ul class="warnings">
+          {scene.warnings.map((warning) => (
+            <li key={warning}>{warning}</li>
+          ))}
+        </ul>
+      )}
+      <PresetList scene={scene.id} action="Open and bake" onChoose={onOpen} />
+    </section>
+  );
+}

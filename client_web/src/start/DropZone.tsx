@@ -1,0 +1,78 @@
+/** Import: drop files anywhere on the page, or choose them; then the upload with its progress. */
+import { useEffect, useState } from "preact/hooks";
+import { uploadScene } from "../net/upload";
+import type { SceneBody } from "../protocol";
+import { attempt, showError } from "../ui/toasts";
+import { sortFiles, type Chosen } from "./files";
+
+const NOTHING: Chosen = { scene: null, environment: null, refused: [] };
+
+function useDrop(take: (files: File[]) => void): boolean {
+  const [over, setOver] = useState(false);
+  useEffect(() => {
+    const drag = (event: DragEvent) => {
+      event.preventDefault();
+      setOver(event.type === "dragover");
+    };
+    const drop = (event: DragEvent) => {
+      event.preventDefault();
+      setOver(false);
+      take([...(event.dataTransfer?.files ?? [])]);
+    };
+    window.addEventListener("dragover", drag);
+    window.addEventListener("dragleave", drag);
+    window.addEventListener("drop", drop);
+    return () => {
+      window.removeEventListener("dragover", drag);
+      window.removeEventListener("dragleave", drag);
+      window.removeEventListener("drop", drop);
+    };
+  });
+  return over;
+}
+
+export function DropZone({ onImported }: { onImported(scene: SceneBody): void }) {
+  const [chosen, setChosen] = useState<Chosen>(NOTHING);
+  const [sent, setSent] = useState<number | null>(null);
+  const take = (files: File[]) => {
+    const next = sortFiles(files, chosen);
+    if (next.refused.length > 0) showError(`${next.refused.join(", ")}: give a scene as .glb and an environment as .hdr or .exr.`);
+    setChosen(next);
+  };
+  const over = useDrop(take);
+  const send = async (scene: File) => {
+    setSent(0);
+    const name = scene.name.replace(/\.glb$/i, "");
+    const imported = await attempt(() => uploadScene({ scene, environment: chosen.environment, name }, setSent));
+    setSent(null);
+    if (imported === undefined) return;
+    setChosen(NOTHING);
+    onImported(imported);
+  };
+  return (
+    <section class={`drop ${over ? "over" : ""}`} aria-label="Import a scene">
+      <p>
+        <b>Drop a .glb and an .hdr anywhere</b>, or{" "}
+        <label class="file">
+          choose files
+          <input type="file" multiple accept=".glb,.hdr,.exr" onChange={(event) => take([...(event.currentTarget.files ?? [])])} />
+        </label>
+        . Without an environment the scene gets a plain sky.
+      </p>
+      <div class="chosen">
+        <span class={chosen.scene ? "" : "quiet"}>Scene: {chosen.scene?.name ?? "none"}</span>
+        <span class={chosen.environment ? "" : "quiet"}>Environment: {chosen.environment?.name ?? "none"}</span>
+        {sent !== null ? (
+          <>
+            <progress max={1} value={sent} aria-label="Upload" />
+            <span>{sent < 1 ? `Sending, ${Math.round(100 * sent)} %` : "The server reads the scene…"}</span>
+          </>
+        ) : (
+          <button class="primary" disabled={chosen.scene === null} onClick={() => chosen.scene && void send(chosen.scene)}>
+            Import
+          </button>
+        )}
+      </div>
+    </section>
+  );
+}

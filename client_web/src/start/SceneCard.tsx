@@ -1,0 +1,44 @@
+import type { SceneBody } from "../protocol";
+import { IconButton } from "../ui/Button";
+import { formatCount } from "../ui/scale";
+
+interface Props {
+  scene: SceneBody;
+  onOpen(): void;
+  onBake(): void;
+  onDelete(): void;
+}
+
+/** One scene: its picture opens it. */
+export function SceneCard({ scene, onOpen, onBake, onDelete }: Props) {
+  const baked = scene.bakes.length > 0;
+  return (
+    <li class="scene-card">
+      <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
+        {scene.thumbnail === null ? <span class="no-picture">{baked ? "bake under way" : "not baked yet"}</span> : <img src={scene.thumbnail} alt="" loading="lazy" />}
+      </button>
+      <div class="scene-text">
+        <b title={scene.name}>{scene.name}</b>
+        <small>
+          {formatCount(scene.triangles)} triangles · {scene.materials.length} materials · {scene.views.length} {scene.views.length === 1 ? "view" : "views"}
+        </small>
+        {scene.warnings.length > 0 && (
+          <details>
+            <summary>
+              {scene.warnings.length} {scene.warnings.length === 1 ? "thing was" : "things were"} not understood
+            </summary>
+            <ul>
+              {scene.warnings.map((warning) => (
+                <li key={warning}>{warning}</li>
+              ))}
+            </ul>
+          </details>
+        )}
+      </div>
+      <div class="scene-actions">
+        <button onClick={onBake}>Bake…</button>
+        <IconButton icon="trash" label={`Delete ${scene.name}`} onClick={onDelete} />
+      </div>
+    </li>
+  );
+}

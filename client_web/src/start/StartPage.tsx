@@ -1,0 +1,48 @@
+/** Scenes as cards; drop a scene and an environment anywhere. */
+import { useEffect, useState } from "preact/hooks";
+import { deleteScene, listScenes } from "../net/api";
+import type { SceneBody } from "../protocol";
+import { openScene, type Preset } from "../state/open";
+import { attempt, note } from "../ui/toasts";
+import { BakeDialog } from "./BakeDialog";
+import { DropZone } from "./DropZone";
+import { SceneCard } from "./SceneCard";
+
+function open(scene: SceneBody, preset?: Preset): void {
+  window.history.pushState(null, "", `?scene=${encodeURIComponent(scene.id)}`);
+  void openScene(scene.id, undefined, preset);
+}
+
+export function StartPage() {
+  const [scenes, setScenes] = useState<SceneBody[] | null>(null);
+  const [planned, setPlanned] = useState<SceneBody | null>(null);
+  const refresh = () => attempt(async () => setScenes(await listScenes()));
+  useEffect(() => void refresh(), []);
+  const imported = (scene: SceneBody) => {
+    setPlanned(scene);
+    void refresh();
+  };
+  const remove = (scene: SceneBody) =>
+    note(`Delete “${scene.name}” with its bakes? This cannot be undone.`, {
+      label: "Delete",
+      run: () => void attempt(() => deleteScene(scene.id)).then(refresh),
+    });
+  return (
+    <main class="start">
+      <header>
+        <h1>relume</h1>
+        <p>Edit materials in the finished picture, with its real shadows, while you drag a curve.</p>
+      </header>
+      <DropZone onImported={imported} />
+      {planned !== null && <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(preset) => open(planned, preset)} />}
+      <h2>Scenes</h2>
+      {scenes === null && <p class="quiet">Looking for scenes…</p>}
+      {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop a .glb above, or run the demo.</p>}
+      <ul class="cards">
+        {scenes?.map((scene) => (
+          <SceneCard key={scene.id} scene={scene} onOpen={() => open(scene)} onBake={() => setPlanned(scene)} onDelete={() => remove(scene)} />
+        ))}
+      </ul>
+    </main>
+  );
+}

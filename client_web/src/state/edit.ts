@@ -1,0 +1,44 @@
+/** The one way to change the look: an undoable operation, and the newest look to the server. */
+import type { Look } from "../protocol";
+import { getAt, setAt } from "./pointer";
+import { history, look } from "./store";
+
+type Listener = (look: Look, inputTime: number) => void;
+let listener: Listener = () => undefined;
+
+/** Who takes the looks to the server. */
+export function onLook(take: Listener): void {
+  listener = take;
+}
+
+/** When the hand moved, on the clock of performance.now; inside an event handler the event's own time. */
+export function inputNow(): number {
+  const event = window.event;
+  return event !== undefined && event.timeStamp > 0 ? event.timeStamp : performance.now();
+}
+
+export function showLook(next: Look): void {
+  look.value = next;
+  listener(next, inputNow());
+}
+
+/** Replace the whole look as one step of the history. */
+export function commit(label: string, next: Look, key?: string): void {
+  const before = look.value;
+  if (before === null || next === before) return;
+  showLook(next);
+  history.record({
+    label,
+    ...(key === undefined ? {} : { key }),
+    before,
+    after: next,
+    redo: () => showLook(next),
+    undo: () => showLook(before),
+  });
+}
+
+/** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */
+export function edit(label: string, path: string, value: unknown): void {
+  if (look.value === null || getAt(look.value, path) === value) return;
+  commit(label, setAt(look.value, path, value), path);
+}

@@ -1,0 +1,115 @@
+/** Opening a scene: the finest bake there is, or a preview at once and the full bake behind it. */
+import * as api from "../net/api";
+import { bakeEnd, followBake } from "../net/events";
+import { FIT } from "../picture/transform";
+import { stage } from "../picture/stage";
+import type { BakeBody, SceneBody } from "../protocol";
+import { attempt, showError } from "../ui/toasts";
+import { connect, disconnect, whenBakeIsReady } from "./live";
+import { placeFromUrl, recall, type Place } from "./place";
+import * as store from "./store";
+
+export type Preset = "preview" | "good" | "final";
+
+let stopFollowing: () => void = () => undefined;
+
+function pixels(bake: BakeBody): number {
+  return bake.recipe.size[0] * bake.recipe.size[1] * bake.recipe.lights;
+}
+
+/** A scene's bakes, finest first. */
+export async function bakesOf(scene: SceneBody): Promise<BakeBody[]> {
+  const bakes = await api.bakesOfScene(scene.id);
+  return bakes.sort((a, b) => pixels(b) - pixels(a));
+}
+
+function reset(scene: SceneBody): void {
+  disconnect();
+  stopFollowing();
+  stage.clear();
+  store.history.clear();
+  store.scene.value = scene;
+  store.look.value = store.defaultLook.value = null;
+  store.bake.value = store.coming.value = null;
+  store.selectedMaterial.value = store.selectedCurve.value = null;
+  store.transform.value = FIT;
+  store.connection.value = "connecting";
+  store.freezing.value = null;
+  store.page.value = "editor";
+}
+
+function restorePlace(scene: SceneBody, place: Place): string | null {
+  const kept = recall(scene.id);
+  if (kept !== null) {
+    store.look.value = kept.look;
+    store.transform.value = kept.transform;
+  }
+  store.viewName.value = place.view ?? scene.views[0]?.name ?? "";
+  if (scene.materials.some((material) => material.name === place.material)) {
+    store.selectedMaterial.value = place.material;
+    store.selectedTerm.value = place.term;
+    store.selectedCurve.value = place.curve;
+  }
+  return kept !== null && kept.bake === place.bake ? kept.token : null;
+}
+
+/** Follow a bake that is meant to replace the one shown. */
+export function follow(bake: BakeBody): void {
+  stopFollowing();
+  store.coming.value = bake;
+  stopFollowing = followBake(bake.id, (news) => {
+    store.coming.value = news;
+    if (news.state === "ready") swapTo(news.id);
+    if (news.state === "failed") showError(`The bake failed: ${api.problemText(news.problem)} The picture stays as it is.`);
+  });
+}
+
+/** Open a session on a finer bake once; it takes over when its first picture is there. */
+function swapTo(bake: string): void {
+  if (store.page.peek() !== "editor" || bake === store.bake.peek() || bake === swapping) return;
+  swapping = bake;
+  connect(bake);
+}
+let swapping: string | null = null;
+whenBakeIsReady(swapTo);
+
+async function bakePreview(scene: SceneBody): Promise<string | null> {
+  const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview" });
+  store.coming.value = preview;
+  const end = preview.state === "ready" ? preview : await bakeEnd(preview.id, (news) => (store.coming.value = news));
+  if (end.state === "ready") return end.id;
+  throw new api.ApiError(`The preview could not be baked: ${api.problemText(end.problem, end.state)}`, 0);
+}
+
+/** Bake a scene at a preset and take the result over when it is ready. */
+export async function startFullBake(scene: SceneBody, preset: Preset): Promise<void> {
+  const full = await api.startBake({ scene: scene.id, method: "direct", preset });
+  if (full.state === "ready") swapTo(full.id);
+  else follow(full);
+}
+
+export async function openScene(id: string, place: Place = placeFromUrl(`?scene=${id}`), preset?: Preset): Promise<void> {
+  await attempt(async () => {
+    const [scene, models] = await Promise.all([api.getScene(id), api.listModels()]);
+    store.models.value = models;
+    reset(scene);
+    swapping = null;
+    const token = restorePlace(scene, place);
+    const bakes = await bakesOf(scene);
+    store.bakes.value = bakes;
+    const ready = bakes.filter((bake) => bake.state === "ready");
+    const shown = ready.find((bake) => bake.id === place.bake) ?? ready[0];
+    const running = bakes.find((bake) => bake.state === "running" || bake.state === "queued");
+    connect(shown?.id ?? ((await bakePreview(scene)) as string), token);
+    if (preset !== undefined) await startFullBake(scene, preset);
+    else if (running !== undefined) follow(running);
+    else if (shown === undefined) await startFullBake(scene, "good");
+  });
+}
+
+export function leave(): void {
+  disconnect();
+  stopFollowing();
+  store.page.value = "start";
+  window.history.pushState(null, "", "/");
+}

@@ -1,0 +1,36 @@
+/** How long it takes from the hand to the picture, for the status bar and for benchmarks (`window.relumeStats`). */
+import { latencyMs } from "./store";
+
+export interface Latency {
+  revision: number;
+  /** Both on the clock of performance.now, milliseconds. */
+  inputTime: number;
+  drawnTime: number;
+}
+
+const MAX_KEPT = 1000;
+const waiting: { revision: number; inputTime: number }[] = [];
+const latencies: Latency[] = [];
+
+declare global {
+  interface Window {
+    relumeStats: { latencies: Latency[] };
+  }
+}
+window.relumeStats = { latencies };
+
+export function editSent(revision: number, inputTime: number): void {
+  waiting.push({ revision, inputTime });
+  if (waiting.length > MAX_KEPT) waiting.shift();
+}
+
+/** A frame of this revision is on the canvas. */
+export function frameDrawn(revision: number): void {
+  const drawnTime = performance.now();
+  while (waiting[0] !== undefined && waiting[0].revision <= revision) {
+    const { revision: sent, inputTime } = waiting.shift() as { revision: number; inputTime: number };
+    latencies.push({ revision: sent, inputTime, drawnTime });
+    if (latencies.length > MAX_KEPT) latencies.shift();
+    if (waiting[0] === undefined || waiting[0].revision > revision) latencyMs.value = drawnTime - inputTime;
+  }
+}

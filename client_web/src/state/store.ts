@@ -1,0 +1,70 @@
+/** What the editor knows, as signals. Functions that change it live beside it, one concern per file. */
+import { computed, signal } from "@preact/signals";
+import type { Connection } from "../net/session";
+import { FIT, type Transform } from "../picture/transform";
+import type { BakeBody, CurveMessage, HelloMessage, Look, ModelInfo, ProbeAnswer, SceneBody, Term } from "../protocol";
+import { History } from "./history";
+import { pointer } from "./pointer";
+
+export const page = signal<"start" | "editor">("start");
+export const models = signal<ModelInfo[]>([]);
+export const scene = signal<SceneBody | null>(null);
+
+/** The bake that the picture shows, and one that is on its way. */
+export const bake = signal<string | null>(null);
+export const coming = signal<Pick<BakeBody, "id" | "state" | "progress" | "seconds_left" | "problem"> | null>(null);
+export const bakes = signal<BakeBody[]>([]);
+
+export const views = signal<HelloMessage["views"]>([]);
+export const viewName = signal("");
+export const view = computed(() => views.value.find((v) => v.name === viewName.value) ?? null);
+
+export const look = signal<Look | null>(null);
+/** The scene's own look, for resets. */
+export const defaultLook = signal<Look | null>(null);
+export const history = new History();
+
+export const selectedMaterial = signal<string | null>(null);
+export const selectedTerm = signal(0);
+export const selectedCurve = signal<string | null>(null);
+export const hoveredMaterial = signal<string | null>(null);
+export const materialNames = computed(() => scene.value?.materials.map((m) => m.name) ?? []);
+
+export const terms = computed<Term[]>(() => {
+  const name = selectedMaterial.value;
+  return name === null ? [] : (look.value?.materials[name]?.terms ?? []);
+});
+
+/** Pointer of the curve that is open, null where none is. */
+export const curvePath = computed(() => {
+  const [material, curve] = [selectedMaterial.value, selectedCurve.value];
+  if (material === null || curve === null || terms.value[selectedTerm.value] === undefined) return null;
+  return pointer("materials", material, "terms", selectedTerm.value, "curves", curve);
+});
+export const curveShape = signal<CurveMessage | null>(null);
+/** A stretch of the open curve whose pixels are tinted, degrees. */
+export const brushed = signal<[from: number, to: number] | null>(null);
+
+export const transform = signal<Transform>(FIT);
+export const falseColour = signal(false);
+export const wipe = signal<{ on: boolean; at: number }>({ on: false, at: 0.5 });
+export const showBefore = signal(false);
+export const probe = signal<{ x: number; y: number; answer: ProbeAnswer | null } | null>(null);
+
+export const connection = signal<Connection>("connecting");
+export const retryInMs = signal(0);
+export const freezing = signal<{ what: string; progress: number } | null>(null);
+export const exact = signal(false);
+export const latencyMs = signal<number | null>(null);
+/** Counts up with every frame that is drawn. */
+export const drawn = signal(0);
+
+export const outlineOpen = signal(true);
+export const inspectorOpen = signal(true);
+export const filmstripOpen = signal(true);
+export const inspectorWidth = signal(320);
+export const helpOpen = signal(false);
+
+export function modelOf(term: Term): ModelInfo | undefined {
+  return models.value.find((model) => model.model === term.model);
+}

@@ -1,0 +1,31 @@
+import type { ComponentChildren } from "preact";
+import { Icon, type IconName } from "./Icon";
+
+interface IconButtonProps {
+  icon: IconName;
+  /** Said by screen readers and shown as tooltip. */
+  label: string;
+  keys?: string;
+  pressed?: boolean;
+  disabled?: boolean;
+  onClick(): void;
+  children?: ComponentChildren;
+}
+
+/** A small button with an icon and, where there are children, words beside it. */
+export function IconButton({ icon, label, keys, pressed, disabled, onClick, children }: IconButtonProps) {
+  return (
+    <button
+      type="button"
+      class={children === undefined ? "icon" : ""}
+      title={keys === undefined ? label : `${label} (${keys})`}
+      aria-label={children === undefined ? label : undefined}
+      aria-pressed={pressed}
+      disabled={disabled}
+      onClick={onClick}
+    >
+      <Icon name={icon} />
+      {children}
+    </button>
+  );
+}

@@ -1,0 +1,29 @@
+/** The editor's layout: what stands where. Everything but the picture collapses. */
+import { Filmstrip } from "../looks/Filmstrip";
+import { Inspector } from "../inspector/Inspector";
+import { Outline } from "../outline/Outline";
+import { PictureView } from "../picture/PictureView";
+import { filmstripOpen, helpOpen, inspectorOpen, inspectorWidth, outlineOpen } from "../state/store";
+import { Help } from "./Help";
+import { Splitter } from "./Splitter";
+import { StatusBar } from "./StatusBar";
+import { TopBar } from "./TopBar";
+import { useKeyboard } from "./keyboard";
+
+export function Editor() {
+  useKeyboard();
+  return (
+    <div class="editor" style={{ "--inspector": `${inspectorWidth.value}px` }}>
+      <TopBar />
+      <div class="middle">
+        {outlineOpen.value && <Outline />}
+        <PictureView />
+        {inspectorOpen.value && <Splitter />}
+        {inspectorOpen.value && <Inspector />}
+      </div>
+      {filmstripOpen.value && <Filmstrip />}
+      <StatusBar />
+      {helpOpen.value && <Help />}
+    </div>
+  );
+}

@@ -1,0 +1,108 @@
+/** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset. */
+import { useRef, useState } from "preact/hooks";
+import { NumberField } from "./NumberField";
+import { formatNumber, fromFraction, toFraction, type Range } from "./scale";
+
+interface Props extends Range {
+  label: string;
+  value: number;
+  unit?: string;
+  initial?: number;
+  tint?: string;
+  onChange(value: number): void;
+}
+
+const FINE = 0.1;
+const STEPS: Record<string, number> = {
+  ArrowLeft: -0.01,
+  ArrowDown: -0.01,
+  ArrowRight: 0.01,
+  ArrowUp: 0.01,
+  PageDown: -0.1,
+  PageUp: 0.1,
+};
+
+export function Slider(props: Props) {
+  const { label, value, unit = "", initial, tint, onChange } = props;
+  const track = useRef<HTMLDivElement>(null);
+  const drag = useRef({ x: 0, at: 0, before: value });
+  const [typing, setTyping] = useState(false);
+  const at = toFraction(props, value);
+
+  const set = (fraction: number) => {
+    drag.current.at = Math.min(1, Math.max(0, fraction));
+    onChange(fromFraction(props, fraction));
+  };
+  const down = (event: PointerEvent) => {
+    const element = track.current as HTMLDivElement;
+    if (event.button !== 0) return;
+    if ((event.ctrlKey || event.altKey || event.metaKey) && initial !== undefined) return onChange(initial);
+    element.setPointerCapture(event.pointerId);
+    const box = element.getBoundingClientRect();
+    const clicked = (event.clientX - box.left) / box.width;
+    drag.current = { x: event.clientX, at, before: event.detail < 2 ? value : drag.current.before };
+    if (Math.abs(clicked - at) * box.width > 7) set(clicked);
+  };
+  const move = (event: PointerEvent) => {
+    const element = track.current as HTMLDivElement;
+    if (!element.hasPointerCapture(event.pointerId)) return;
+    const dx = (event.clientX - drag.current.x) / element.clientWidth;
+    drag.current.x = event.clientX;
+    if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
+  };
+  const key = (event: KeyboardEvent) => {
+    const step = STEPS[event.key];
+    if (step !== undefined) set(at + step * (event.shiftKey ? FINE : 1));
+    else if (event.key === "Home") set(0);
+    else if (event.key === "End") set(1);
+    else if (event.key === "Enter") setTyping(true);
+    else if ((event.key === "Delete" || event.key === "Backspace") && initial !== undefined) onChange(initial);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const shown = `${formatNumber(value)}${unit === "" ? "" : ` ${unit}`}`;
+  return (
+    <div class="slider">
+      <div
+        ref={track}
+        class="track"
+        role="slider"
+        tabIndex={0}
+        aria-label={label}
+        aria-valuemin={props.minimum}
+        aria-valuemax={props.maximum}
+        aria-valuenow={value}
+        aria-valuetext={shown}
+        style={{ "--at": at, ...(tint === undefined ? {} : { "--tint": tint }) }}
+        onPointerDown={down}
+        onPointerMove={move}
+        onKeyDown={key}
+        onDblClick={() => {
+          onChange(drag.current.before);
+          setTyping(true);
+        }}
+      >
+        <span class="fill" />
+        <span class="thumb" />
+        {initial !== undefined && <span class="initial" style={{ left: `${toFraction(props, initial) * 100}%` }} />}
+      </div>
+      {typing ? (
+        <NumberField
+          value={value}
+          label={`${label}, as a number`}
+          minimum={props.minimum}
+          maximum={props.maximum}
+          step={(props.maximum - props.minimum) / 100}
+          autoFocus
+          onChange={onChange}
+          onDone={() => setTyping(false)}
+        />
+      ) : (
+        <button class="value" title="Type a number" aria-label={`${label}: ${shown}; type a number`} onClick={() => setTyping(true)}>
+          {shown}
+        </button>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,74 @@
+/** What is going on, in words: connection, latency, exactness, freezing, bakes, memory. */
+import { useComputed } from "@preact/signals";
+import { cancelBake } from "../net/api";
+import { reconnectNow } from "../state/live";
+import { useMemory } from "../state/memory";
+import { coming, connection, exact, freezing, latencyMs, look, retryInMs } from "../state/store";
+import { formatBytes, formatSeconds } from "./scale";
+import { attempt } from "./toasts";
+
+function connectionWords(): string {
+  switch (connection.value) {
+    case "open":
+      return "Connected";
+    case "connecting":
+      return "Connecting…";
+    case "reconnecting":
+      return retryInMs.value > 0 ? `Connection lost. Edits are kept; trying again in ${formatSeconds(retryInMs.value / 1000)}` : "Reconnecting…";
+    case "closed":
+      return "Not connected";
+  }
+}
+
+function pictureWords(): string {
+  if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
+  if (look.value === null || connection.value !== "open") return "";
+  return exact.value ? "exact ✓" : "refining…";
+}
+
+function bakeWords(): string {
+  const next = coming.value;
+  if (next === null) return "";
+  if (next.state === "queued") return "Bake waits for its turn";
+  if (next.state === "failed") return "Bake failed";
+  if (next.state === "cancelled") return "Bake cancelled";
+  const left = next.seconds_left === null ? "" : `, ${formatSeconds(next.seconds_left)} left`;
+  return next.state === "ready" ? "Bake ready, opening" : `Baking ${Math.round(100 * next.progress)} %${left}`;
+}
+
+export function StatusBar() {
+  const memory = useMemory();
+  // announced: only what changes seldom, without the numbers that run
+  const announced = useComputed(() => [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords()].filter(Boolean).join(". "));
+  const running = coming.value !== null && (coming.value.state === "running" || coming.value.state === "queued");
+  return (
+    <footer class="status">
+      <span class={`state ${connection.value}`}>
+        <i class="lamp" aria-hidden="true" />
+        {connectionWords()}
+        {connection.value === "reconnecting" && retryInMs.value > 0 && <button onClick={reconnectNow}>Now</button>}
+      </span>
+      <span class="latency" title="From the hand to the drawn frame">
+        edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
+      </span>
+      <span class={`exactness ${exact.value ? "is-exact" : ""}`}>{pictureWords()}</span>
+      {freezing.value !== null && <progress max={1} value={freezing.value.progress} aria-label={pictureWords()} />}
+      <span class="spacer" />
+      {coming.value !== null && (
+        <span class="bake">
+          {bakeWords()}
+          {running && (
+            <>
+              <progress max={1} value={coming.value.progress} aria-label="Bake" />
+              <button onClick={() => coming.value && void attempt(() => cancelBake(coming.value?.id ?? ""))}>Cancel</button>
+            </>
+          )}
+        </span>
+      )}
+      {memory !== null && <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>}
+      <span class="announce" role="status" aria-live="polite">
+        {announced.value}
+      </span>
+    </footer>
+  );
+}

@@ -1,0 +1,118 @@
+/** Scene, views, undo, comparison, display, export. */
+import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
+import { exportExr, exportPng, share } from "../looks/export";
+import { TONE_MAPS } from "../picture/tonemap";
+import { edit } from "../state/edit";
+import { chooseView } from "../state/live";
+import { leave } from "../state/open";
+import { filmstripOpen, helpOpen, history, inspectorOpen, look, outlineOpen, scene, showBefore, viewName, views, wipe } from "../state/store";
+import { IconButton } from "./Button";
+import { BakeMenu } from "./BakeMenu";
+import { Slider } from "./Slider";
+
+function Views() {
+  if (views.value.length < 2) return null;
+  return (
+    <div class="group" role="group" aria-label="Views">
+      {views.value.map((view) => (
+        <button key={view.name} aria-pressed={view.name === viewName.value} onClick={() => chooseView(view.name)}>
+          {view.name}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+function Compare() {
+  const none = sideA.value === null;
+  const label = none ? "nothing yet" : (sideA.value?.label ?? "");
+  return (
+    <div class="group" role="group" aria-label="Compare">
+      <button class="letter" title={`Keep this picture as A (A). A is: ${label}`} onClick={markA}>
+        A
+      </button>
+      <IconButton icon="wipe" label="Wipe between A and the live picture" keys="W" pressed={wipe.value.on} disabled={none} onClick={toggleWipe} />
+      <button
+        title="Show A while held (B)"
+        aria-pressed={showBefore.value}
+        disabled={none}
+        onPointerDown={() => (showBefore.value = true)}
+        onPointerUp={() => (showBefore.value = false)}
+        onPointerLeave={() => (showBefore.value = false)}
+        onKeyDown={(event) => (event.key === " " || event.key === "Enter") && (showBefore.value = true)}
+        onKeyUp={() => (showBefore.value = false)}
+        onBlur={() => (showBefore.value = false)}
+      >
+        Before
+      </button>
+      <button title="Swap A and the live look (X)" disabled={none} onClick={swapA}>
+        Swap
+      </button>
+    </div>
+  );
+}
+
+function Display() {
+  const display = look.value?.display ?? { exposure: 0, tone_map: "agx" };
+  return (
+    <div class="display-controls">
+      <span class="label">Exposure</span>
+      <Slider
+        label="Exposure"
+        value={display.exposure}
+        initial={0}
+        minimum={-8}
+        maximum={8}
+        scale="linear"
+        unit="EV"
+        onChange={(value) => edit("Exposure", "/display/exposure", value)}
+      />
+      <select aria-label="Tone map" title="Tone map" value={display.tone_map} onChange={(event) => edit("Tone map", "/display/tone_map", event.currentTarget.value)}>
+        {TONE_MAPS.map(({ name, label }) => (
+          <option key={name} value={name}>
+            {label}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
+
+function Panels() {
+  return (
+    <div class="group" role="group" aria-label="Panels">
+      <IconButton icon="left" label="Scene panel" pressed={outlineOpen.value} onClick={() => (outlineOpen.value = !outlineOpen.value)} />
+      <IconButton icon="bottom" label="Looks" pressed={filmstripOpen.value} onClick={() => (filmstripOpen.value = !filmstripOpen.value)} />
+      <IconButton icon="right" label="Inspector" pressed={inspectorOpen.value} onClick={() => (inspectorOpen.value = !inspectorOpen.value)} />
+    </div>
+  );
+}
+
+export function TopBar() {
+  return (
+    <header class="top-bar">
+      <IconButton icon="back" label="All scenes" onClick={leave} />
+      <h1 title={scene.value?.name}>{scene.value?.name ?? "…"}</h1>
+      <BakeMenu />
+      <Views />
+      <div class="group" role="group" aria-label="History">
+        <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={() => void history.undo()} />
+        <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={() => void history.redo()} />
+      </div>
+      <Compare />
+      <span class="spacer" />
+      <Display />
+      <div class="group" role="group" aria-label="Export">
+        <button title="Export as displayed (Ctrl+Shift+S)" onClick={() => void exportPng()}>
+          PNG
+        </button>
+        <button title="Export linear radiance" onClick={() => void exportExr()}>
+          EXR
+        </button>
+      </div>
+      <IconButton icon="share" label="Copy the address" onClick={() => void share()} />
+      <Panels />
+      <IconButton icon="help" label="Keyboard map" keys="?" pressed={helpOpen.value} onClick={() => (helpOpen.value = !helpOpen.value)} />
+    </header>
+  );
+}

@@ -1,0 +1,79 @@
+/** Everything that has a key: the keyboard and the help page read the same list. */
+import { exportPng } from "../looks/export";
+import { markA, saveLook, swapA, toggleWipe } from "../looks/compare";
+import { logarithmic, tool } from "../curve/settings";
+import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
+import { edit } from "../state/edit";
+import { falseColour, filmstripOpen, helpOpen, history, inspectorOpen, look, outlineOpen, showBefore, wipe } from "../state/store";
+
+export interface Action {
+  group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";
+  label: string;
+  /** `KeyboardEvent.key`, with "Ctrl+" and "Shift+" in front where they matter. */
+  keys: string[];
+  run(): void;
+  /** For keys that act while they are held. */
+  release?(): void;
+}
+
+const THIRD = 1 / 3;
+
+function expose(stops: number): void {
+  const now = look.value?.display.exposure ?? 0;
+  edit("Exposure", "/display/exposure", Number((now + stops).toFixed(3)));
+}
+
+function moveWipe(by: number): void {
+  if (wipe.value.on) wipe.value = { on: true, at: Math.min(1, Math.max(0, wipe.value.at + by)) };
+}
+
+function togglePanels(): void {
+  const open = !(outlineOpen.value || inspectorOpen.value || filmstripOpen.value);
+  outlineOpen.value = inspectorOpen.value = filmstripOpen.value = open;
+}
+
+export const ACTIONS: readonly Action[] = [
+  { group: "Picture", label: "Zoom in", keys: ["+", "="], run: () => zoomBy(1.25) },
+  { group: "Picture", label: "Zoom out", keys: ["-"], run: () => zoomBy(1 / 1.25) },
+  { group: "Picture", label: "Fit", keys: ["f"], run: zoomFit },
+  { group: "Picture", label: "One to one", keys: ["1"], run: zoomActual },
+  { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
+  { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => expose(-THIRD) },
+  { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => expose(THIRD) },
+  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: () => void history.undo() },
+  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: () => void history.redo() },
+  { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
+  { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
+  { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: markA },
+  { group: "Compare", label: "Swap A and the live look", keys: ["x"], run: swapA },
+  { group: "Compare", label: "Wipe between A and live", keys: ["w"], run: toggleWipe },
+  { group: "Compare", label: "Move the wipe", keys: ["[", "]"], run: () => undefined },
+  {
+    group: "Compare",
+    label: "Show A while held",
+    keys: ["b"],
+    run: () => (showBefore.value = true),
+    release: () => (showBefore.value = false),
+  },
+  { group: "Curve", label: "Points", keys: ["p"], run: () => (tool.value = "points") },
+  { group: "Curve", label: "Draw", keys: ["d"], run: () => (tool.value = "draw") },
+  { group: "Curve", label: "Scale and shift a stretch", keys: ["s"], run: () => (tool.value = "stretch") },
+  { group: "Curve", label: "Logarithmic values", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
+  { group: "Panels", label: "Only the picture", keys: ["\\"], run: togglePanels },
+  { group: "Panels", label: "These keys", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
+];
+
+/** Keys of controls that have the focus; listed, handled where they belong. */
+export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
+  ["Slider: step, large step, ends", "← →  Page  Home End"],
+  ["Slider: fine steps, type, reset", "Shift  Enter  Delete"],
+  ["Curve point: move, fine", "← → ↑ ↓  Shift"],
+  ["Curve point: pick up and put down", "Enter, click"],
+  ["Curve point: delete, reset", "Delete  R"],
+  ["Stretch: scale, shift", "↑ ↓  ← →"],
+  ["Picture: pan", "← → ↑ ↓"],
+];
+
+export function onWipeKey(key: string): void {
+  moveWipe(key === "[" ? -0.02 : 0.02);
+}

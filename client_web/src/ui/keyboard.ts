@@ -1,0 +1,49 @@
+/** Keys of the whole page; controls that have the focus take theirs first. */
+import { useEffect } from "preact/hooks";
+import { helpOpen } from "../state/store";
+import { ACTIONS, onWipeKey, type Action } from "./actions";
+
+/** "Ctrl+Shift+z" of an event; Shift is only named beside Ctrl, as it decides which character a key is. */
+export function chord(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  if (!event.ctrlKey && !event.metaKey) return key;
+  return `Ctrl+${event.shiftKey ? "Shift+" : ""}${key}`;
+}
+
+function typing(target: EventTarget | null): boolean {
+  return target instanceof HTMLElement && target.matches("input:not([type=color]), textarea, select, [contenteditable]");
+}
+
+function actionOf(event: KeyboardEvent): Action | undefined {
+  return ACTIONS.find((action) => action.keys.includes(chord(event)));
+}
+
+function down(event: KeyboardEvent): void {
+  if (event.defaultPrevented || event.altKey) return;
+  if (event.key === "Escape" && helpOpen.value) helpOpen.value = false;
+  const action = actionOf(event);
+  if (action === undefined || (typing(event.target) && !event.ctrlKey && !event.metaKey)) return;
+  // in a field, undo is the field's own
+  if (typing(event.target) && /z|y/.test(event.key)) return;
+  event.preventDefault();
+  if (event.key === "[" || event.key === "]") onWipeKey(event.key);
+  else if (!(event.repeat && action.release !== undefined)) action.run();
+}
+
+function up(event: KeyboardEvent): void {
+  for (const action of ACTIONS) if (action.keys.includes(event.key.toLowerCase())) action.release?.();
+}
+
+export function useKeyboard(): void {
+  useEffect(() => {
+    const release = () => ACTIONS.forEach((action) => action.release?.());
+    window.addEventListener("keydown", down);
+    window.addEventListener("keyup", up);
+    window.addEventListener("blur", release);
+    return () => {
+      window.removeEventListener("keydown", down);
+      window.removeEventListener("keyup", up);
+      window.removeEventListener("blur", release);
+    };
+  }, []);
+}

@@ -1,0 +1,78 @@
+/** How a slider's way maps to its value, and how numbers are written. */
+
+export interface Range {
+  minimum: number;
+  maximum: number;
+  scale: "linear" | "log";
+}
+
+function isLog(range: Range): boolean {
+  return range.scale === "log" && range.minimum > 0;
+}
+
+export function clampTo(range: Range, value: number): number {
+  return Math.min(range.maximum, Math.max(range.minimum, value));
+}
+
+/** Position 0…1 of a value on its slider. */
+export function toFraction(range: Range, value: number): number {
+  const { minimum, maximum } = range;
+  const v = clampTo(range, value);
+  if (isLog(range)) return Math.log(v / minimum) / Math.log(maximum / minimum);
+  return maximum > minimum ? (v - minimum) / (maximum - minimum) : 0;
+}
+
+/** Value at a position, rounded to three significant digits of the slider's own resolution. */
+export function fromFraction(range: Range, fraction: number): number {
+  const t = Math.min(1, Math.max(0, fraction));
+  const { minimum, maximum } = range;
+  const value = isLog(range) ? minimum * (maximum / minimum) ** t : minimum + (maximum - minimum) * t;
+  return clampTo(range, tidy(value, isLog(range) ? value : maximum - minimum));
+}
+
+/** Round to a thousandth of `span`, to a power of ten. */
+function tidy(value: number, span: number): number {
+  if (!(span > 0)) return value;
+  const step = 10 ** (Math.floor(Math.log10(span)) - 3);
+  return Number((Math.round(value / step) * step).toPrecision(12));
+}
+
+/** A number as people read it: four significant digits, no trailing noise. */
+export function formatNumber(value: number): string {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-4) return value.toExponential(2).replace("e+", "e");
+  if (size >= 1000) return value.toFixed(0);
+  if (size >= 100) return value.toFixed(1);
+  if (size >= 10) return value.toFixed(2);
+  return value.toFixed(3);
+}
+
+/** A number that somebody typed, with point or comma; null where it is none. */
+export function parseNumber(text: string): number | null {
+  const cleaned = text.trim().replace(",", ".");
+  if (cleaned === "") return null;
+  const value = Number(cleaned);
+  return Number.isFinite(value) ? value : null;
+}
+
+export function formatBytes(bytes: number): string {
+  if (bytes >= 1e9) return `${(bytes / 1e9).toFixed(1)} GB`;
+  if (bytes >= 1e6) return `${(bytes / 1e6).toFixed(bytes >= 1e7 ? 0 : 1)} MB`;
+  return `${Math.max(1, Math.round(bytes / 1e3))} kB`;
+}
+
+/** Seconds in words: "under a second", "12 s", "3 min". */
+export function formatSeconds(seconds: number): string {
+  if (seconds < 1) return "under a second";
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
+  return `${(seconds / 3600).toFixed(1)} h`;
+}
+
+export function formatCount(count: number): string {
+  if (count >= 1e9) return `${(count / 1e9).toFixed(1)} billion`;
+  if (count >= 1e6) return `${(count / 1e6).toFixed(count >= 1e8 ? 0 : 1)} million`;
+  return count.toLocaleString("en");
+}
