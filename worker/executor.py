@@ -17,8 +17,8 @@ from typing import Any
 from relume.errors import PlanError
 from relume.transfer.base import Plan
 
-# About four seconds of tracing on two cores, what starting a cluster costs.
-TINY_BAKE_RAYS = 50_000_000
+# About four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
+TINY_BAKE_RAYS = 100_000_000
 CONNECT_S = 10
 
 # One Python thread per process, so one thread for every library below it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from dataclasses import dataclass
 from functools import lru_cache
@@ -36,10 +37,18 @@ def scene_of(data_dir: Path, scene_id: str) -> Scene:
     return load_scene(scene_path(data_dir, scene_id))
 
 
+_methods: dict[bytes, TransferMethod] = {}
+
+
+def _resident(method: TransferMethod) -> TransferMethod:
+    """This process's own copy of a method, which keeps what it built for a scene: each task brings a fresh one."""
+    return _methods.setdefault(pickle.dumps(method), method)
+
+
 def run_task(job: Job, task: Task) -> TaskCost:
     """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes."""
     began = time.perf_counter()
     scene = scene_of(job.data_dir, job.scene_id)
     staging = staging_path(job.data_dir, job.bake_id)
-    written = fill.run_task(job.method, scene, job.recipe, staging, task)
+    written = fill.run_task(_resident(job.method), scene, job.recipe, staging, task)
     return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - began)
