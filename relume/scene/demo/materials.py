@@ -18,7 +18,7 @@ def materials() -> tuple[Material, ...]:
                 {
                     "model": "ashikhmin_shirley",
                     "color": [1.0, 1.0, 1.0],
-                    "params": {"nu": 160.0, "nv": 1200.0, "f0": 0.055},
+                    "params": {"nu": 300.0, "nv": 1500.0, "f0": 0.07},
                 },
             ),
         ),
@@ -40,7 +40,7 @@ def materials() -> tuple[Material, ...]:
         Material(
             "Pearls",
             (
-                {"model": "lambert", "color": [0.56, 0.49, 0.42]},
+                {"model": "lambert", "color": [0.66, 0.585, 0.51]},
                 {
                     "model": "cook_torrance",
                     "color": [1.0, 0.95, 0.92],
@@ -58,14 +58,14 @@ def materials() -> tuple[Material, ...]:
         Material(
             "Cloth",
             (
-                {"model": "lambert", "color": [0.58, 0.52, 0.43]},
+                {"model": "lambert", "color": [0.085, 0.130, 0.195]},
                 {"model": "blinn_phong", "color": [0.030, 0.030, 0.032], "params": {"exponent": 6.0}},
             ),
         ),
         Material(
             "Table",
             (
-                {"model": "lambert", "color": [0.075, 0.088, 0.090]},
+                {"model": "lambert", "color": [0.066, 0.058, 0.051]},
                 {"model": "blinn_phong", "color": [0.012, 0.012, 0.012], "params": {"exponent": 24.0}},
             ),
         ),

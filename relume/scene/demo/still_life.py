@@ -40,8 +40,8 @@ def cameras() -> tuple[Camera, ...]:
     """Two views at 4:3, about 55 mm on a full-frame sensor."""
     yfov = float(np.radians(24.0))
     return (
-        look_at("front", (0.09, 0.345, 0.86), (0.012, 0.050, 0.030), yfov),
-        look_at("left", (-0.62, 0.24, 0.66), (0.0, 0.054, 0.02), yfov),
+        look_at("front", (0.09, 0.350, 0.91), (0.008, 0.050, 0.030), yfov),
+        look_at("left", (-0.72, 0.29, 0.60), (0.005, 0.050, 0.025), yfov),
     )
 
 

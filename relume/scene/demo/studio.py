@@ -20,13 +20,13 @@ def studio() -> Environment:
     """The studio as an equirectangular map of 512×256 texels; the picture's front is +Z."""
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)
     radiance = _room(w)
-    radiance += _window(w)[..., None] * np.array([13.0, 12.3, 11.2])
+    radiance += _window(w)[..., None] * np.array([13.0, 12.7, 12.3])
     strip = _panel(w, azimuth=-38.0, elevation=38.0, half_width=5.0, half_height=26.0, softness=1.5)
     radiance += strip[..., None] * np.array([10.0, 11.5, 14.0])
     fill = _panel(w, azimuth=12.0, elevation=12.0, half_width=24.0, half_height=20.0, softness=14.0)
-    radiance += fill[..., None] * np.array([0.42, 0.37, 0.31])
-    lamp = _panel(w, azimuth=118.0, elevation=46.0, half_width=1.8, half_height=1.8, softness=0.5)
-    radiance += lamp[..., None] * np.array([1000.0, 760.0, 500.0])
+    radiance += fill[..., None] * np.array([0.70, 0.62, 0.53])
+    lamp = _panel(w, azimuth=158.0, elevation=37.0, half_width=1.8, half_height=1.8, softness=0.5)
+    radiance += lamp[..., None] * np.array([1600.0, 1220.0, 830.0])
     return Environment("studio", radiance.astype(np.float32))
 
 
@@ -35,7 +35,7 @@ def _room(w: F64) -> F64:
     y = w[..., 1:2]
     upper = HORIZON + (CEILING - HORIZON) * np.clip(y, 0, 1) ** 0.6
     lower = HORIZON + (FLOOR - HORIZON) * np.clip(-y, 0, 1) ** 0.4
-    toward_window = 0.75 + 0.35 * (w @ _direction(150.0, 20.0))[..., None]
+    toward_window = 0.75 + 0.35 * (w @ _direction(186.0, 20.0))[..., None]
     return np.asarray(np.where(y >= 0, upper, lower) * toward_window)
 
 
@@ -45,7 +45,7 @@ def _window(w: F64) -> F64:
     for column in (-1, 1):
         for row in (-1, 0, 1):
             right, up = 10.4 * column, 14.4 * row
-            panes += _panel(w, 140.0, 40.0, half_width=9.4, half_height=6.5, softness=0.8, right=right, up=up)
+            panes += _panel(w, 186.0, 36.0, half_width=9.4, half_height=6.5, softness=0.8, right=right, up=up)
     return panes * (0.85 + 0.3 * np.clip(w[..., 1], 0, 1))
 
 
