@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 PYTHON_STAMP := $(VENV)/.stamp-packages
 PROJECT_STAMP := $(VENV)/.stamp-project
 CLIENT_STAMP := client_web/node_modules/.stamp-packages
-CLIENT_BUILD := client_web/dist/.stamp-build
+CLIENT_BUILD := client_web/dist/index.html
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
 
