@@ -85,7 +85,8 @@ def surface_at(
     position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
     diffuse, specular = np.ones((2, *position.shape), np.float32)
     if materials and origin is not None:
-        uv_area = np.abs(np.cross(np.diff(geometry.uvs[corners], axis=1)[:, 0], np.diff(geometry.uvs[corners], axis=1)[:, 1]))
+        (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
+        uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
         distance = np.where(hit, hits.distance, 1.0)
         cosine = np.maximum(-np.einsum("nc,nc->n", face_normal, directions), 0.05)
         # side of the pixel's footprint in uv: its area over the triangle's, in texture space
