@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from relume.errors import SceneError
 from relume.light.environment import read_environment
-from relume.scene.gltf import import_gltf
+from relume.scene.gltf import import_gltf, importer
 from relume.scene.model import Environment, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -178,6 +178,37 @@ def test_import_refuses_instances_without_end() -> None:
     glb.document["nodes"] = [{"mesh": 0}] * 30
     glb.document["scenes"] = [{"nodes": list(range(30))}]
     assert "20,000 meshes" in refused(glb.bytes())
+
+
+def test_import_refuses_degenerate_triangles_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importer, "MAX_CORNERS", 600)
+    glb = Glb().quad()
+    primitive = glb.document["meshes"][0]["primitives"][0]
+    primitive["indices"] = glb.accessor(np.zeros(300, np.uint16))
+    glb.document["meshes"][0]["primitives"] = [primitive] * 3
+    assert "triangles" in refused(glb.bytes())
+
+
+def test_import_refuses_json_of_too_many_values() -> None:
+    assert "values" in refused(b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 4_000_001 + b"0]}")
+
+
+def test_import_refuses_jpegs_of_too_many_scans() -> None:
+    glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
+    view = glb.view(b"\xff\xd8" + b"\xff\xda" * 500)
+    glb.document |= {"images": [{"bufferView": view}], "textures": [{"source": 0}]}
+    assert "scans" in refused(glb.bytes())
+
+
+def test_import_shows_names_without_control_characters() -> None:
+    glb = Glb().quad({"extensions": {"EVIL\n\x1b[2J": {}}, "alphaMode": "A\nB"})
+    glb.document |= {"extensionsRequired": ["NEW\nLINE"], "cameras": [{"type": "orthographic", "name": "a\nb"}]}
+    glb.document["nodes"][0] |= {"camera": 0, "skin": 0, "name": "c\r\nd"}
+    warnings = imported(glb.bytes()).warnings
+    assert len(warnings) == 5
+    assert all(warning.isprintable() for warning in warnings)
+    glb.document["meshes"][0]["primitives"][0]["attributes"]["X\nY"] = -1
+    refused(glb.bytes())
 
 
 @pytest.mark.parametrize(

@@ -26,15 +26,18 @@ class AccessorReader:
 
     def __init__(self, container: Container) -> None:
         self._container = container
-        self._read: dict[int, Array] = {}
+        self._integers: dict[int, Array] = {}
+        self._floats: dict[int, NDArray[np.float32]] = {}
         self._budget = MAX_NUMBERS
 
     def integers(self, index: int, what: str) -> Array:
         """Unsigned scalars, such as vertex indices. (count,)"""
-        accessor = _at(self._container.document.accessors, index, what)
+        accessor = self._accessor(index, what)
         if accessor.type != "SCALAR" or accessor.componentType not in (5121, 5123, 5125):
             raise SceneError(f"{what} are not unsigned scalars; export the scene again")
-        return np.asarray(self._values(index, accessor, what)[:, 0])
+        if index not in self._integers:
+            self._integers[index] = self._values(accessor, what)[:, 0]
+        return self._integers[index]
 
     def floats(self, index: int, widths: tuple[int, ...], what: str) -> NDArray[np.float32]:
         """Vectors; normalised integers scaled to [0, 1] or [-1, 1], other integers taken as they are. (count, width)
@@ -42,22 +45,25 @@ class AccessorReader:
         Raises:
             SceneError: an index, offset, stride, type or count does not fit the data.
         """
-        accessor = _at(self._container.document.accessors, index, what)
+        accessor = self._accessor(index, what)
         if WIDTHS.get(accessor.type) not in widths:
             raise SceneError(f"{what} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
-        values = self._values(index, accessor, what)
-        if values.dtype.kind == "f" or not accessor.normalized:
-            return np.asarray(values, np.float32)
-        scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
-        return np.asarray(np.maximum(scaled, np.float32(-1)))
+        if index not in self._floats:
+            values = self._values(accessor, what)
+            scale = np.iinfo(values.dtype).max if accessor.normalized and values.dtype.kind != "f" else 1
+            scaled = values.astype(np.float32) / np.float32(scale)
+            self._floats[index] = np.maximum(scaled, np.float32(-1)) if scale > 1 else scaled
+        return self._floats[index]
 
-    def _values(self, index: int, accessor: Accessor, what: str) -> Array:
-        if index not in self._read:
-            self._budget -= accessor.count * WIDTHS[accessor.type]
-            if self._budget < 0:
-                raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
-            self._read[index] = _read(self._container, accessor, what)
-        return self._read[index]
+    def _accessor(self, index: int, what: str) -> Accessor:
+        accessor: Accessor = _at(self._container.document.accessors, index, what)
+        return accessor
+
+    def _values(self, accessor: Accessor, what: str) -> Array:
+        self._budget -= accessor.count * WIDTHS[accessor.type]
+        if self._budget < 0:
+            raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
+        return _read(self._container, accessor, what)
 
 
 def view_bytes(container: Container, index: int, what: str) -> memoryview:

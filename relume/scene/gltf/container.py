@@ -17,9 +17,10 @@ from pydantic import ValidationError
 
 from relume.errors import SceneError
 from relume.scene.gltf.document import Buffer, Document
+from relume.scene.gltf.names import UNREADABLE
 
 MAX_FILE_BYTES = 512 << 20
-MAX_JSON_BYTES = 128 << 20
+MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: gltf-transform copy in.gltf out.glb"
 
 # Required extensions that change what an accessor or image holds, with what undoes them.
@@ -66,8 +67,8 @@ def read_container(data: bytes) -> Container:
 
 def parse_document(json_bytes: bytes) -> Document:
     """The JSON chunk as a checked model; says where the first fault is."""
-    if len(json_bytes) > MAX_JSON_BYTES:
-        raise SceneError(f"the scene's JSON is larger than {MAX_JSON_BYTES >> 20} MB; export it as .glb")
+    if sum(json_bytes.count(mark) for mark in b",[{") > MAX_JSON_VALUES:  # each value has one of these before it
+        raise SceneError(f"the scene's JSON has more than {MAX_JSON_VALUES:,} values; export it as .glb")
     try:
         content = json.loads(json_bytes.decode("utf-8-sig"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as problem:
@@ -76,7 +77,7 @@ def parse_document(json_bytes: bytes) -> Document:
         return Document.model_validate(content)
     except ValidationError as problem:
         fault = problem.errors(include_url=False, include_input=False)[0]
-        place = "/".join(str(step)[:40] for step in fault["loc"]) or "the document"
+        place = UNREADABLE.sub("", "/".join(str(step)[:40] for step in fault["loc"])) or "the document"
         raise SceneError(
             f"the scene's JSON is not valid glTF 2.0 at {place}: {fault['msg']}; export it again"
         ) from None

@@ -12,10 +12,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 MAX_COUNT = 2**32 - 1
 Index = Annotated[int, Field(ge=0, lt=2**31, strict=True)]
+Indices = Annotated[list[Index], Field(max_length=100_000, fail_fast=True)]
 Bytes = Annotated[int, Field(ge=0, lt=2**40, strict=True)]
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e30, le=1e30)]
 Factor = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
 Name = Annotated[str, Field(max_length=65_536)]
+Names = Annotated[list[Name], Field(max_length=1_000, fail_fast=True)]
 Extensions = dict[str, Any]
 
 
@@ -104,13 +106,13 @@ class Material(Part):
     normalTexture: TextureInfo | None = None  # noqa: N815
     occlusionTexture: TextureInfo | None = None  # noqa: N815
     emissiveTexture: TextureInfo | None = None  # noqa: N815
-    emissiveFactor: list[Number] = [0.0, 0.0, 0.0]  # noqa: N815
+    emissiveFactor: Annotated[list[Number], Field(max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
     alphaMode: str = "OPAQUE"  # noqa: N815
     doubleSided: bool = False  # noqa: N815
 
 
 class Primitive(Part):
-    attributes: dict[str, Index]
+    attributes: Annotated[dict[str, Index], Field(max_length=256)]
     indices: Index | None = None
     material: Index | None = None
     mode: Annotated[int, Field(ge=0, le=6)] = 4
@@ -118,7 +120,7 @@ class Primitive(Part):
 
 
 class Mesh(Part):
-    primitives: Annotated[list[Primitive], Field(min_length=1, max_length=65_536)]
+    primitives: Annotated[list[Primitive], Field(min_length=1, max_length=65_536, fail_fast=True)]
 
 
 class Perspective(Part):
@@ -131,7 +133,7 @@ class Camera(Part):
 
 
 class Node(Part):
-    children: list[Index] = []
+    children: Indices = []
     matrix: Annotated[list[Number], Field(min_length=16, max_length=16)] | None = None
     translation: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     rotation: Annotated[list[Number], Field(min_length=4, max_length=4)] = [0.0, 0.0, 0.0, 1.0]
@@ -142,26 +144,26 @@ class Node(Part):
 
 
 class SceneRoot(Part):
-    nodes: list[Index] = []
+    nodes: Indices = []
 
 
 class Document(Part):
     """The whole file. Lists longer than relume allows are refused before they are looked at."""
 
     asset: Asset
-    extensionsUsed: list[Name] = []  # noqa: N815
-    extensionsRequired: list[Name] = []  # noqa: N815
-    accessors: Annotated[list[Accessor], Field(max_length=1_000_000)] = []
+    extensionsUsed: Names = []  # noqa: N815
+    extensionsRequired: Names = []  # noqa: N815
+    accessors: Annotated[list[Accessor], Field(max_length=1_000_000, fail_fast=True)] = []
     animations: list[Any] = []
-    buffers: Annotated[list[Buffer], Field(max_length=10_000)] = []
-    bufferViews: Annotated[list[BufferView], Field(max_length=1_000_000)] = []  # noqa: N815
-    cameras: Annotated[list[Camera], Field(max_length=1_000)] = []
-    images: Annotated[list[Image], Field(max_length=10_000)] = []
-    materials: Annotated[list[Material], Field(max_length=1_000)] = []
-    meshes: Annotated[list[Mesh], Field(max_length=100_000)] = []
-    nodes: Annotated[list[Node], Field(max_length=4_096)] = []
-    samplers: Annotated[list[Sampler], Field(max_length=10_000)] = []
+    buffers: Annotated[list[Buffer], Field(max_length=10_000, fail_fast=True)] = []
+    bufferViews: Annotated[list[BufferView], Field(max_length=1_000_000, fail_fast=True)] = []  # noqa: N815
+    cameras: Annotated[list[Camera], Field(max_length=1_000, fail_fast=True)] = []
+    images: Annotated[list[Image], Field(max_length=10_000, fail_fast=True)] = []
+    materials: Annotated[list[Material], Field(max_length=1_000, fail_fast=True)] = []
+    meshes: Annotated[list[Mesh], Field(max_length=100_000, fail_fast=True)] = []
+    nodes: Annotated[list[Node], Field(max_length=4_096, fail_fast=True)] = []
+    samplers: Annotated[list[Sampler], Field(max_length=10_000, fail_fast=True)] = []
     scene: Index | None = None
-    scenes: Annotated[list[SceneRoot], Field(max_length=10_000)] = []
+    scenes: Annotated[list[SceneRoot], Field(max_length=10_000, fail_fast=True)] = []
     skins: list[Any] = []
-    textures: Annotated[list[Texture], Field(max_length=10_000)] = []
+    textures: Annotated[list[Texture], Field(max_length=10_000, fail_fast=True)] = []

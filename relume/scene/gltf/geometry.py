@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.gltf.accessors import AccessorReader
-from relume.scene.gltf.document import Primitive
+from relume.scene.gltf.document import Document, Primitive
 from relume.scene.model import F32, U32
 
 I64 = NDArray[np.int64]
@@ -30,6 +30,12 @@ class Geometry:
     tangents: F32
     uvs: tuple[F32, ...]
     faces: U32
+
+
+def num_corners(document: Document, primitive: Primitive) -> int:
+    """How many corners `read_primitive` will have to look at, whether they make triangles or not."""
+    index = primitive.attributes.get("POSITION") if primitive.indices is None else primitive.indices
+    return document.accessors[index].count if index is not None and index < len(document.accessors) else 0
 
 
 def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warnings: list[str]) -> Geometry | None:

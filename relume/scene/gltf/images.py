@@ -6,7 +6,6 @@ glTF 2.0 specification, sections 3.8 and 3.9.
 from __future__ import annotations
 
 import io
-import warnings as python_warnings
 
 import numpy as np
 import PIL.Image
@@ -19,7 +18,8 @@ from relume.scene.gltf.container import Container, data_uri
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
 MAX_SIDE = 8_192
-MAX_TEXELS = 400_000_000  # of all images of a scene together
+MAX_TEXELS = 200_000_000  # of all images of a scene together
+MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
 FORMATS = ("PNG", "JPEG", "WEBP")
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
@@ -83,16 +83,15 @@ class ImageReader:
         return self._decoded[index]
 
     def _decode(self, data: bytes, what: str) -> U8:
+        if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
+            raise SceneError(f"{what} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
         try:
-            with python_warnings.catch_warnings():
-                # Pillow warns of large images; the check below refuses them.
-                python_warnings.simplefilter("ignore")
-                with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
-                    self._check_size(*image.size, what)
-                    return _rgb(image)
+            with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                self._check_size(*image.size, what)
+                return _rgb(image)
         except SceneError:
             raise
-        except PIL.Image.DecompressionBombError:
+        except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
             raise SceneError(f"{what} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
         except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
             raise SceneError(f"{what} is damaged or neither PNG, JPEG nor WebP; export the scene again") from None

@@ -16,7 +16,7 @@ from relume.scene.gltf.cameras import framing_camera, rigid, slug
 from relume.scene.gltf.container import MAX_FILE_BYTES, READ_EXTENSIONS, Container, read_container
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import Node, Primitive
-from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, read_primitive
+from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.materials import MaterialReader, Understood
 from relume.scene.gltf.names import unique_name
@@ -26,7 +26,7 @@ from relume.scene.model import Camera, Environment, Mesh, Scene
 
 F64 = NDArray[np.float64]
 MAX_WARNINGS = 200
-MAX_VERTICES = 3 * MAX_TRIANGLES
+MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
 MAX_PLACED = 20_000  # primitives times the nodes that show them
 
 
@@ -76,7 +76,8 @@ class _Reading:
         self._material_index: dict[int | None, int] = {}
         self._mesh_names: dict[str, int] = {}
         self._camera_names: dict[str, int] = {}
-        self._places_left, self._triangles_left, self._vertices_left = MAX_PLACED, MAX_TRIANGLES, MAX_VERTICES
+        self._places_left, self._corners_left = MAX_PLACED, MAX_CORNERS
+        self._triangles_left, self._vertices_left = MAX_TRIANGLES, MAX_VERTICES
         self.materials: list[Understood] = []
         self.meshes: list[Mesh] = []
         self.cameras: list[Camera] = []
@@ -109,6 +110,9 @@ class _Reading:
 
     def _place_primitive(self, key: tuple[int, int], primitive: Primitive, name: str, to_world: F64) -> None:
         if key not in self._geometry:
+            self._corners_left -= num_corners(self._document, primitive)
+            if self._corners_left < 0:
+                raise SceneError(f"the file describes more than {MAX_TRIANGLES:,} triangles; simplify it")
             self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
         geometry = self._geometry[key]
         if geometry is None:
@@ -154,7 +158,9 @@ class _Reading:
             self.warnings.append("the file's lights are not used; the environment is the only light")
         for extension in document.extensionsRequired:
             if extension not in READ_EXTENSIONS:
-                self.warnings.append(f"the file requires {extension[:60]}, which is not understood; it may look wrong")
+                self.warnings.append(
+                    f"the file requires {extension[:60]!r}, which is not understood; it may look wrong"
+                )
 
 
 def _placed(geometry: Geometry, understood: Understood, to_world: F64, name: str, material: int) -> Mesh | None:

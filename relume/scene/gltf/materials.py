@@ -131,11 +131,11 @@ class MaterialReader:
         if material.emissiveTexture is not None or any(material.emissiveFactor):
             self._warnings.append(f"{what} glows; its emission is not used")
         if material.alphaMode != "OPAQUE":
-            self._warnings.append(f"{what} is see-through ({material.alphaMode[:20]}); it is opaque here")
+            self._warnings.append(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here")
         if material.occlusionTexture is not None:
             self._warnings.append(f"the occlusion texture of {what} is not used; relume traces occlusion")
         for extension in sorted(material.extensions):
-            self._warnings.append(f"{extension[:60]} of {what} is not used")
+            self._warnings.append(f"extension {extension[:60]!r} of {what} is not used")
 
 
 def _mix(base: Any, metallic: float) -> Any:
