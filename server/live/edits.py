@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from relume import look as looks
@@ -21,13 +20,12 @@ class LookDesk:
         """The look as something to show."""
         return Target(looks.validate(self.document, self.default), self.document, self.revision, received_s)
 
-    def apply(self, message: EditMessage) -> Target:
-        """Apply an edit, whole or not at all.
+    def apply(self, message: EditMessage, received_s: float) -> Target:
+        """Apply an edit that came at `received_s`, whole or not at all.
 
         Raises:
             EditError, ParameterError: the look stays as it was.
         """
-        received_s = time.perf_counter()
         if message.revision <= self.revision:
             raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; count on from there")
         patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]

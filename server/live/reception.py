@@ -50,7 +50,9 @@ class Reception:
             ProtocolError: the session must end; carries the close code.
         """
         while True:
-            text = _text_of(await self._websocket.receive())
+            received = await self._websocket.receive()
+            received_s = time.perf_counter()
+            text = _text_of(received)
             if text is None:
                 await self._bad(ProtocolError("messages are JSON text; send text frames", 1003))
                 continue
@@ -60,7 +62,7 @@ class Reception:
                 await self._bad(message_problem(error))
                 continue
             try:
-                self._take(message)
+                self._take(message, received_s)
             except RelumeError as error:
                 revision = message.revision if isinstance(message, protocol.EditMessage) else None
                 await self._wire.refuse(error, revision)
@@ -73,12 +75,12 @@ class Reception:
             raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
         await self._wire.refuse(problem)
 
-    def _take(self, message: protocol.ClientMessage) -> None:
+    def _take(self, message: protocol.ClientMessage, received_s: float) -> None:
         match message:
             case protocol.EditMessage():
-                self._edit(message)
+                self._edit(message, received_s)
             case protocol.AckMessage():
-                self._window.acknowledged(message.frame, time.perf_counter())
+                self._window.acknowledged(message.frame, received_s)
             case protocol.ViewMessage():
                 self._check_view(message.name)
                 self._wishes.view = message.name
@@ -96,9 +98,9 @@ class Reception:
                 self._wishes.touch = message.curve
                 self._focus(frozenset({message.curve}))
 
-    def _edit(self, message: protocol.EditMessage) -> None:
+    def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
-            self._wishes.target = self._desk.apply(message)
+            self._wishes.target = self._desk.apply(message, received_s)
         except RelumeError:
             self._metrics.edits.labels("refused").inc()
             raise

@@ -15,19 +15,15 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from relume.errors import NotFoundError, ParameterError
 from relume.transfer.base import Plan, Recipe
-from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, Preset, RecipeBody
+from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
 from server.errors import NotReadyError
 from server.services import Services, Shared
+from worker.presets import PRESETS
 from worker.scenes import get_scene
 from worker.status import BakeStatus, bake_id
 
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
-PRESETS: dict[Preset, tuple[tuple[int, int], int]] = {
-    "preview": ((320, 240), 300),
-    "good": ((640, 480), 2000),
-    "final": ((1024, 768), 4000),
-}
 EVENT_POLL_S = 0.5
 
 
@@ -118,9 +114,9 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     unknown = sorted(set(request.views or ()) - set(known))
     if unknown:
         raise ParameterError("views", unknown[0], "some of " + ", ".join(known)[:400])
-    size, num_lights = PRESETS[request.preset or "good"]
+    preset = PRESETS[request.preset or "good"]
     views = tuple(dict.fromkeys(request.views or known))
-    return Recipe(request.method, views, request.size or size, request.lights or num_lights)
+    return Recipe(request.method, views, request.size or preset.size, request.lights or preset.num_lights)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:

@@ -1,0 +1,153 @@
+"""The parts of a session that need neither picture nor network."""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from relume.errors import ParameterError, ProtocolError, StoreError
+from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
+from server.live.pointers import find_curve, focus_of
+from server.live.resume import MAX_KEPT, ResumeStore
+from server.live.transfers import MAX_IDLE, TransferPool
+from server.live.window import Window
+from server.protocol import PatchOperation
+
+DOCUMENT: dict[str, Any] = {
+    "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
+}
+TERM = "/materials/a~1b/terms"
+
+
+def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -> None:
+    window = Window(ack_seconds=10)
+    for _ in range(2):
+        assert window.is_open
+        window.sent(100, now_s=1.0)
+    assert not window.is_open
+    window.acknowledged(2, now_s=1.1)
+    window.sent(100, now_s=1.2)
+    assert window.is_open
+    assert window.next_frame == 4
+
+
+def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
+    window = Window(ack_seconds=10)
+    window.sent(100, now_s=1.0)
+    with pytest.raises(ProtocolError, match="never sent"):
+        window.acknowledged(2, now_s=1.0)
+    window.check(10.9)
+    with pytest.raises(ProtocolError) as lost:
+        window.check(11.1)
+    assert lost.value.close_code == 4408
+
+
+def stream(window: Window, num_frames: int, num_bytes: int, bytes_per_s: float, start_s: float) -> float:
+    """Send frames one after another over a link of 10 ms round trip; returns the time after them."""
+    now_s = start_s
+    for _ in range(num_frames):
+        frame = window.next_frame
+        window.sent(num_bytes, now_s)
+        now_s += 0.010 + num_bytes / bytes_per_s
+        window.acknowledged(frame, now_s)
+    return now_s
+
+
+def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> None:
+    window = Window(ack_seconds=10)
+    assert not window.is_slow_for(1_000_000)
+    now_s = stream(window, 5, 1_000_000, 100e6, 0.0)
+    assert not window.is_slow_for(1_000_000)
+    now_s = stream(window, 20, 1_000_000, 5e6, now_s)
+    assert window.is_slow_for(1_000_000)
+    assert window.is_slow_for(1_000_000 * 50 // 66)  # hysteresis: not quick yet
+    stream(window, 20, 1_000_000, 100e6, now_s)
+    assert not window.is_slow_for(1_000_000)
+
+
+def test_pace_settles_where_steps_take_the_target() -> None:
+    pace = Pace()
+    ms_per_coefficient = 0.05
+    for _ in range(30):
+        pace.learn(pace.max_coefficients * ms_per_coefficient, exact=False)
+    assert pace.max_coefficients == pytest.approx(TARGET_MS / ms_per_coefficient, rel=0.1)
+
+
+def test_pace_is_bounded() -> None:
+    pace = Pace()
+    for _ in range(50):
+        pace.learn(1000.0, exact=False)
+    assert pace.max_coefficients == MIN_COEFFICIENTS
+    for _ in range(50):
+        pace.learn(0.1, exact=True)
+    assert pace.max_coefficients == MAX_COEFFICIENTS
+
+
+def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
+    store = ResumeStore(resume_seconds=600)
+    for k in range(MAX_KEPT + 5):
+        store.keep(f"t{k}", "bake", {"k": k}, k, now_s=0.0)
+    assert store.take("t4", "bake", 1.0) is None
+    assert store.take("t5", "other", 1.0) is None
+    kept = store.take("t5", "bake", 1.0)
+    assert kept is not None
+    assert kept.revision == 5
+    assert store.take("t5", "bake", 1.0) is None
+    assert store.take("t6", "bake", 601.0) is None
+    assert ResumeStore.new_token() != ResumeStore.new_token()
+
+
+@pytest.mark.parametrize(
+    ("path", "curves"),
+    [
+        (f"{TERM}/1/params/sigma", {f"{TERM}/1/curves/theta_h"}),
+        (f"{TERM}/1/params/ior", {f"{TERM}/1/curves/theta_d"}),
+        (f"{TERM}/1/curves/theta_d/points/3/1", {f"{TERM}/1/curves/theta_d"}),
+        (f"{TERM}/1/color", set()),
+        (f"{TERM}/7/params/sigma", set()),
+        ("/materials/none/terms/1/params/sigma", set()),
+        ("/environment/scale", set()),
+        ("", set()),
+    ],
+)
+def test_focus_is_the_curves_that_an_edit_shapes(path: str, curves: set[str]) -> None:
+    assert focus_of([PatchOperation(op="replace", path=path, value=1)], DOCUMENT) == curves
+
+
+def test_curve_pointers_are_resolved_or_refused() -> None:
+    term, curve = find_curve(f"{TERM}/2/curves/alpha", DOCUMENT)
+    assert (term["model"], curve.name) == ("ashikhmin_shirley", "alpha")
+    for pointer in (f"{TERM}/0/curves/theta_h", f"{TERM}/3/curves/alpha", f"{TERM}/02/curves/alpha", "/x"):
+        with pytest.raises(ParameterError):
+            find_curve(pointer, DOCUMENT)
+
+
+def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failure() -> None:
+    opened: list[str] = []
+
+    def open_transfer(path: Path) -> Any:
+        opened.append(path.name)
+        if opened == ["broken"]:
+            raise StoreError("broken; bake again")
+        return path
+
+    async def run() -> None:
+        with ThreadPoolExecutor(2) as executor:
+            pool = TransferPool(open_transfer, executor)
+            with pytest.raises(StoreError):
+                async with pool.using("broken", Path("broken")):
+                    pass
+            async with pool.using("broken", Path("broken")) as found, pool.using("broken", Path("broken")) as again:
+                assert found is again
+                for k in range(MAX_IDLE + 2):
+                    async with pool.using(f"b{k}", Path(f"b{k}")):
+                        pass
+                async with pool.using("b0", Path("b0")):
+                    pass
+            async with pool.using("broken", Path("broken")):
+                pass
+
+    asyncio.run(run())
+    assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
