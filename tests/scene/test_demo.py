@@ -104,6 +104,13 @@ def test_pearls_touch_the_ground_but_not_each_other() -> None:
     assert (lowest >= ground - 1e-6).all()
 
 
+def test_nothing_reaches_into_a_pearl() -> None:
+    balls = _balls(MESHES["Pearls"])
+    for name in ("Teapot", "Tray", "Handles", "Bowl", "Cloth", "Table"):
+        distance, _ = cKDTree(MESHES[name].positions).query([centre for centre, _ in balls])
+        assert (distance - [radius for _, radius in balls]).min() > -2e-4, name
+
+
 def test_the_teapot_touches_neither_bowl_nor_pearls() -> None:
     pot = cKDTree(MESHES["Teapot"].positions)
     for name in ("Bowl", "Pearls"):

@@ -63,7 +63,7 @@ def pearls(centres: F64, radii: F64) -> Surface:
     parts = []
     for centre, radius in zip(centres, radii, strict=True):
         axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        parts.append(sphere(radius, 12 if radius < 0.009 else 18).moved(axes * np.sign(np.linalg.det(axes)), centre))
+        parts.append(sphere(radius, 11 if radius < 0.010 else 18).moved(axes * np.sign(np.linalg.det(axes)), centre))
     return merged(parts)
 
 

@@ -83,9 +83,9 @@ def _string() -> tuple[F64, F64]:
 
 
 def _heap() -> tuple[F64, F64]:
-    radii = np.random.default_rng(3).uniform(0.0062, 0.0090, 15)
+    radii = np.random.default_rng(3).uniform(0.0070, 0.0098, 30)
     height = _shifted(pearls.bowl_height, BOWL_PLACE, FLOOR_Y)
-    return pearls.heap(height, BOWL_PLACE, 0.030, radii, seed=11), radii
+    return pearls.heap(height, BOWL_PLACE, 0.034, radii, seed=11), radii
 
 
 def _loose() -> tuple[F64, F64]:
