@@ -9,14 +9,18 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
+import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from relume.errors import RelumeError, SceneError
 
 MAX_OUTPUT_BYTES = 64 * 1024
+UPLOAD_PREFIX = "upload-"
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,14 @@ def import_in_process(order: Order) -> str:
     if "problem" in answer:
         raise SceneError(answer["problem"])
     return str(answer["scene"])
+
+
+def remove_stray_uploads(data: Path, older_than_s: float) -> None:
+    """Delete uploads that a killed server left behind; younger ones may be another server's."""
+    for folder in data.glob(f"{UPLOAD_PREFIX}*"):
+        with suppress(OSError):
+            if time.time() - folder.stat().st_mtime > older_than_s:
+                shutil.rmtree(folder)
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from server import tables  # noqa: F401  its tables must be known before the database is opened
+from server.importing import remove_stray_uploads
 from server.live.bake_news import BakeNews
 from server.live.ports import Library
 from server.live.resume import ResumeStore
@@ -60,6 +61,7 @@ async def open_services(
 ) -> AsyncIterator[Services]:
     """Open everything; close it in the reverse order."""
     settings.data.mkdir(parents=True, exist_ok=True)
+    remove_stray_uploads(settings.data, older_than_s=2 * settings.import_seconds)
     library = open_library(settings.cache_bytes)
     metrics.watch_cache(library.cache_used_bytes)
     threads = Threads()

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Sequence
+
+from sqlalchemy.exc import SQLAlchemyError
 
 from server.live.wire import Wire
 from server.protocol import BakeMessage
 from worker.status import BakeStatus
 
+log = logging.getLogger(__name__)
 POLL_S = 0.5
 
 
@@ -22,11 +26,18 @@ class BakeNews:
         """Run for as long as the session does; says each change once."""
         told: dict[str, BakeMessage] = {}
         while True:
-            for news in self._news(bake, await asyncio.to_thread(self._list_bakes, scene)):
+            for news in self._news(bake, await self._look_up(scene)):
                 if told.get(news.bake) != news:
                     told[news.bake] = news
                     await wire.send(news)
             await asyncio.sleep(POLL_S)
+
+    async def _look_up(self, scene: str) -> Sequence[BakeStatus]:
+        try:
+            return await asyncio.to_thread(self._list_bakes, scene)
+        except SQLAlchemyError as error:  # the database may be away for a while; the picture needs it not
+            log.warning("bakes cannot be listed: %s", type(error).__name__)
+            return ()
 
     @staticmethod
     def _news(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:

@@ -56,6 +56,7 @@ class FrameLoop:
         self._picture: Picture
         self._all_tiles: frozenset[Tile] = frozenset()
         self._lacking: frozenset[Tile] = frozenset()
+        self._moving_bytes = 0
         self._is_settled = False
         self._rest_until_s = 0.0
         self._sent_s = 0.0
@@ -73,6 +74,10 @@ class FrameLoop:
         """The user edits or opened these curves: a freeze for others is no longer wanted."""
         if curves and self._freezing_for and curves.isdisjoint(self._freezing_for):
             self._cancel.set()
+
+    def leave_view(self) -> None:
+        """Another view is wanted: whatever is being frozen is for this one."""
+        self._cancel.set()
 
     async def run(self) -> None:
         """Serve until cancelled or until the client is lost."""
@@ -163,7 +168,7 @@ class FrameLoop:
 
     def _order(self, target: Target | None) -> Order:
         wishes, view = self._wishes, self._transfer.views[self._view]
-        is_slow = self._window.is_slow_for(4 * view.width * view.height)
+        is_slow = self._window.is_slow_for(self._moving_bytes)
         form: Format = "rgb9e5"
         if wishes.form == "jpeg" or (wishes.form == "auto" and is_slow and target is not None):
             form = "jpeg"
@@ -187,6 +192,7 @@ class FrameLoop:
         self._pace.learn(painted.update_ms, painted.exact)
         if order.target is not None and order.target.received_s is not None:
             self._rest_until_s = time.perf_counter() + REST_S
+            self._moving_bytes = 4 * sum(w * h for _, _, w, h in painted.tiles)
         if painted.message is None:
             self._lacking = self._lacking.union(painted.tiles)
             return
@@ -217,6 +223,8 @@ class FrameLoop:
 
     async def _freeze(self, what: str) -> None:
         """Freeze in a thread and say how far it is; ends early when the user has moved on."""
+        if self._wishes.view is not None or self._wishes.touch is not None:
+            return  # moved on already
         self._cancel.clear()
         self._freezing_for = self._wishes.focus
         progress = [0.0]

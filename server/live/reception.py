@@ -84,6 +84,7 @@ class Reception:
             case protocol.ViewMessage():
                 self._check_view(message.name)
                 self._wishes.view = message.name
+                self._frame_loop.leave_view()
             case protocol.StreamMessage():
                 self._wishes.form, self._wishes.quality = message.format, message.quality
             case protocol.ProbeMessage():

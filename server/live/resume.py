@@ -1,4 +1,7 @@
-"""Looks of sessions that were lost, kept for a while under a token that only their client knows."""
+"""Looks of sessions that were lost, kept for a while under a token that only their client knows.
+
+A client often notices a broken connection long before the server does, so live sessions can be resumed as well.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import secrets
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
+
+from server.live.edits import LookDesk
 
 MAX_KEPT = 256
 
@@ -21,26 +26,33 @@ class Kept:
 
 
 class ResumeStore:
-    """Bounded in number and time; the oldest go first."""
+    """Bounded in number and time; the oldest go first. Used from the event loop only."""
 
     def __init__(self, resume_seconds: float) -> None:
         self._resume_seconds = resume_seconds
+        self._live: dict[str, tuple[str, LookDesk]] = {}
         self._kept: OrderedDict[str, Kept] = OrderedDict()
 
-    @staticmethod
-    def new_token() -> str:
-        """A token that cannot be guessed."""
-        return secrets.token_urlsafe(24)
+    def open(self, bake: str, desk: LookDesk) -> str:
+        """A session begins; returns its token, which cannot be guessed."""
+        token = secrets.token_urlsafe(24)
+        self._live[token] = bake, desk
+        return token
 
-    def keep(self, token: str, bake: str, document: dict[str, Any], revision: int, now_s: float) -> None:
-        """Remember a session from its end on."""
-        self._kept[token] = Kept(bake, document, revision, now_s + self._resume_seconds)
-        self._kept.move_to_end(token)
+    def close(self, token: str, now_s: float) -> None:
+        """A session ends: keep its look, unless it was resumed already."""
+        if token not in self._live:
+            return
+        bake, desk = self._live.pop(token)
+        self._kept[token] = Kept(bake, desk.document, desk.revision, now_s + self._resume_seconds)
         while len(self._kept) > MAX_KEPT or next(iter(self._kept.values())).until_s < now_s:
             self._kept.popitem(last=False)
 
     def take(self, token: str, bake: str, now_s: float) -> Kept | None:
         """The session of that token on that bake, once; None where there is none (any more)."""
+        if token in self._live and self._live[token][0] == bake:
+            _, desk = self._live.pop(token)
+            return Kept(bake, desk.document, desk.revision, now_s)
         kept = self._kept.get(token)
         if kept is None or kept.bake != bake:
             return None

@@ -48,7 +48,7 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
     default: dict[str, Any] = transfer.default_look
     desk = LookDesk(default, kept.document if kept else default, kept.revision if kept else 0)
     wire = Wire(websocket, house.ack_seconds)
-    token = ResumeStore.new_token()
+    token = house.resumes.open(bake, desk)
     house.metrics.sessions.inc()
     try:
         await wire.send(_hello(bake, transfer, desk, token, kept is not None))
@@ -62,7 +62,7 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
         await wire.close(close_code_of(error), problem_of(error).detail)
     finally:
         house.metrics.sessions.dec()
-        house.resumes.keep(token, bake, desk.document, desk.revision, time.monotonic())
+        house.resumes.close(token, time.monotonic())
 
 
 def _hello(bake: str, transfer: Transfer, desk: LookDesk, token: str, resumed: bool) -> HelloMessage:

@@ -16,7 +16,7 @@ from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
 from server.bodies import Id, SceneBody, SceneMaterial, SceneView
-from server.importing import Order, import_in_process
+from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import thumbnail
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
@@ -43,7 +43,7 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
     settings = services.settings
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
-    with tempfile.TemporaryDirectory(dir=settings.data, prefix="upload-") as folder:
+    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
         order = Order(
             data=str(settings.data.resolve()),
             database=settings.database_url,

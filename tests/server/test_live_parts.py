@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from relume.errors import ParameterError, ProtocolError, StoreError
+from server.live.edits import LookDesk
 from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
 from server.live.pointers import find_curve, focus_of
 from server.live.resume import MAX_KEPT, ResumeStore
@@ -87,16 +88,27 @@ def test_pace_is_bounded() -> None:
 
 def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
     store = ResumeStore(resume_seconds=600)
-    for k in range(MAX_KEPT + 5):
-        store.keep(f"t{k}", "bake", {"k": k}, k, now_s=0.0)
-    assert store.take("t4", "bake", 1.0) is None
-    assert store.take("t5", "other", 1.0) is None
-    kept = store.take("t5", "bake", 1.0)
+    tokens = [store.open("bake", LookDesk({}, {"k": k}, k)) for k in range(MAX_KEPT + 5)]
+    assert len(set(tokens)) == len(tokens)
+    for token in tokens:
+        store.close(token, now_s=0.0)
+    assert store.take(tokens[4], "bake", 1.0) is None
+    assert store.take(tokens[5], "other", 1.0) is None
+    kept = store.take(tokens[5], "bake", 1.0)
     assert kept is not None
-    assert kept.revision == 5
-    assert store.take("t5", "bake", 1.0) is None
-    assert store.take("t6", "bake", 601.0) is None
-    assert ResumeStore.new_token() != ResumeStore.new_token()
+    assert (kept.revision, kept.document) == (5, {"k": 5})
+    assert store.take(tokens[5], "bake", 1.0) is None
+    assert store.take(tokens[6], "bake", 601.0) is None
+
+
+def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
+    store = ResumeStore(resume_seconds=600)
+    token = store.open("bake", LookDesk({}, {"k": 1}, 3))
+    kept = store.take(token, "bake", 0.0)
+    assert kept is not None
+    assert kept.revision == 3
+    store.close(token, 1.0)
+    assert store.take(token, "bake", 2.0) is None
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE, Control
 from session_client import SIGMA, THETA_D, THETA_H, Baked, open_session
 
+from server.live.window import Window
 from server.protocol import FrameHeader
 
 WIDTH, HEIGHT = SIZE
@@ -177,6 +178,45 @@ def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> Non
         assert frame.header["format"] == "jpeg"
         assert frame.header["tiles"] == [[0, 0, WIDTH, HEIGHT]]
         assert frame.payload[:2] == b"\xff\xd8"
+
+
+def test_slow_link_gets_jpeg_while_moving_and_one_hdr_still(
+    client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    control.max_step = 3
+    monkeypatch.setattr(Window, "is_slow_for", lambda *_: True)
+    with open_session(client, baked.bake) as session:
+        session.edit(1, SIGMA, 0.4)
+        while (moving := session.frame()).header["revision"] != 1:
+            pass
+        assert moving.header["format"] == "jpeg"
+        still = session.exact(1)
+        assert still.header["format"] == "rgb9e5"
+        assert np.frombuffer(still.payload, "<u4").size == WIDTH * HEIGHT
+
+
+def test_finer_bake_of_the_scene_is_announced(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        finer = {"scene": baked.scene, "size": [WIDTH, HEIGHT], "lights": 50}
+        coarser = {"scene": baked.scene, "size": [16, 16], "lights": 5}
+        client.post("/api/bakes", json=coarser)
+        bake = client.post("/api/bakes", json=finer).json()["id"]
+        while (news := session.text("bake"))["state"] != "ready":
+            assert news["bake"] == bake
+        assert (news["bake"], news["replaces"]) == (bake, baked.bake)
+
+
+def test_another_view_does_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_D)
+        assert control.freezing.wait(10)
+        session.send(type="view", name="left")
+        control.may_freeze.wait(0.2)
+        control.may_freeze.set()
+        assert session.exact(0).header["view"] == "left"
+        assert control.num_cancelled == 1
 
 
 def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Baked) -> None:
