@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -121,10 +123,12 @@ def _read_pixels(data: bytes, suffix: str, name: str) -> F32:
             file.write(data)
         image = oiio.ImageInput.open(path)
         if image is None:
-            oiio.geterror()
+            _forget_error(oiio.geterror)
             raise SceneError(f"environment {name!r} is damaged or not what its first bytes say; export it again")
         try:
             return _read_open_image(image, name)
+        except UnicodeDecodeError:  # names in the header that are no text
+            raise SceneError(f"environment {name!r} is damaged; export it again") from None
         finally:
             image.close()
     finally:
@@ -138,11 +142,20 @@ def _read_open_image(image: oiio.ImageInput, name: str) -> F32:
         raise SceneError(f"environment {name!r} is deep or has {spec.nchannels} channels; save it as plain RGB")
     names = [channel.rpartition(".")[2].upper() for channel in spec.channelnames]
     order = [names.index(c) for c in "RGB"] if {"R", "G", "B"} <= set(names) else [0, 0, 0]
-    pixels = image.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+    first, last = min(order), max(order)
+    if last - first > 3 and spec.width * spec.height > 1 << 24:
+        raise SceneError(f"environment {name!r} has channels between its RGB; save it as plain RGB")
+    pixels = image.read_image(0, 0, first, last + 1, oiio.FLOAT)
     if pixels is None:
-        image.geterror()
+        _forget_error(image.geterror)
         raise SceneError(f"environment {name!r} ends early or is damaged; export it again")
-    return np.ascontiguousarray(np.asarray(pixels, np.float32)[..., order])
+    return np.ascontiguousarray(np.asarray(pixels, np.float32)[..., [channel - first for channel in order]])
+
+
+def _forget_error(take_error: Callable[[], str]) -> None:
+    """OpenImageIO keeps its message until it is asked for; the message may quote bytes that are no text."""
+    with suppress(UnicodeDecodeError):
+        take_error()
 
 
 def _repaired(pixels: F32, name: str) -> Environment:

@@ -6,10 +6,12 @@ import contextlib
 import io
 import json
 import struct
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenImageIO as oiio  # noqa: N813
 import PIL.Image
 import pytest
 from glb_builder import QUAD, Glb, pack, self_contained
@@ -337,6 +339,45 @@ def test_environment_refuses_damaged_files(data: bytes) -> None:
     with pytest.raises(SceneError) as problem:
         read_environment(data, "sky")
     assert "\n" not in str(problem.value)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.lists(st.tuples(st.integers(8, 380), st.integers(0, 255)), min_size=1, max_size=6))
+def test_environment_survives_any_changed_exr_header(changes: list[tuple[int, int]]) -> None:
+    data = bytearray(EXR)
+    for place, value in changes:
+        data[place] = value
+    with contextlib.suppress(SceneError):
+        assert np.isfinite(read_environment(bytes(data), "sky").radiance).all()
+
+
+@pytest.mark.parametrize(
+    "window", [(0, 0, 99_999, 99_999), (0, 0, 199_999, 99_999), (0, 0, -1, -1), (0, 0, 2**31 - 1, 9)]
+)
+def test_environment_refuses_exr_sizes_before_reading(window: tuple[int, int, int, int]) -> None:
+    place = EXR.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    data = bytearray(EXR)
+    data[place : place + 16] = struct.pack("<4i", *window)
+    with pytest.raises(SceneError):
+        read_environment(bytes(data), "sky")
+
+
+def _exr_file() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / "sky.exr")
+        output = oiio.ImageOutput.create(path)
+        assert output is not None
+        assert output.open(path, oiio.ImageSpec(16, 8, 3, oiio.HALF))
+        assert output.write_image(np.full((8, 16, 3), 0.5, np.float32))
+        output.close()
+        return Path(path).read_bytes()
+
+
+EXR = _exr_file()
+
+
+def test_changed_exr_is_good_to_begin_with() -> None:
+    np.testing.assert_array_equal(read_environment(EXR, "sky").radiance, np.full((8, 16, 3), 0.5, np.float32))
 
 
 def test_environment_refuses_missing_files(tmp_path: Path) -> None:

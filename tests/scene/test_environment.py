@@ -73,6 +73,17 @@ def test_grey_and_alpha_are_understood(tmp_path: Path) -> None:
     np.testing.assert_array_equal(alpha.radiance[0, 0], [1, 2, 3])
 
 
+def test_rgb_is_found_among_other_channels(tmp_path: Path) -> None:
+    spec = oiio.ImageSpec(4, 2, 5, oiio.FLOAT)
+    spec.channelnames = ("A", "B", "G", "R", "Z")
+    output = oiio.ImageOutput.create(str(tmp_path / "layers.exr"))
+    assert output is not None
+    assert output.open(str(tmp_path / "layers.exr"), spec)
+    assert output.write_image(np.broadcast_to(np.array([0.5, 3, 2, 1, 9], np.float32), (2, 4, 5)).copy())
+    output.close()
+    np.testing.assert_array_equal(read_environment(tmp_path / "layers.exr", "layers").radiance[1, 2], [1, 2, 3])
+
+
 def test_texels_that_are_no_light_are_repaired_with_a_warning_each(tmp_path: Path) -> None:
     pixels = np.ones((4, 8, 3), np.float32)
     pixels[0, 0, 1], pixels[1, 1, 0], pixels[2, 2, 2], pixels[3, 3] = np.nan, np.inf, -3.0, 1e30
