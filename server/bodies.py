@@ -49,6 +49,42 @@ class SceneBody(Body):
     bakes: list[str]
 
 
+class ParameterBody(Body):
+    """A number that generates curves; `scale` says how a slider moves."""
+
+    name: str
+    label: str
+    minimum: float
+    maximum: float
+    default: float
+    unit: str
+    scale: Literal["linear", "log"]
+    help: str
+
+
+class CurveBody(Body):
+    """An editable factor of a term; an outgoing one multiplies the finished pixel."""
+
+    name: str
+    label: str
+    angle: str
+    parameters: list[str]
+    bands: int
+    outgoing: bool
+
+
+class ModelBody(Body):
+    """A BRDF term; `texture` is the channel it takes by default."""
+
+    model: str
+    label: str
+    help: str
+    source: str
+    texture: str
+    parameters: list[ParameterBody]
+    curves: list[CurveBody]
+
+
 class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins."""
 

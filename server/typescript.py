@@ -44,6 +44,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     *SERVER_MESSAGES,
     protocol.FrameHeader,
     bodies.SceneBody,
+    bodies.ModelBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

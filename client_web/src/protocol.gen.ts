@@ -107,6 +107,16 @@ export interface BakeMessage {
   seconds_left: number | null;
 }
 
+/** An editable factor of a term; an outgoing one multiplies the finished pixel. */
+export interface CurveBody {
+  name: string;
+  label: string;
+  angle: string;
+  parameters: string[];
+  bands: number;
+  outgoing: boolean;
+}
+
 /** server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`. */
 export interface CurveMessage {
   type: "curve";
@@ -166,6 +176,29 @@ export interface LookEntry {
   etag: string;
   modified: string;
   bytes: number;
+}
+
+/** A BRDF term; `texture` is the channel it takes by default. */
+export interface ModelBody {
+  model: string;
+  label: string;
+  help: string;
+  source: string;
+  texture: string;
+  parameters: ParameterBody[];
+  curves: CurveBody[];
+}
+
+/** A number that generates curves; `scale` says how a slider moves. */
+export interface ParameterBody {
+  name: string;
+  label: string;
+  minimum: number;
+  maximum: number;
+  default: number;
+  unit: string;
+  scale: "linear" | "log";
+  help: string;
 }
 
 /** What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown. */

@@ -12,7 +12,7 @@ def open_library(cache_bytes: int) -> Library:
     from relume.transfer.picture import Picture
     from relume.transfer.render import render_image
 
-    from relume.transfer.direct import open_transfer
+    from relume.transfer.opened import open_transfer
 
     cache = FrozenCache(cache_bytes)
     return Library(

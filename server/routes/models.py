@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
 
 from relume.brdf import registry
+from server.bodies import ModelBody
 
 router = APIRouter(prefix="/api", tags=["models"])
 
 
 @router.get("/models")
-def list_models() -> list[dict[str, Any]]:
+def list_models() -> list[ModelBody]:
     """Every BRDF term."""
-    return registry.describe()
+    return [ModelBody(**term) for term in registry.describe()]
