@@ -96,8 +96,6 @@ function usePlot(model: CurveModel, width: number, ready: boolean) {
     history.seal();
     setHeld(axes);
     gesture.current = begin(hand, frame, spotOf(frame, svg, event));
-    const index = picked.value?.index;
-    if (tool.value === "points" && index !== undefined) requestAnimationFrame(() => svg.querySelector<SVGGElement>(`[data-index="${index}"]`)?.focus());
     event.preventDefault();
   };
   const move = (event: PointerEvent) => {
@@ -119,6 +117,10 @@ function usePlot(model: CurveModel, width: number, ready: boolean) {
     gesture.current?.up(spotOf(frame, svg, event));
     gesture.current = null;
     setHeld(null);
+    // the keys go on where the hand let go
+    const index = tool.value === "points" ? picked.value?.index : undefined;
+    if (index === undefined) svg.focus();
+    else requestAnimationFrame(() => svg.querySelector<SVGGElement>(`[data-index="${index}"]`)?.focus());
   };
   const leave = () => {
     setSpot(null);

@@ -1,8 +1,9 @@
 /** One line under the plot: where the pointer is, where a pixel's light comes from, or what to do. */
 import { formatNumber } from "../ui/scale";
 import { valueAt, type Axes } from "./axes";
-import { mainStretch, type CurveModel } from "./model";
+import type { CurveModel } from "./model";
 import { tool } from "./settings";
+import { mainStretch } from "./stretch";
 import { picked, selection, type Spot } from "./tools";
 
 const HINTS = {

@@ -1,5 +1,4 @@
 /** The selected stretch by numbers and buttons: the click way to what dragging does. */
-import { IconButton } from "../ui/Button";
 import { NumberField } from "../ui/NumberField";
 import { applyScale, applyShift, selection, type Hand } from "./tools";
 
@@ -9,7 +8,7 @@ export function StretchBar({ hand }: { hand: Hand }) {
   return (
     <div class="stretch-bar">
       <label>
-        from
+        from{" "}
         <NumberField label="Stretch from, degrees" value={from} minimum={0} maximum={to} step={0.5} onChange={(x) => (selection.value = [x, to])} />
       </label>
       <label>
@@ -29,7 +28,6 @@ export function StretchBar({ hand }: { hand: Hand }) {
       <button title="Scale by 1.1" onClick={() => applyScale(hand, [from, to], 1.1)}>
         ×1.1
       </button>
-      <IconButton icon="close" label="Select no stretch" disabled={selection.value === null} onClick={() => (selection.value = null)} />
     </div>
   );
 }

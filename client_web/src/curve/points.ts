@@ -65,7 +65,7 @@ export function mergeStroke(base: readonly Point[], stroke: Stroke, axes: Axes):
   const extent = stroke.extent();
   if (extent === null) return [...base];
   const samples = stroke.heights().map(([x, height]): Point => [x, valueAt(axes, Math.max(0, height))]);
-  const budget = Math.round(6 + 30 * stroke.share(...extent));
+  const budget = Math.round(5 + 24 * stroke.share(...extent));
   const fitted = fitPoints(samples, axes, Math.min(MAX_POINTS / 2, budget));
   const [from, to] = [extent[0] - stroke.bandDegrees, extent[1] + stroke.bandDegrees];
   const merged = [...base.filter(([x]) => x < from || x > to), ...fitted].sort((a, b) => a[0] - b[0]);

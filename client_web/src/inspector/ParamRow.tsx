@@ -24,34 +24,37 @@ export function ParamRow({ info, value, initial, onChange }: Props) {
   const parted = typeof value !== "number";
   const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit };
   const toggle = () => onChange(parted ? mean(value) : [value, value, value]);
+  const link = (
+    <IconButton
+      icon={parted ? "unlink" : "link"}
+      label={parted ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`}
+      pressed={parted}
+      onClick={toggle}
+    />
+  );
   return (
-    <div class="param">
-      <div class="param-head">
-        <span class="param-label" title={info.help}>
-          {info.label}
-        </span>
-        <IconButton
-          icon={parted ? "unlink" : "link"}
-          label={parted ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`}
-          pressed={parted}
-          onClick={toggle}
-        />
-      </div>
+    <div class={`param ${parted ? "parted" : ""}`}>
+      <span class="param-label" title={info.help}>
+        {info.label}
+      </span>
       {parted ? (
-        CHANNELS.map(({ name, tint }, channel) => (
-          <Slider
-            key={name}
-            {...range}
-            label={`${info.label}, ${name}`}
-            tint={tint}
-            value={value[channel] as number}
-            initial={typeof initial === "number" ? initial : (initial[channel] as number)}
-            onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
-          />
-        ))
+        <div class="channels">
+          {CHANNELS.map(({ name, tint }, channel) => (
+            <Slider
+              key={name}
+              {...range}
+              label={`${info.label}, ${name}`}
+              tint={tint}
+              value={value[channel] as number}
+              initial={typeof initial === "number" ? initial : (initial[channel] as number)}
+              onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
+            />
+          ))}
+        </div>
       ) : (
         <Slider {...range} label={info.label} value={value} initial={mean(initial)} onChange={onChange} />
       )}
+      {link}
     </div>
   );
 }

@@ -5,6 +5,8 @@ import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
 import { defaultLook, models, modelOf, selectedCurve, selectedTerm } from "../state/store";
 import { IconButton } from "../ui/Button";
+import { selectTerm } from "../state/select";
+import { toHex } from "./color";
 import { ColorField } from "./ColorField";
 import { ParamRow } from "./ParamRow";
 import { withModel } from "./terms";
@@ -46,17 +48,24 @@ export function TermCard({ material, term, index, onRemove }: Props) {
   const path = pointer("materials", material, "terms", index);
   const initial = defaultLook.value?.materials[material]?.terms[index];
   const same = initial?.model === term.model ? initial : undefined;
+  const open = selectedTerm.value === index;
+  const changeModel = (name: string) => {
+    edit("Change model", path, withModel(term, name, models.value));
+    selectTerm(index);
+    selectedCurve.value = models.value.find((m) => m.model === name)?.curves[0]?.name ?? null;
+  };
   return (
-    <section class="card" aria-label={`Term ${index + 1}: ${model?.label ?? term.model}`}>
+    <section class={`card ${open ? "" : "folded"}`} aria-label={`Term ${index + 1}: ${model?.label ?? term.model}`}>
       <header>
+        <button class="icon fold" aria-expanded={open} aria-label={open ? "Open term" : "Unfold this term"} onClick={() => selectTerm(index)}>
+          {open ? "▾" : "▸"}
+        </button>
+        {!open && <span class="patch" style={{ background: toHex(term.color) }} />}
         <select
           aria-label="Model"
           title={model?.help}
           value={term.model}
-          onChange={(event) => {
-            selectedCurve.value = null;
-            edit("Change model", path, withModel(term, event.currentTarget.value, models.value));
-          }}
+          onChange={(event) => changeModel(event.currentTarget.value)}
         >
           {models.value.map((m) => (
             <option key={m.model} value={m.model}>
@@ -66,22 +75,26 @@ export function TermCard({ material, term, index, onRemove }: Props) {
         </select>
         {onRemove !== null && <IconButton icon="trash" label="Remove this term" onClick={onRemove} />}
       </header>
-      <ColorField
-        label="Colour"
-        value={term.color}
-        initial={same?.color ?? null}
-        onChange={(value: Rgb) => edit("Colour", `${path}/color`, value)}
-      />
-      {model?.parameters.map((info) => (
-        <ParamRow
-          key={info.name}
-          info={info}
-          value={term.params?.[info.name] ?? info.default}
-          initial={same?.params?.[info.name] ?? info.default}
-          onChange={(value) => edit(info.label, `${path}/params/${info.name}`, value)}
-        />
-      ))}
-      {model !== undefined && <Curves model={model} term={term} index={index} />}
+      {open && (
+        <>
+          <ColorField
+            label="Colour"
+            value={term.color}
+            initial={same?.color ?? null}
+            onChange={(value: Rgb) => edit("Colour", `${path}/color`, value)}
+          />
+          {model?.parameters.map((info) => (
+            <ParamRow
+              key={info.name}
+              info={info}
+              value={term.params?.[info.name] ?? info.default}
+              initial={same?.params?.[info.name] ?? info.default}
+              onChange={(value) => edit(info.label, `${path}/params/${info.name}`, value)}
+            />
+          ))}
+          {model !== undefined && <Curves model={model} term={term} index={index} />}
+        </>
+      )}
     </section>
   );
 }

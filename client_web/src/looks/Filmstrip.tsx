@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
 import { defaultLook, history, look, scene } from "../state/store";
+import { goTo } from "../state/undo";
 import { IconButton } from "../ui/Button";
 import { completed, markLook, saveLook, sideA } from "./compare";
 import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
@@ -72,7 +73,7 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
   const undone = count > history.cursor.value;
   return (
     <li class={`tile step ${current ? "shown" : ""} ${undone ? "undone" : ""}`}>
-      <button class="tile-picture" aria-label={`Go to step ${count}: ${label}`} aria-current={current ? "step" : undefined} onClick={() => void history.goTo(count)}>
+      <button class="tile-picture" aria-label={`Go to step ${count}: ${label}`} aria-current={current ? "step" : undefined} onClick={() => goTo(count)}>
         <Picture image={historyThumbnail(of)} text={label} />
       </button>
       <span class="tile-name" title={label}>

@@ -7,7 +7,8 @@ import { fetchPicture, whenExact } from "../state/live";
 import { defaultLook, exact, look, scene, viewName, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
-import { addLook, freeName, keepThumbnail, shelf } from "./shelf";
+import { freeName } from "./names";
+import { addLook, keepThumbnail, shelf } from "./shelf";
 
 /** The look whose picture is kept as A, and what it is called. */
 export const sideA = signal<{ look: Look; label: string; view: string } | null>(null);

@@ -77,13 +77,6 @@ async function perform(label: string, redo: () => Promise<void>, undo: () => Pro
   });
 }
 
-/** The first of "Look 1", "Look 2", … that is free. */
-export function freeName(taken: readonly string[]): string {
-  let n = taken.length + 1;
-  while (taken.includes(`Look ${n}`)) n += 1;
-  return `Look ${n}`;
-}
-
 export function addLook(name: string, look: Look): Promise<void> {
   return perform(`Save ${name}`, () => write(name, look, null), () => erase(name));
 }

@@ -16,6 +16,8 @@ import { FrameError, parseFrame, type Frame } from "./frame";
 import { EditQueue } from "./queue";
 
 const MAX_BUFFERED_BYTES = 1 << 20;
+/** Another version of the protocol, no such bake, not ready, damaged: trying again gives the same. */
+const FINAL_CODES = new Set([1002, 4404, 4409, 4410]);
 
 export type Connection = "connecting" | "open" | "reconnecting" | "closed";
 
@@ -29,6 +31,8 @@ export interface SessionHandlers {
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
   sent(revision: number, inputTime: number): void;
+  /** The server will not have this session again; no use in trying. */
+  ended(reason: string): void;
   broken(message: string): void;
 }
 
@@ -41,15 +45,19 @@ export class Session {
   private scheduled = false;
   private sentThisFrame = false;
   private readonly queue = new EditQueue();
-  resume: string | null;
+  /** Names this session to the server, so that a lost connection finds its look again. */
+  private resume: string | null = null;
 
   constructor(
     readonly bake: string,
     private readonly handlers: SessionHandlers,
-    resume: string | null = null,
   ) {
-    this.resume = resume;
     this.connect();
+  }
+
+  /** Of the newest edit that was sent. */
+  get revision(): number {
+    return this.queue.revision;
   }
 
   private connect(): void {
@@ -60,13 +68,18 @@ export class Session {
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
-    socket.onclose = () => this.lost(socket);
+    socket.onclose = (event) => this.lost(socket, event);
     this.socket = socket;
   }
 
-  private lost(socket: WebSocket): void {
+  private lost(socket: WebSocket, event: CloseEvent): void {
     if (this.closed || socket !== this.socket) return;
     this.ready = false;
+    if (FINAL_CODES.has(event.code)) {
+      this.close();
+      this.handlers.ended(event.reason || `code ${event.code}`);
+      return;
+    }
     const wait = backoffMs(this.attempt++);
     // a token that was refused once is not tried for ever
     if (this.attempt > 3) this.resume = null;
@@ -161,6 +174,12 @@ export class Session {
       this.sentThisFrame = true;
     }
     this.schedule();
+  }
+
+  /** Send a question about the look; the edits made before it go first. */
+  ask(message: ClientMessage): boolean {
+    if (this.queue.pending) this.flush();
+    return this.send(message);
   }
 
   send(message: ClientMessage): boolean {

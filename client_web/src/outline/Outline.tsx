@@ -66,7 +66,7 @@ export function Outline() {
       <header class="panel-head">
         <h2>Environment</h2>
       </header>
-      <div class="param">
+      <div class="param alone">
         <span class="param-label">Brightness</span>
         <Slider
           label="Environment brightness"

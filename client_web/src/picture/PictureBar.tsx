@@ -12,17 +12,12 @@ function Probe() {
   if (at === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
   const { exposure, tone_map } = look.value?.display ?? { exposure: 0, tone_map: "agx" };
   const shown = toDisplay(radiance, exposure, tone_map).map((v) => Math.round(255 * v));
-  const [width, height] = stage.size;
   const material = stage.material(at.x, at.y);
   return (
     <span class="probe">
       <i class="chip" style={{ background: `rgb(${shown.join(" ")})` }} />
       <span class="where">
         {at.x}, {at.y}
-        <small>
-          {" "}
-          of {width}×{height}
-        </small>
       </span>
       <span class="linear" title="Linear radiance">
         {radiance.map((v, c) => (

@@ -7,7 +7,8 @@ import { allocate, makeProgram, makeTexture } from "./textures";
 const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uIds"] as const;
 type Unit = (typeof UNITS)[number];
 const TONE_MAP_INDEX: Record<string, number> = { none: 0, linear: 0, agx: 1, filmic: 2 };
-const NEAREST_FROM = 3;
+/** Screen pixels per picture pixel from which the pixels themselves are shown. */
+const NEAREST_FROM = 6;
 
 export interface DrawState {
   /** Left, top, width, height of the picture in device pixels. */

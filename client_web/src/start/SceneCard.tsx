@@ -1,5 +1,6 @@
 import type { SceneBody } from "../protocol";
 import { IconButton } from "../ui/Button";
+import { CardProgress } from "./CardProgress";
 import { formatCount } from "../ui/scale";
 
 interface Props {
@@ -7,15 +8,16 @@ interface Props {
   onOpen(): void;
   onBake(): void;
   onDelete(): void;
+  /** Its first bake is ready. */
+  onReady(): void;
 }
 
 /** One scene: its picture opens it. */
-export function SceneCard({ scene, onOpen, onBake, onDelete }: Props) {
-  const baked = scene.bakes.length > 0;
+export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
-        {scene.thumbnail === null ? <span class="no-picture">{baked ? "bake under way" : "not baked yet"}</span> : <img src={scene.thumbnail} alt="" loading="lazy" />}
+        {scene.thumbnail === null ? <CardProgress scene={scene} onReady={onReady} /> : <img src={scene.thumbnail} alt="" loading="lazy" />}
       </button>
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>

@@ -40,7 +40,7 @@ export function StartPage() {
       {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop a .glb above, or run the demo.</p>}
       <ul class="cards">
         {scenes?.map((scene) => (
-          <SceneCard key={scene.id} scene={scene} onOpen={() => open(scene)} onBake={() => setPlanned(scene)} onDelete={() => remove(scene)} />
+          <SceneCard key={scene.id} scene={scene} onOpen={() => open(scene)} onBake={() => setPlanned(scene)} onDelete={() => remove(scene)} onReady={() => void refresh()} />
         ))}
       </ul>
     </main>

@@ -9,34 +9,29 @@ import type { ClientMessage, HelloMessage, Look } from "../protocol";
 import { attempt, note, showError } from "../ui/toasts";
 import { onLook } from "./edit";
 import * as store from "./store";
-import { editSent } from "./stats";
+import { editSent, forgetWaiting } from "./stats";
 
 let session: Session | null = null;
 /** A session on a finer bake, until its first picture is there. */
 let incoming: Session | null = null;
-let onBakeNews: (bake: string, state: string) => void = () => undefined;
-let exactWaiters: { revision: number; done(): void }[] = [];
-let sentRevision = 0;
+let onBakeReady: (bake: string) => void = () => undefined;
+const exactWaiters: (() => void)[] = [];
 
 onLook((look, inputTime) => {
   session?.want(look, inputTime);
   incoming?.want(look, inputTime);
 });
 
-export function whenBakeIsReady(take: typeof onBakeNews): void {
-  onBakeNews = take;
+export function whenBakeIsReady(take: typeof onBakeReady): void {
+  onBakeReady = take;
 }
 
 export function send(message: ClientMessage): boolean {
-  return session?.send(message) ?? false;
+  return session?.ask(message) ?? false;
 }
 
 export function reconnectNow(): void {
   session?.reconnectNow();
-}
-
-export function resumeToken(): string | null {
-  return session?.resume ?? null;
 }
 
 export function disconnect(): void {
@@ -46,9 +41,9 @@ export function disconnect(): void {
 }
 
 /** Open a session; where there is one already, it goes on until the new one has a picture. */
-export function connect(bake: string, resume: string | null = null): void {
+export function connect(bake: string): void {
   incoming?.close();
-  const opened: Session = new Session(bake, handlersOf(() => opened), resume);
+  const opened: Session = new Session(bake, handlersOf(() => opened));
   if (session === null) session = opened;
   else incoming = opened;
 }
@@ -87,16 +82,13 @@ function showViews(of: Session, views: HelloMessage["views"], name: string): voi
 
 function takeFrame(from: Session, frame: Frame): void {
   if (from === incoming && frame.header.kind !== "brush") swap(from);
-  if (from !== session) return;
+  if (from !== session || frame.header.view !== store.viewName.peek()) return;
   void stage.show(frame).catch(showError);
   if (frame.header.kind === "brush") return;
-  const newest = frame.header.revision >= sentRevision;
-  store.exact.value = frame.header.exact && newest;
+  store.exact.value = frame.header.exact && frame.header.revision >= from.revision;
   store.freezing.value = null;
-  if (!frame.header.exact) return;
-  const ready = exactWaiters.filter((waiter) => waiter.revision <= frame.header.revision);
-  exactWaiters = exactWaiters.filter((waiter) => !ready.includes(waiter));
-  for (const waiter of ready) waiter.done();
+  if (!store.exact.value) return;
+  for (const done of exactWaiters.splice(0)) done();
 }
 
 function swap(to: Session): void {
@@ -104,6 +96,7 @@ function swap(to: Session): void {
   session = to;
   incoming = null;
   old?.close();
+  forgetWaiting();
   showViews(to, pendingViews, store.viewName.peek());
   store.coming.value = null;
   store.connection.value = "open";
@@ -143,14 +136,16 @@ function handlersOf(self: () => Session): SessionHandlers {
     },
     bake(message) {
       const { bake: id, state, progress, seconds_left } = message;
-      if (state === "ready") onBakeNews(id, state);
+      if (state === "ready") onBakeReady(id);
       else store.coming.value = { id, state: state as "running", progress, seconds_left, problem: null };
     },
     sent(revision, inputTime) {
       if (!current()) return;
-      sentRevision = revision;
       store.exact.value = false;
       editSent(revision, inputTime);
+    },
+    ended(reason) {
+      showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
     },
     broken: (text) => showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),
   };
@@ -159,11 +154,12 @@ function handlersOf(self: () => Session): SessionHandlers {
 /** Resolves when the picture is exact for everything that was sent. */
 export function whenExact(): Promise<void> {
   if (store.exact.peek()) return Promise.resolve();
-  return new Promise((done) => exactWaiters.push({ revision: sentRevision, done }));
+  return new Promise((done) => exactWaiters.push(done));
 }
 
 /** Fetch the exact picture of another look while the canvas keeps what it shows. */
 export async function fetchPicture(of: Look): Promise<ReturnType<typeof stage.capture>> {
+  if (store.connection.peek() !== "open") throw new Error("There is no connection; try again when it is back.");
   const back = store.look.peek() as Look;
   stage.held = true;
   try {

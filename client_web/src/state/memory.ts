@@ -1,14 +1,8 @@
 /** How much frozen transport the server holds, read now and then from its metrics. */
 import { useEffect, useState } from "preact/hooks";
+import { gauge } from "./metrics";
 
 const EVERY_MS = 10_000;
-
-/** The value of a Prometheus gauge without labels; null where it is not there. */
-export function gauge(text: string, name: string): number | null {
-  const line = text.split("\n").find((candidate) => candidate.startsWith(`${name} `));
-  const value = line === undefined ? Number.NaN : Number(line.slice(name.length));
-  return Number.isFinite(value) ? value : null;
-}
 
 export function useMemory(): number | null {
   const [bytes, setBytes] = useState<number | null>(null);

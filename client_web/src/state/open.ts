@@ -6,8 +6,9 @@ import { stage } from "../picture/stage";
 import type { BakeBody, SceneBody } from "../protocol";
 import { attempt, showError } from "../ui/toasts";
 import { connect, disconnect, whenBakeIsReady } from "./live";
-import { placeFromUrl, recall, type Place } from "./place";
+import { recall } from "./place";
 import * as store from "./store";
+import { placeFromUrl, type Place } from "./url";
 
 export type Preset = "preview" | "good" | "final";
 
@@ -38,7 +39,7 @@ function reset(scene: SceneBody): void {
   store.page.value = "editor";
 }
 
-function restorePlace(scene: SceneBody, place: Place): string | null {
+function restorePlace(scene: SceneBody, place: Place): void {
   const kept = recall(scene.id);
   if (kept !== null) {
     store.look.value = kept.look;
@@ -50,7 +51,6 @@ function restorePlace(scene: SceneBody, place: Place): string | null {
     store.selectedTerm.value = place.term;
     store.selectedCurve.value = place.curve;
   }
-  return kept !== null && kept.bake === place.bake ? kept.token : null;
 }
 
 /** Follow a bake that is meant to replace the one shown. */
@@ -71,7 +71,16 @@ function swapTo(bake: string): void {
   connect(bake);
 }
 let swapping: string | null = null;
-whenBakeIsReady(swapTo);
+
+// somebody else's bake of this scene takes over only where it is finer
+whenBakeIsReady((id) => {
+  const current = store.bake.peek();
+  if (current === null || id === current) return;
+  void attempt(async () => {
+    const [other, shown] = await Promise.all([api.getBake(id), api.getBake(current)]);
+    if (pixels(other) > pixels(shown)) swapTo(id);
+  });
+});
 
 async function bakePreview(scene: SceneBody): Promise<string | null> {
   const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview" });
@@ -94,13 +103,13 @@ export async function openScene(id: string, place: Place = placeFromUrl(`?scene=
     store.models.value = models;
     reset(scene);
     swapping = null;
-    const token = restorePlace(scene, place);
+    restorePlace(scene, place);
     const bakes = await bakesOf(scene);
     store.bakes.value = bakes;
     const ready = bakes.filter((bake) => bake.state === "ready");
     const shown = ready.find((bake) => bake.id === place.bake) ?? ready[0];
     const running = bakes.find((bake) => bake.state === "running" || bake.state === "queued");
-    connect(shown?.id ?? ((await bakePreview(scene)) as string), token);
+    connect(shown?.id ?? ((await bakePreview(scene)) as string));
     if (preset !== undefined) await startFullBake(scene, preset);
     else if (running !== undefined) follow(running);
     else if (shown === undefined) await startFullBake(scene, "good");

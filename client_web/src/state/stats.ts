@@ -24,6 +24,11 @@ export function editSent(revision: number, inputTime: number): void {
   if (waiting.length > MAX_KEPT) waiting.shift();
 }
 
+/** Another session counts its revisions anew. */
+export function forgetWaiting(): void {
+  waiting.length = 0;
+}
+
 /** A frame of this revision is on the canvas. */
 export function frameDrawn(revision: number): void {
   const drawnTime = performance.now();

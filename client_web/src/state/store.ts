@@ -38,7 +38,9 @@ export const terms = computed<Term[]>(() => {
 /** Pointer of the curve that is open, null where none is. */
 export const curvePath = computed(() => {
   const [material, curve] = [selectedMaterial.value, selectedCurve.value];
-  if (material === null || curve === null || terms.value[selectedTerm.value] === undefined) return null;
+  const term = terms.value[selectedTerm.value];
+  if (material === null || curve === null || term === undefined) return null;
+  if (!modelOf(term)?.curves.some((info) => info.name === curve)) return null;
   return pointer("materials", material, "terms", selectedTerm.value, "curves", curve);
 });
 export const curveShape = signal<CurveMessage | null>(null);

@@ -6,6 +6,7 @@ import { edit } from "../state/edit";
 import { chooseView } from "../state/live";
 import { leave } from "../state/open";
 import { filmstripOpen, helpOpen, history, inspectorOpen, look, outlineOpen, scene, showBefore, viewName, views, wipe } from "../state/store";
+import { redo, undo } from "../state/undo";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
 import { Slider } from "./Slider";
@@ -96,8 +97,8 @@ export function TopBar() {
       <BakeMenu />
       <Views />
       <div class="group" role="group" aria-label="History">
-        <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={() => void history.undo()} />
-        <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={() => void history.redo()} />
+        <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={undo} />
+        <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={redo} />
       </div>
       <Compare />
       <span class="spacer" />

@@ -4,7 +4,8 @@ import { markA, saveLook, swapA, toggleWipe } from "../looks/compare";
 import { logarithmic, tool } from "../curve/settings";
 import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
 import { edit } from "../state/edit";
-import { falseColour, filmstripOpen, helpOpen, history, inspectorOpen, look, outlineOpen, showBefore, wipe } from "../state/store";
+import { redo, undo } from "../state/undo";
+import { falseColour, filmstripOpen, helpOpen, inspectorOpen, look, outlineOpen, showBefore, wipe } from "../state/store";
 
 export interface Action {
   group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";
@@ -40,8 +41,8 @@ export const ACTIONS: readonly Action[] = [
   { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
   { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => expose(-THIRD) },
   { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => expose(THIRD) },
-  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: () => void history.undo() },
-  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: () => void history.redo() },
+  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
+  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: redo },
   { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
   { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
   { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: markA },

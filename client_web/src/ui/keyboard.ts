@@ -2,13 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { helpOpen } from "../state/store";
 import { ACTIONS, onWipeKey, type Action } from "./actions";
-
-/** "Ctrl+Shift+z" of an event; Shift is only named beside Ctrl, as it decides which character a key is. */
-export function chord(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
-  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-  if (!event.ctrlKey && !event.metaKey) return key;
-  return `Ctrl+${event.shiftKey ? "Shift+" : ""}${key}`;
-}
+import { chord } from "./chord";
 
 function typing(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && target.matches("input:not([type=color]), textarea, select, [contenteditable]");

@@ -1,0 +1,31 @@
+/** A place in the editor as the address says it. */
+
+export interface Place {
+  scene: string | null;
+  bake: string | null;
+  view: string | null;
+  material: string | null;
+  term: number;
+  curve: string | null;
+}
+
+export function placeFromUrl(search: string): Place {
+  const query = new URLSearchParams(search);
+  return {
+    scene: query.get("scene"),
+    bake: query.get("bake"),
+    view: query.get("view"),
+    material: query.get("material"),
+    term: Math.max(0, Math.trunc(Number(query.get("term") ?? 0)) || 0),
+    curve: query.get("curve"),
+  };
+}
+
+export function placeToUrl(place: Place): string {
+  const query = new URLSearchParams();
+  for (const key of ["scene", "bake", "view", "material", "curve"] as const) {
+    if (place[key] !== null && place[key] !== "") query.set(key, place[key]);
+  }
+  if (place.material !== null && place.term > 0) query.set("term", String(place.term));
+  return query.size > 0 ? `?${query.toString()}` : "/";
+}

@@ -1,0 +1,223 @@
+import { describe, expect, test } from "vitest";
+import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "../src/curve/axes";
+import { joined, readChannels, writeChannels } from "../src/curve/channels";
+import { bandSamples, fitPoints, MAX_POINTS, Stroke } from "../src/curve/fit";
+import { pchip } from "../src/curve/pchip";
+import { addPoint, mergeStroke, MIN_GAP, movePoint, removePoint, scaleStretch, shiftStretch } from "../src/curve/points";
+import { mainStretch } from "../src/curve/stretch";
+import type { Point } from "../src/protocol";
+
+const LINEAR: Axes = { stretched: false, log: false, top: 5 };
+const POINTS: Point[] = [
+  [0, 4],
+  [5, 3.8],
+  [12, 1.5],
+  [13, 1.5],
+  [40, 2],
+  [90, 0],
+];
+
+function beckmann(sigma: number, bands = 256): number[] {
+  return Array.from({ length: bands }, (_, j) => {
+    const theta = (((j + 0.5) / bands) * Math.PI) / 2;
+    return Math.exp(-(Math.tan(theta) ** 2) / sigma ** 2) / (sigma ** 2 * Math.cos(theta) ** 4);
+  });
+}
+
+function expectValid(points: readonly Point[]): void {
+  points.forEach(([x, y], i) => {
+    expect(x).toBeGreaterThanOrEqual(0);
+    expect(x).toBeLessThanOrEqual(90);
+    expect(y).toBeGreaterThanOrEqual(0);
+    if (i > 0) expect(x).toBeGreaterThan((points[i - 1] as Point)[0]);
+  });
+}
+
+describe("pchip", () => {
+  test("agrees with SciPy's PchipInterpolator", () => {
+    const expected = [3.9901352042921996, 3.8645408171687987, 2.8278019562285146, 1.5, 1.5833968399126148, 1.9979931920947007, 1.6703953823953823, 0.07727827609427632];
+    const curve = pchip(POINTS);
+    [1, 4, 8, 12.5, 20, 39, 60, 89].forEach((x, i) => expect(curve(x)).toBeCloseTo(expected[i] as number, 10));
+  });
+
+  test("goes through its points, is constant outside and does not overshoot", () => {
+    const curve = pchip([[10, 1], [20, 5], [30, 5.1]]);
+    expect([curve(0), curve(10), curve(20), curve(30), curve(90)]).toEqual([1, 1, 5, 5.1, 5.1]);
+    for (let x = 10; x <= 30; x += 0.1) expect(curve(x)).toBeLessThanOrEqual(5.1 + 1e-12);
+  });
+
+  test("one point and none are constant", () => {
+    expect(pchip([[10, 3]])(50)).toBe(3);
+    expect(pchip([])(50)).toBe(0);
+  });
+});
+
+describe("axes", () => {
+  test.each([
+    { stretched: false, log: false, top: 4 },
+    { stretched: true, log: true, top: 400 },
+  ])("there and back: %o", (axes) => {
+    for (const x of [0, 0.3, 7, 45, 90]) expect(degreesAt(axes, xFraction(axes, x))).toBeCloseTo(x, 9);
+    for (const y of [axes.top, axes.top / 3, axes.top / 100]) expect(valueAt(axes, yFraction(axes, y))).toBeCloseTo(y, 9);
+    expect(valueAt(axes, 0)).toBe(0);
+    expect(yFraction(axes, 0)).toBe(0);
+  });
+
+  test("the top leaves room above the largest value", () => {
+    for (const v of [0.013, 0.9, 1, 4.9, 97, 3999]) {
+      expect(niceTop(v, false)).toBeGreaterThan(v);
+      expect(niceTop(v, false)).toBeLessThan(2.2 * v);
+      expect(Math.log10(niceTop(v, true)) % 1).toBeCloseTo(0, 9);
+    }
+    expect(niceTop(0, false)).toBe(1);
+  });
+});
+
+describe("fitPoints", () => {
+  test.each([0.05, 0.2, 0.6])("a few points carry a Beckmann lobe of σ = %d", (sigma) => {
+    const samples = bandSamples(beckmann(sigma));
+    const axes: Axes = { stretched: true, log: false, top: niceTop(Math.max(...beckmann(sigma)), false) };
+    const points = fitPoints(samples, axes);
+    expectValid(points);
+    expect(points.length).toBeLessThanOrEqual(24);
+    const curve = pchip(points);
+    for (const [x, y] of samples) expect(Math.abs(curve(x) - y) / axes.top).toBeLessThan(0.01);
+  });
+
+  test("a constant needs two points", () => {
+    expect(fitPoints(bandSamples(Array<number>(64).fill(1)), LINEAR)).toEqual([[0, 1], [90, 1]]);
+  });
+});
+
+describe("Stroke", () => {
+  test("fills the bands between two events and forgets nothing outside", () => {
+    const stroke = new Stroke(90, LINEAR);
+    stroke.add(10, 0);
+    stroke.add(20, 1);
+    const heights = stroke.heights(0);
+    expect(heights).toHaveLength(11);
+    expect(heights[5]?.[0]).toBeCloseTo(15, 9);
+    expect(heights[5]?.[1]).toBeCloseTo(0.5, 9);
+    expect(stroke.extent()).toEqual([10, 20]);
+  });
+
+  test("the newest pass wins", () => {
+    const stroke = new Stroke(90, LINEAR);
+    stroke.add(10, 0.2);
+    stroke.add(30, 0.2);
+    stroke.add(20, 0.8);
+    expect(stroke.heights(0).find(([x]) => x === 20)?.[1]).toBeCloseTo(0.8, 9);
+    expect(stroke.heights(0).find(([x]) => x === 12)?.[1]).toBeCloseTo(0.2, 9);
+  });
+
+  test("smoothing takes the shake out and keeps a straight line", () => {
+    const shaky = new Stroke(256, LINEAR);
+    const straight = new Stroke(256, LINEAR);
+    for (let j = 0; j <= 128; j++) {
+      shaky.add((j / 256) * 90, 0.5 + (j % 2 ? 0.1 : -0.1));
+      straight.add((j / 256) * 90, j / 256);
+    }
+    const inner = shaky.heights().slice(6, -6);
+    for (const [, h] of inner) expect(Math.abs(h - 0.5)).toBeLessThan(0.005);
+    for (const [x, h] of straight.heights()) expect(h).toBeCloseTo(x / 90, 9);
+  });
+
+  test("merged, it replaces what it covers, keeps the rest, and stays bounded", () => {
+    let points = POINTS;
+    for (let pass = 0; pass < 30; pass++) {
+      const stroke = new Stroke(256, LINEAR);
+      for (let i = 0; i <= 50; i++) stroke.add(20 + (pass % 3) * 5 + i / 4, 0.4 + 0.3 * Math.sin(i / 2 + pass));
+      points = mergeStroke(points, stroke, LINEAR);
+      expectValid(points);
+      expect(points.length).toBeLessThanOrEqual(MAX_POINTS);
+    }
+    expect(points.slice(0, 4)).toEqual(POINTS.slice(0, 4));
+    expect(points.at(-1)).toEqual([90, 0]);
+  });
+});
+
+describe("points", () => {
+  test("are added in order, and twice in one place is a change of value", () => {
+    const { points, index } = addPoint(POINTS, 20, 3);
+    expect(index).toBe(4);
+    expectValid(points);
+    const again = addPoint(points, 20.001, 5);
+    expect(again.points).toHaveLength(points.length);
+    expect(again.points[4]).toEqual([20, 5]);
+  });
+
+  test("are stopped by their neighbours and by the plot", () => {
+    const moved = movePoint(POINTS, 2, 60, -3);
+    expectValid(moved);
+    expect(moved[2]?.[0]).toBeCloseTo(13 - MIN_GAP, 6);
+    expect(moved[2]?.[1]).toBe(0);
+    expect(movePoint(POINTS, 5, 200, 1)[5]).toEqual([90, 1]);
+    expect(POINTS[2]).toEqual([12, 1.5]);
+  });
+
+  test("two always stay", () => {
+    const two: Point[] = [[0, 1], [90, 0]];
+    expect(removePoint(two, 0)).toEqual(two);
+    expect(removePoint(POINTS, 1)).toHaveLength(POINTS.length - 1);
+  });
+
+  test("no more than the bound are taken", () => {
+    const many = Array.from({ length: MAX_POINTS }, (_, i): Point => [i, 1]);
+    expect(addPoint(many, 80.5, 1)).toEqual({ points: many, index: -1 });
+  });
+});
+
+describe("stretches", () => {
+  test("scaling multiplies inside and leaves the outside alone", () => {
+    const before = pchip(POINTS);
+    const points = scaleStretch(POINTS, 15, 35, 2, 0.35);
+    expectValid(points);
+    const after = pchip(points);
+    expect(after(15)).toBeCloseTo(2 * before(15), 2);
+    expect(after(35)).toBeCloseTo(2 * before(35), 2);
+    expect(after(5)).toBeCloseTo(before(5), 2);
+    expect(after(60)).toBeCloseTo(before(60), 1);
+  });
+
+  test("shifting moves the stretch and stays on the plot", () => {
+    const points = shiftStretch(POINTS, 10, 14, 10);
+    expectValid(points);
+    expect(points).toContainEqual([22, 1.5]);
+    expect(points).toContainEqual([23, 1.5]);
+    expectValid(shiftStretch(POINTS, 10, 14, -500));
+    expectValid(shiftStretch(POINTS, 10, 14, 500));
+  });
+});
+
+describe("channels", () => {
+  const red: Point[] = [[0, 1], [90, 0]];
+  const rest: Point[] = [[0, 2], [90, 1]];
+
+  test("equal channels share one object, and reading gives back what was written", () => {
+    expect(writeChannels([rest, rest, rest])).toEqual({ points: rest, channels: "rgb" });
+    expect(writeChannels([null, null, null])).toBeUndefined();
+    const mixed = [red, null, rest] as const;
+    expect(writeChannels(mixed)).toEqual([
+      { points: red, channels: "r" },
+      { points: rest, channels: "b" },
+    ]);
+    expect(readChannels(writeChannels(mixed), 256)).toEqual(mixed);
+    expect(joined(readChannels({ points: red }, 256))).toBe(true);
+    expect(joined(mixed)).toBe(false);
+  });
+
+  test("bands become points, flat, per channel, or for one channel", () => {
+    const ramp = Array.from({ length: 64 }, (_, j) => 64 - j);
+    const flat = readChannels({ bands: [...ramp, ...ramp.map((v) => 2 * v), ...ramp] }, 64);
+    expect(pchip(flat[1] as Point[])(45)).toBeCloseTo(2 * pchip(flat[0] as Point[])(45), 0);
+    expect(readChannels({ bands: [ramp, ramp, ramp] }, 64)[2]).toEqual(flat[0]);
+    expect(readChannels({ bands: ramp, channels: "g" }, 64).map((c) => c === null)).toEqual([true, false, true]);
+  });
+});
+
+test("mainStretch finds the narrowest run that carries the light", () => {
+  const bands = Array<number>(90).fill(0.01);
+  bands.fill(10, 3, 7);
+  expect(mainStretch([bands, bands, bands])).toEqual([3, 7]);
+  expect(mainStretch([[0, 0], [0, 0], [0, 0]])).toBeNull();
+});

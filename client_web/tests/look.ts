@@ -1,0 +1,17 @@
+/** A small look for tests. */
+import type { Look } from "../src/protocol";
+
+export const LOOK: Look = {
+  materials: {
+    Teapot: {
+      terms: [
+        { model: "lambert", color: [0.1, 0.02, 0.02], params: {}, curves: {} },
+        { model: "cook_torrance", color: [1, 1, 1], params: { sigma: 0.2, ior: 1.5 }, curves: {} },
+      ],
+    },
+    "a/b~c": { terms: [{ model: "lambert", color: [0.5, 0.5, 0.5] }] },
+  },
+  environment: { scale: 1, rotation: 0 },
+  lights: {},
+  display: { exposure: 0, tone_map: "agx" },
+};

@@ -1,0 +1,106 @@
+import { describe, expect, test } from "vitest";
+import { fromHex, strength, toHex } from "../src/inspector/color";
+import { defaultTerm, withModel } from "../src/inspector/terms";
+import { freeName } from "../src/looks/names";
+import type { ModelInfo, Rgb } from "../src/protocol";
+import { sortFiles } from "../src/start/files";
+import { gauge } from "../src/state/metrics";
+import { placeFromUrl, placeToUrl } from "../src/state/url";
+import { chord } from "../src/ui/chord";
+import { formatBytes, formatNumber, formatSeconds, fromFraction, parseNumber, toFraction } from "../src/ui/scale";
+
+describe("slider scales", () => {
+  const log = { minimum: 0.01, maximum: 1, scale: "log" } as const;
+  const linear = { minimum: 1, maximum: 5, scale: "linear" } as const;
+
+  test("a log slider's middle is the geometric mean", () => {
+    expect(fromFraction(log, 0.5)).toBeCloseTo(0.1, 6);
+    expect(toFraction(log, 0.1)).toBeCloseTo(0.5, 9);
+    expect(fromFraction(linear, 0.5)).toBe(3);
+  });
+
+  test("the ends are exact and nothing leaves them", () => {
+    for (const range of [log, linear]) {
+      expect([fromFraction(range, 0), fromFraction(range, 1)]).toEqual([range.minimum, range.maximum]);
+      expect(fromFraction(range, 7)).toBe(range.maximum);
+      expect(toFraction(range, -4)).toBe(0);
+    }
+  });
+
+  test("values are tidy", () => {
+    expect(String(fromFraction(linear, 1 / 3)).length).toBeLessThanOrEqual(6);
+  });
+});
+
+describe("numbers", () => {
+  test("are written as people read them", () => {
+    expect([0, 0.2, 12.345, 123.45, 12345, 1e-7, Number.NaN].map(formatNumber)).toEqual(["0", "0.200", "12.35", "123.5", "12345", "1.00e-7", "–"]);
+    expect(formatBytes(104_448_000)).toBe("104 MB");
+    expect([0.2, 14, 200, 9000].map(formatSeconds)).toEqual(["under a second", "14 s", "3 min", "2.5 h"]);
+  });
+
+  test("are read with point or comma, and only when they are numbers", () => {
+    expect([" 1,5 ", "2e-3", "abc", "", "Infinity"].map(parseNumber)).toEqual([1.5, 0.002, null, null, null]);
+  });
+});
+
+describe("colours", () => {
+  test("the picker keeps a colour's strength", () => {
+    const strong: Rgb = [4, 2, 1];
+    expect(strength(strong)).toBe(4);
+    fromHex(toHex(strong), strong).forEach((v, c) => expect(v).toBeCloseTo(strong[c] as number, 1));
+    expect(toHex([1, 1, 1])).toBe("#ffffff");
+    expect(fromHex("#ffffff", [0.2, 0.1, 0.1])).toEqual([1, 1, 1]);
+  });
+});
+
+describe("terms", () => {
+  const model = (name: string, parameters: string[]): ModelInfo => ({
+    model: name,
+    label: name,
+    help: "",
+    source: "",
+    texture: "specular",
+    parameters: parameters.map((p) => ({ name: p, label: p, minimum: 0, maximum: 1, default: 0.5, unit: "", scale: "linear", help: "" })),
+    curves: [],
+  });
+  const models = [model("ggx", ["roughness", "f0"]), model("schlick", ["roughness", "r"])];
+
+  test("a new model keeps colour, texture and parameters of the same name", () => {
+    const term = { ...defaultTerm(models[0] as ModelInfo), color: [1, 2, 3] as Rgb, params: { roughness: 0.1, f0: 0.9 }, curves: { theta_h: {} } };
+    expect(withModel(term, "schlick", models)).toEqual({ model: "schlick", color: [1, 2, 3], params: { roughness: 0.1, r: 0.5 }, texture: null, curves: {} });
+    expect(withModel(term, "nothing", models)).toBe(term);
+  });
+});
+
+test("a place survives the URL", () => {
+  const place = { scene: "ab12", bake: "cd34", view: "front & left", material: "a/b~c", term: 2, curve: "theta_h" };
+  expect(placeFromUrl(placeToUrl(place))).toEqual(place);
+  expect(placeFromUrl("?term=-3")).toEqual({ scene: null, bake: null, view: null, material: null, term: 0, curve: null });
+  expect(placeFromUrl("?term=zzz").term).toBe(0);
+});
+
+test("dropped files find their role", () => {
+  const file = (name: string) => new File([], name);
+  const nothing = { scene: null, environment: null, refused: [] };
+  const first = sortFiles([file("a.GLB"), file("notes.txt")], nothing);
+  expect(first.refused).toEqual(["notes.txt"]);
+  const second = sortFiles([file("sky.exr")], first);
+  expect([second.scene?.name, second.environment?.name, second.refused]).toEqual(["a.GLB", "sky.exr", []]);
+});
+
+test("free names are free", () => {
+  expect(freeName([])).toBe("Look 1");
+  expect(freeName(["Warm", "Look 3"])).toBe("Look 4");
+});
+
+test("chords name Shift only beside Ctrl", () => {
+  const key = (k: string, ctrlKey = false, shiftKey = false) => chord({ key: k, ctrlKey, shiftKey, metaKey: false });
+  expect([key("?", false, true), key("Z", true, true), key("z", true), key("W")]).toEqual(["?", "Ctrl+Shift+z", "Ctrl+z", "w"]);
+});
+
+test("a gauge is read from Prometheus text", () => {
+  const text = "# HELP relume_frozen_cache_bytes x\nrelume_frozen_cache_bytes 1.5e+06\nrelume_frozen_cache_bytes_limit 9\n";
+  expect(gauge(text, "relume_frozen_cache_bytes")).toBe(1_500_000);
+  expect(gauge(text, "nothing")).toBeNull();
+});
