@@ -6,12 +6,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
+import uvicorn
 from fastapi import FastAPI
 
 from server import errors
 from server.guard import Guard
 from server.live.library import open_library
 from server.metrics import Metrics
+from server.protocol import MAX_MESSAGE_BYTES
 from server.routes import bakes, client, health, looks, models, renders, scenes, session
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
@@ -68,14 +70,17 @@ def create_app(
 
 def serve(settings: Settings) -> None:
     """Run the server until it is stopped; blocks."""
-    import uvicorn
+    uvicorn.Server(configure(create_app(settings), settings)).run()
 
-    uvicorn.run(
-        create_app(settings),
+
+def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """How uvicorn runs the app."""
+    return uvicorn.Config(
+        app,
         host=settings.host,
         port=settings.port,
         loop="uvloop",
-        ws_max_size=64 * 1024,
+        ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
         log_level="warning",  # the access log would show resume tokens
         server_header=False,

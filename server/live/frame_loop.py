@@ -12,7 +12,7 @@ import time
 from typing import Any
 
 from relume.brdf.curves import curve_bands, generated_bands
-from relume.errors import CancelledError, ParameterError, RelumeError
+from relume.errors import CancelledError, MemoryBudgetError, ParameterError, RelumeError
 from server.live.edits import LookDesk
 from server.live.pace import Pace
 from server.live.painter import Format, Order, Painted, Target, encode_brush, pack, paint, rounded, times
@@ -213,6 +213,10 @@ class FrameLoop:
 
     async def _take_back(self, target: Target | None, error: RelumeError) -> None:
         """Go back to the look that is shown; where that one itself fails, the session cannot go on."""
+        if target is None and isinstance(error, MemoryBudgetError):  # a curve was opened that is too much to freeze
+            self._touched, self._is_settled = None, True
+            await self._wire.refuse(error)
+            return
         if target is None or target.received_s is None:
             raise error
         if self._wishes.target is target:
