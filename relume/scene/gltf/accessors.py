@@ -50,9 +50,11 @@ class AccessorReader:
             raise SceneError(f"{what} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
         if index not in self._floats:
             values = self._values(accessor, what)
-            scale = np.iinfo(values.dtype).max if accessor.normalized and values.dtype.kind != "f" else 1
-            scaled = values.astype(np.float32) / np.float32(scale)
-            self._floats[index] = np.maximum(scaled, np.float32(-1)) if scale > 1 else scaled
+            if accessor.normalized and values.dtype.kind != "f":
+                scaled = values / np.float64(np.iinfo(values.dtype).max)
+                self._floats[index] = np.maximum(scaled, -1).astype(np.float32)
+            else:
+                self._floats[index] = values.astype(np.float32)
         return self._floats[index]
 
     def _accessor(self, index: int, what: str) -> Accessor:
