@@ -14,7 +14,7 @@ from relume.scene.gltf import import_gltf
 from relume.store import bake_here
 from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import open_transfer
+from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
 from relume.transfer.registry import METHODS
 
