@@ -214,8 +214,9 @@ class FrameLoop:
     async def _take_back(self, target: Target | None, error: RelumeError) -> None:
         """Go back to the look that is shown; where that one itself fails, the session cannot go on."""
         if target is None and isinstance(error, MemoryBudgetError):  # a curve was opened that is too much to freeze
-            self._touched, self._is_settled = None, True
+            self._touched = None
             await self._wire.refuse(error)
+            await self._open_view(self._view)  # a new picture, that does not wait for this curve
             return
         if target is None or target.received_s is None:
             raise error

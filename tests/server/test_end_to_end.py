@@ -1,0 +1,91 @@
+"""A real scene, a real bake, a real picture: what the session streams is what a render of the same look gives."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO
+import pytest
+import trimesh
+from fastapi.testclient import TestClient
+from session_client import Frame, open_session
+
+from server.app import create_app
+from server.settings import Settings
+
+WIDTH, HEIGHT = 80, 60
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    data = tmp_path_factory.mktemp("data")
+    with TestClient(create_app(Settings(data=data, allowed_hosts=["testserver"]))) as client:
+        yield client
+
+
+def decode_rgb9e5(payload: bytes) -> np.ndarray:
+    """EXT_texture_shared_exponent, written out."""
+    words = np.frombuffer(payload, "<u4")
+    mantissas = np.stack([(words >> shift) & 0x1FF for shift in (0, 9, 18)], -1).astype(np.float64)
+    return mantissas * np.exp2((words >> 27).astype(np.float64) - 15 - 9)[:, None]
+
+
+def put(picture: np.ndarray, frame: Frame) -> None:
+    """Copy a frame's tiles into the client's picture."""
+    pixels, start = decode_rgb9e5(frame.payload), 0
+    for x, y, w, h in frame.header["tiles"]:
+        picture[y : y + h, x : x + w] = pixels[start : start + w * h].reshape(h, w, 3)
+        start += w * h
+
+
+def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
+    for _ in range(6000):
+        body: dict[str, Any] = client.get(url).json()
+        if body["state"] not in ("queued", "running"):
+            return body
+        time.sleep(0.02)
+    raise TimeoutError(url)
+
+
+def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) -> None:
+    glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
+    scene = real.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
+    request = {"scene": scene["id"], "size": [WIDTH, HEIGHT], "lights": 200}
+    bake = wait_until_done(real, real.post("/api/bakes", json=request).headers["location"])
+    assert bake["state"] == "ready", bake["problem"]
+
+    name = scene["materials"][0]["name"]
+    terms = [
+        {"model": "lambert", "color": [0.1, 0.3, 0.2]},
+        {"model": "cook_torrance", "color": [1.0, 1.0, 1.0], "params": {"sigma": 0.3}},
+    ]
+    picture = np.zeros((HEIGHT, WIDTH, 3))
+    with open_session(real, bake["id"]) as session:
+        session.edit(1, f"/materials/{name}/terms", terms)
+        session.send(type="touch", curve=f"/materials/{name}/terms/1/curves/theta_h")
+        session.edit(2, f"/materials/{name}/terms/1/params/sigma", 0.2)
+        while True:
+            message = session.receive()
+            if isinstance(message, Frame):
+                put(picture, message)
+                if message.header["exact"] and message.header["revision"] == 2:
+                    break
+        session.send(type="probe", x=WIDTH // 2, y=HEIGHT // 2)
+        probe = session.text("probe")
+
+    terms[1]["params"] = {"sigma": 0.2}
+    looks = [{"materials": {name: {"terms": terms}}}]
+    render = {"bake": bake["id"], "view": "front", "looks": looks, "format": "exr"}
+    url = real.post("/api/renders", json=render).headers["location"]
+    assert wait_until_done(real, url)["state"] == "ready"
+    file = tmp_path / "frame.exr"
+    file.write_bytes(real.get(f"{url}/frames/0").content)
+    rendered = OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)
+    # nine bits of mantissa, shared by the channels
+    tolerance = rendered.max(axis=-1, keepdims=True) / 256 + 1e-4
+    assert rendered.max() > 0.01
+    assert np.all(np.abs(picture - rendered) <= tolerance)
+    assert probe["material"] == name
+    assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
