@@ -26,7 +26,7 @@ BETA = int(Angle.BETA)
 THETA_O = int(Angle.THETA_O)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def acos_clamped(x):  # type: ignore[no-untyped-def]
     """Arc cosine of x clamped to [0, 1], in [0, π/2]; absolute error below 3e-7 (Abramowitz and Stegun 4.4.46)."""
     x = min(max(x, _ZERO), _ONE)
@@ -41,7 +41,7 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
     return p * math.sqrt(_ONE - x)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions; `kind` is an `Angle`."""
     if kind == THETA_I:
@@ -66,7 +66,7 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     return acos_clamped(math.exp(power * math.log(cos_theta_h)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """γ · scale of many directions wi and one wo.
 
@@ -76,5 +76,13 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
         ox, oy, oz: local wo, scalars.
         out: (n,) float32, written.
     """
-    for k in range(ix.shape[0]):
-        out[k] = scale * angle_at(kind, ix[k], iy[k], iz[k], ox, oy, oz)
+    # one loop for each frequent angle: only then does the compiler vectorise it
+    if kind == THETA_H:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(THETA_H, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == THETA_D:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(THETA_D, ix[k], iy[k], iz[k], ox, oy, oz)
+    else:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(kind, ix[k], iy[k], iz[k], ox, oy, oz)

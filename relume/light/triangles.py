@@ -33,23 +33,21 @@ class TriangleLights:
     """M spherical triangles that tile the sphere.
 
     Attributes:
-        vertices: unit. (num_vertices, 3) float32
-        faces: (M, 3) int32
-        centroid: normalised mean of the corners. (M, 3) float32
+        nodes: of each triangle its corners a, b, c and the midpoints of ab, bc, ca. (M, 6) int32
+        node_directions: unit. (3, num_nodes) float32
         direction: mean direction of the light in the triangle; shadow rays go there. (M, 3) float32
         power: radiance integrated over the triangle, W/m² per colour. (M, 3) float32
     """
 
-    vertices: F32
-    faces: NDArray[np.int32]
-    centroid: F32
+    nodes: NDArray[np.int32]
+    node_directions: F32
     direction: F32
     power: F32
 
     @property
     def num_lights(self) -> int:
         """M."""
-        return len(self.faces)
+        return len(self.nodes)
 
 
 @nb.njit(nogil=True, cache=True)
@@ -121,6 +119,11 @@ class _Subdivision:
             self.vertices.append(_unit(self.vertices[a] + self.vertices[b]))
         return self.midpoints[key]
 
+    def nodes_of(self, face: tuple[int, int, int]) -> tuple[int, ...]:
+        """Corners and edge midpoints of a face."""
+        a, b, c = face
+        return a, b, c, self._midpoint(a, b), self._midpoint(b, c), self._midpoint(c, a)
+
     def split_largest(self) -> bool:
         """Replace the leaf of largest metric by its four children; False where nothing is left to split."""
         if self.heap[0][0] == 0.0:
@@ -150,9 +153,9 @@ def subdivide(radiance: F32, num_lights: int) -> TriangleLights:
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
     leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together
+    nodes = np.array([tree.nodes_of(leaf[2]) for leaf in leaves], dtype=np.int32)
     vertices = np.asarray(tree.vertices)
-    faces = np.array([leaf[2] for leaf in leaves], dtype=np.int32)
-    centroid = _unit(vertices[faces].mean(axis=1))
+    centroid = _unit(vertices[nodes[:, :3]].mean(axis=1))
     power = np.array([tree.power[leaf[3]].sum(axis=0) for leaf in leaves])
     direction = np.empty_like(centroid)
     for m, leaf in enumerate(leaves):
@@ -160,9 +163,5 @@ def subdivide(radiance: F32, num_lights: int) -> TriangleLights:
         length = float(np.linalg.norm(towards))
         direction[m] = towards / length if length > 0 else centroid[m]
     return TriangleLights(
-        vertices.astype(np.float32),
-        faces,
-        centroid.astype(np.float32),
-        direction.astype(np.float32),
-        power.astype(np.float32),
+        nodes, np.ascontiguousarray(vertices.T, np.float32), direction.astype(np.float32), power.astype(np.float32)
     )

@@ -1,0 +1,56 @@
+"""From term images to the radiance of view samples: colours, textures and outgoing curves multiply the finished terms."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.parallel import for_ranges
+
+F32 = NDArray[np.float32]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
+    """Tiles [start, stop) of one term into radiance (3, samples of the view), beginning at sample `first`."""
+    samples = image.shape[2]
+    num = texture.shape[0]
+    for tile in range(start, stop):
+        begin = tile * samples
+        count = min(samples, num - begin)
+        for channel in range(3):
+            c = color[channel]
+            for s in range(count):
+                row = begin + s
+                value = c * image[tile, channel, s]
+                if has_texture:
+                    value *= texture[row, channel]
+                if has_outgoing:
+                    value *= outgoing[channel, row]
+                if replace:
+                    radiance[channel, first + row] = value
+                else:
+                    radiance[channel, first + row] += value
+
+
+def add_term(
+    image: F32, color: F32, texture: F32, outgoing: F32 | None, has_texture: bool, first: int, replace: bool, radiance: F32
+) -> None:
+    """Add one term of a material to the view's radiance, or begin with it.
+
+    Args:
+        image: Σ_j c_j T_j. (tiles, 3, samples) float32
+        color: (3,) float32. texture: per sample, used where `has_texture`. (n, 3) float32
+        outgoing: product of the curves of the outgoing angle. (3, n) float32, None for 1
+        first: the material's first sample in the view. replace: overwrite instead of adding.
+        radiance: (3, samples of the view) float32, written.
+    """
+    factor = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
+    for_ranges(
+        lambda start, stop: _add(
+            image, color, texture, factor, has_texture, outgoing is not None, first, replace, start, stop, radiance
+        ),
+        len(image),
+        2,
+    )  # fmt: skip

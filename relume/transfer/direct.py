@@ -1,0 +1,179 @@
+"""Method `direct`: environment light, fixed views, shadows, no bounces (Ben-Artzi 2006).
+
+The bake keeps rays, not answers: per view sample one visibility bit a light triangle, and the image of each term of the
+scene's own look, so that the first picture needs no projection. Stages: "samples" (the light triangles, and each view's
+samples), then "visibility" (rows of each view).
+
+    lights/nodes, node_directions, direction, power         relume.light.triangles.TriangleLights
+    views/<view>/pixel, weight, material                     every sample; background samples last
+    views/<view>/position, normal, tangent, diffuse, specular
+    views/<view>/visibility                                  samples on surfaces only, as the next one
+    views/<view>/images                                      Σ_j c_j T_j of each term of the default look
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.errors import PlanError
+from relume.light.triangles import MAX_LIGHTS, MIN_LIGHTS, TriangleLights, subdivide
+from relume.look import default_look
+from relume.scene.model import Scene
+from relume.trace.geometry import Geometry, merge
+from relume.trace.view_samples import BACKGROUND, sample_view
+from relume.trace.visibility import trace_visibility
+from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.stored import read_lights, read_receivers
+
+CHUNK_ROWS, SHARD_ROWS = 1024, 16_384
+MAX_PIXELS = 4096 * 4096
+_SAMPLES_A_PIXEL = 1.5  # upper bound over the scenes measured; edges have two or three
+_SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
+
+
+class DirectMethod:
+    """Implements `relume.transfer.base.TransferMethod`."""
+
+    name = "direct"
+    stages = ("samples", "visibility")
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._geometry: tuple[str, Geometry] | None = None
+
+    def __reduce__(self) -> tuple[type[DirectMethod], tuple[()]]:
+        return DirectMethod, ()  # travels to workers without its geometry
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Upper bounds from the recipe alone."""
+        width, height = recipe.size
+        known = [camera.name for camera in scene.cameras]
+        if unknown := [view for view in recipe.views if view not in known]:
+            raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(known)}")
+        if not recipe.views or len(set(recipe.views)) != len(recipe.views):
+            raise PlanError("name each view once, and at least one")
+        if not (16 <= width and 16 <= height and width * height <= MAX_PIXELS):
+            raise PlanError(f"{width}×{height} pixels were asked for; give at least 16×16, at most {MAX_PIXELS} in all")
+        if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
+            raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
+        samples_a_view = int(_SAMPLES_A_PIXEL * width * height)
+        samples = samples_a_view * len(recipe.views)
+        bits = (recipe.num_lights + 7) // 8
+        image_bytes = 12 * self._num_images(scene)
+        return Plan(
+            num_view_samples=samples,
+            num_rays=samples * recipe.num_lights,
+            store_bytes=samples * (bits + image_bytes + _SURFACE_BYTES),
+            # the sampling stage holds eight rays of each edge pixel with their surfaces, the others one shard
+            peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + image_bytes + 400) + 200_000_000,
+        )
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """What opening the store needs besides its arrays."""
+        cameras = {camera.name: camera for camera in scene.cameras}
+        return {
+            "method": self.name,
+            "scene": scene.id,
+            "size": list(recipe.size),
+            "num_lights": recipe.num_lights,
+            "look": default_look(scene.materials),
+            "materials": [material.name for material in scene.materials],
+            "views": {view: {"eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views},
+        }
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The lights and each view; then whole shards of each view's surface samples."""
+        if stage == 0:
+            return [Task(0, 0, "", 0, 0), *(Task(0, k + 1, view, 0, 0) for k, view in enumerate(recipe.views))]
+        ranges = [
+            (view, start, min(start + SHARD_ROWS, rows))
+            for view in recipe.views
+            for rows in [self._num_surface_samples(view, store)]
+            for start in range(0, rows, SHARD_ROWS)
+        ]
+        return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """Visibility and images; the arrays of the first stage are made by its tasks."""
+        if stage == 0:
+            return []
+        bits = (store.shape("lights/nodes")[0] + 7) // 8
+        num_images = self._num_images(scene)
+        specs = []
+        for view in recipe.views:
+            rows = self._num_surface_samples(view, store)
+            for name, width, dtype in (("visibility", (bits,), "uint8"), ("images", (num_images, 3), "float32")):
+                specs.append(
+                    ArraySpec(
+                        f"views/{view}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width)
+                    )
+                )
+        return specs
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        """One task; nothing is random, so the same task gives the same bits anywhere."""
+        if task.stage == 1:
+            return self._visibility(scene, task, store)
+        if not task.view:
+            lights = subdivide(scene.environment.radiance, recipe.num_lights)
+            names = ("nodes", "node_directions", "direction", "power")
+            return Written({f"lights/{name}": getattr(lights, name) for name in names}, 0, 0.0)
+        samples = sample_view(scene, self._geometry_of(scene), task.view, recipe.size)
+        surface = samples.surface
+        arrays = {
+            "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
+            "position": surface.position, "normal": surface.normal, "tangent": surface.tangent,
+            "diffuse": surface.diffuse, "specular": surface.specular,
+        }  # fmt: skip
+        return Written({f"views/{task.view}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
+
+    def _visibility(self, scene: Scene, task: Task, store: StoreReader) -> Written:
+        lights = read_lights(store)
+        geometry = self._geometry_of(scene)
+        prefix = f"views/{task.view}"
+        position = store.read(f"{prefix}/position", task.start, task.stop)
+        normal = store.read(f"{prefix}/normal", task.start, task.stop)
+        traced = trace_visibility(geometry.embree, position, normal, lights.direction)
+        receivers = read_receivers(store, task.view, task.start, task.stop, traced.visible)
+        material = store.read(f"{prefix}/material", task.start, task.stop)
+        images = _default_images(scene, material, lights, receivers, self._num_images(scene))
+        arrays = {f"{prefix}/visibility": traced.visible, f"{prefix}/images": images}
+        return Written(arrays, traced.num_rays, traced.trace_s)
+
+    def _geometry_of(self, scene: Scene) -> Geometry:
+        with self._lock:
+            if self._geometry is None or self._geometry[0] != scene.id:
+                self._geometry = scene.id, merge(scene)
+            return self._geometry[1]
+
+    @staticmethod
+    def _num_images(scene: Scene) -> int:
+        return max(1, *(len(material.terms) for material in scene.materials))
+
+    @staticmethod
+    def _num_surface_samples(view: str, store: StoreReader) -> int:
+        return int(np.searchsorted(store.read(f"views/{view}/material"), BACKGROUND))
+
+
+def _default_images(
+    scene: Scene, material: NDArray[np.uint16], lights: TriangleLights, receivers: Receivers, num_images: int
+) -> NDArray[np.float32]:
+    """Image of each term of the scene's own look. (n, num_images, 3) float32"""
+    look = default_look(scene.materials)
+    images = np.zeros((len(material), num_images, 3), np.float32)
+    for index in np.unique(material):
+        first, last = np.searchsorted(material, [index, index + 1])
+        for k, document in enumerate(look["materials"][scene.materials[index].name]["terms"]):
+            term = TERMS[document["model"]]
+            bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
+            projector = Projector(term, contract(term, bands, None), lights, receivers)
+            images[first:last, k] = projector.project(int(first), int(last))[:, 0]
+    return images

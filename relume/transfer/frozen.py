@@ -1,0 +1,104 @@
+"""Freezing: a term's transport along one curve, everything dormant contracted, in the wavelet basis.
+
+T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi 2006).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.daubechies import forward
+from relume.brdf.term import Term
+from relume.errors import CancelledError
+from relume.light.triangles import TriangleLights
+from relume.parallel import for_ranges
+from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.stream import TILE_SAMPLES
+
+F32 = NDArray[np.float32]
+
+_SAMPLES_A_STEP = 512
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """The linear operator from one curve to the image of one term.
+
+    Attributes:
+        transport: wavelet coefficients, samples padded with zeros to whole tiles. (tiles, 3, J, samples) float32
+        importance: length of each column over all samples; what a coefficient moves in the picture. (3, J) float64
+    """
+
+    transport: F32
+    importance: NDArray[np.float64]
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.transport.nbytes
+
+
+def tiles_of(num_samples: int) -> tuple[int, int]:
+    """Number of tiles, and samples a tile, that hold so many samples: tiles alike, none much larger than needed."""
+    tiles = max(1, -(-num_samples // TILE_SAMPLES))
+    samples = -(-num_samples // tiles)
+    return tiles, -(-max(1, samples) // 16) * 16
+
+
+def frozen_bytes(num_samples: int, num_bands: int) -> int:
+    """Memory that freezing needs to keep."""
+    tiles, samples = tiles_of(num_samples)
+    return tiles * samples * 3 * num_bands * 4
+
+
+def freeze(
+    term: Term,
+    bands: Mapping[str, NDArray[np.float64]],
+    active: str,
+    lights: TriangleLights,
+    receivers: Receivers,
+    progress: Callable[[float], None],
+    cancelled: Callable[[], bool],
+) -> Frozen:
+    """Project all receivers along a curve.
+
+    Args:
+        bands: of all the term's curves, (3, J) each; the active one's values do not matter.
+        progress: called with the share done. cancelled: asked now and then.
+    Raises:
+        CancelledError: `cancelled` said so.
+    """
+    contraction = contract(term, bands, active)
+    num_samples, num_bands = len(receivers.normal), contraction.num_columns
+    tiles, samples = tiles_of(num_samples)
+    transport = np.empty((tiles, 3, num_bands, samples), np.float32)
+    squares = np.zeros((3, num_bands))
+    lock, done = threading.Lock(), [0]
+
+    def tile_range(first: int, last: int) -> None:
+        projector = Projector(term, contraction, lights, receivers)
+        for tile in range(first, last):
+            block = transport[tile]
+            for start in range(0, samples, _SAMPLES_A_STEP):
+                if cancelled():
+                    raise CancelledError("freezing was cancelled")
+                begin = min(tile * samples + start, num_samples)
+                end = min(tile * samples + min(start + _SAMPLES_A_STEP, samples), num_samples)
+                rows = np.ascontiguousarray(projector.project(begin, end).transpose(2, 0, 1)).reshape(-1, num_bands)
+                forward(rows)
+                block[:, :, start : start + end - begin] = rows.reshape(3, -1, num_bands).transpose(0, 2, 1)
+                block[:, :, start + end - begin : start + _SAMPLES_A_STEP] = 0
+                with lock:
+                    done[0] += _SAMPLES_A_STEP
+                    progress(min(1.0, done[0] / max(1, tiles * samples)))
+            length = np.einsum("cjs,cjs->cj", block, block, dtype=np.float64)
+            with lock:
+                np.add(squares, length, out=squares)
+
+    for_ranges(tile_range, tiles, 1)
+    return Frozen(transport, np.sqrt(squares))

@@ -1,0 +1,82 @@
+"""The live image of one material: its terms, composed into the radiance of its view samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.transfer.compose import add_term
+from relume.transfer.term_image import TermImage
+from relume.transfer.view import View
+
+F32 = NDArray[np.float32]
+
+
+class MaterialImage:
+    """State of one material in one view."""
+
+    def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]]) -> None:
+        self._view, self.index = view, index
+        rows = view.rows(index)
+        self.num_samples = rows.stop - rows.start
+        self._first = rows.start
+        self._cos_theta_o = view.cos_theta_o[rows]
+        self._textures = {name: texture[rows] for name, texture in view.textures.items()}
+        self.documents = list(documents)
+        self.terms = [TermImage(document, self._cos_theta_o) for document in documents]
+        self._is_current = False
+        images = view.images(index)
+        for k, term in enumerate(self.terms):
+            term.show_default(images[:, k])
+
+    def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
+        """New targets; terms that stay as they are keep their images."""
+        if documents == self.documents:
+            return
+        kept = len(self.terms)
+        for k, document in enumerate(documents):
+            if k >= kept:
+                self.terms.append(TermImage(document, self._cos_theta_o))
+            elif document != self.documents[k]:
+                self.terms[k].set_document(document)
+        del self.terms[len(documents) :]
+        self.documents = list(documents)
+        self._is_current = False
+
+    def changed_terms(self) -> Iterator[TermImage]:
+        """Terms whose image does not show their target."""
+        return (term for term in self.terms if not term.is_exact())
+
+    def compose(self, radiance: F32) -> bool:
+        """Write the material's samples into the view's radiance; False where nothing has changed since the last time."""
+        if self._is_current and all(term.is_composed for term in self.terms):
+            return False
+        for k, term in enumerate(self.terms):
+            color, texture, has_texture = self._factors(term)
+            add_term(term.image, color, texture, term.outgoing, has_texture, self._first, k == 0, radiance)
+            term.is_composed = True
+        if not self.terms:
+            radiance[:, self._first : self._first + self.num_samples] = 0
+        self._is_current = True
+        return True
+
+    def term_radiance(self, term: TermImage, image: F32, radiance: F32) -> None:
+        """Write what another image of one term would give alone; the term itself stays."""
+        color, texture, has_texture = self._factors(term)
+        add_term(image, color, texture, term.outgoing, has_texture, self._first, True, radiance)
+
+    def factors_at(self, term: TermImage, sample: int) -> NDArray[np.float64]:
+        """What multiplies a term's image at one of the material's samples. (3,) float64"""
+        color, texture, has_texture = self._factors(term)
+        factor = color.astype(np.float64)
+        if has_texture:
+            factor = factor * texture[sample]
+        return factor if term.outgoing is None else factor * term.outgoing[:, sample]
+
+    def _factors(self, term: TermImage) -> tuple[F32, F32, bool]:
+        color = np.asarray(term.document["color"], np.float32)
+        name = term.document.get("texture")
+        return color, self._textures[name or "diffuse"], name is not None

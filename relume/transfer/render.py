@@ -1,0 +1,38 @@
+"""One exact picture without a session: batch renders and `relume render`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import PlanError
+from relume.look import Look
+from relume.transfer.cache import FrozenCache
+from relume.transfer.opened import Transfer
+from relume.transfer.picture import Picture
+
+_CACHE_BYTES = 4 << 30  # one operator at a time is alive; the largest picture that fits is what a session could show
+
+
+def render_image(
+    transfer: Transfer, view_name: str, look: Look, size: tuple[int, int] | None = None
+) -> NDArray[np.float32]:
+    """Render a look exactly.
+
+    Args:
+        size: width and height; only the baked one is possible, None means it.
+    Returns:
+        Linear radiance. (height, width, 3) float32
+    Raises:
+        PlanError: another size than the baked one.
+    """
+    view = transfer.views[view_name]
+    if size is not None and tuple(size) != (view.width, view.height):
+        raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
+    picture = Picture(transfer, view_name, FrozenCache(_CACHE_BYTES))
+    picture.set_look(look)
+    while True:
+        exact = picture.advance(None).exact
+        if picture.waiting() is None and exact:
+            return picture.image()
+        picture.freeze(lambda share: None, lambda: False)

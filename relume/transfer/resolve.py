@@ -1,0 +1,104 @@
+"""From view samples to pixels, and pixels to bytes: the last two steps of a frame, a tile of the picture at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import ParameterError
+from relume.parallel import for_ranges
+from relume.transfer.view import Tile, View
+
+F32 = NDArray[np.float32]
+
+_BIAS, _MANTISSA_BITS, _LARGEST = 15, 9, np.float32(65408.0)  # RGB9_E5 of OpenGL, EXT_texture_shared_exponent
+_TILES_A_RANGE = 4
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def pack_rgb9e5(red, green, blue):  # type: ignore[no-untyped-def]
+    """One pixel as 32 bits: three 9-bit mantissas, red lowest, and a 5-bit exponent they share."""
+    red = min(max(red, np.float32(0)), _LARGEST)
+    green = min(max(green, np.float32(0)), _LARGEST)
+    blue = min(max(blue, np.float32(0)), _LARGEST)
+    largest = max(red, max(green, blue))
+    if not largest > 0:
+        return np.uint32(0)
+    _, exponent = math.frexp(largest)
+    shared = max(0, np.int64(exponent) + _BIAS)
+    scale = np.float32(math.ldexp(1.0, _MANTISSA_BITS + _BIAS - shared))
+    if np.int64(largest * scale + np.float32(0.5)) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
+        shared += 1
+        scale *= np.float32(0.5)
+    r = np.uint32(red * scale + np.float32(0.5))
+    g = np.uint32(green * scale + np.float32(0.5))
+    b = np.uint32(blue * scale + np.float32(0.5))
+    return r | (g << np.uint32(9)) | (b << np.uint32(18)) | (np.uint32(shared) << np.uint32(27))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _resolve(radiance, scale, first, order, weight, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
+    """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
+    for t in range(start, stop):
+        x0, y0, tile_width, tile_height = tiles[t, 0], tiles[t, 1], tiles[t, 2], tiles[t, 3]
+        at = offsets[t]
+        for y in range(y0, y0 + tile_height):
+            for x in range(x0, x0 + tile_width):
+                p = y * width + x
+                red = green = blue = np.float32(0)
+                for k in range(first[p], first[p + 1]):
+                    s, w = order[k], scale * weight[k]
+                    red += w * radiance[0, s]
+                    green += w * radiance[1, s]
+                    blue += w * radiance[2, s]
+                out[at, 0], out[at, 1], out[at, 2] = red, green, blue
+                at += 1
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _pack(pixels, start, stop, out):  # type: ignore[no-untyped-def]
+    for p in range(start, stop):
+        out[p] = pack_rgb9e5(pixels[p, 0], pixels[p, 1], pixels[p, 2])
+
+
+def resolve(view: View, radiance: F32, tiles: Sequence[Tile], scale: float) -> F32:
+    """Pixels of tiles, one tile after another, row-major.
+
+    Args:
+        radiance: of every view sample. (3, samples) float32
+        scale: multiplies all, as the environment's scale does.
+    Returns:
+        (pixels, 3) float32
+    """
+    table = np.array(tiles, np.int64).reshape(-1, 4)
+    sizes = table[:, 2] * table[:, 3]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    out = np.empty((int(offsets[-1]), 3), np.float32)
+    for_ranges(
+        lambda start, stop: _resolve(
+            radiance, np.float32(scale), view.first, view.order, view.weight, view.width, table, offsets, start, stop, out
+        ),
+        len(table),
+        _TILES_A_RANGE,
+    )  # fmt: skip
+    return out
+
+
+def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, scale: float) -> bytes:
+    """Pixels of tiles as a frame's payload: "rgb9e5" or "f32" (see docs/api.md).
+
+    Raises:
+        ParameterError: another format.
+    """
+    pixels = resolve(view, radiance, tiles, scale)
+    if form == "f32":
+        return pixels.tobytes()
+    if form != "rgb9e5":
+        raise ParameterError("format", form, "'rgb9e5' or 'f32'")
+    out = np.empty(len(pixels), np.uint32)
+    for_ranges(lambda start, stop: _pack(pixels, start, stop, out), len(pixels), 16_384)
+    return out.tobytes()

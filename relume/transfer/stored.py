@@ -1,0 +1,31 @@
+"""Lights and receivers as a store of the direct method keeps them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.triangles import TriangleLights
+from relume.transfer.base import StoreReader
+from relume.transfer.projector import Receivers
+
+
+def read_lights(store: StoreReader) -> TriangleLights:
+    """The light triangles of a store."""
+    nodes, directions, direction, power = (
+        store.read(f"lights/{name}") for name in ("nodes", "node_directions", "direction", "power")
+    )
+    return TriangleLights(nodes, directions, direction, power)
+
+
+def read_receivers(store: StoreReader, view: str, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
+    """Samples [start, stop) of a view as points that light arrives at."""
+    eye = np.asarray(store.attributes["views"][view]["eye"], np.float32)
+    position = store.read(f"views/{view}/position", start, stop)
+    towards = eye - position
+    return Receivers(
+        store.read(f"views/{view}/normal", start, stop),
+        store.read(f"views/{view}/tangent", start, stop),
+        (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32),
+        visible,
+    )

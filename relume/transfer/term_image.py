@@ -1,0 +1,130 @@
+"""The live image of one term of one material: which curve is free, what it shows, what it should show.
+
+Exactness is tracked as in eqs. 29 to 31, Ben-Artzi 2006: the image belongs to the effective coefficients, and a step adds
+T · (c_perfect − c_effective), the most important coefficients first where there is no time for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.daubechies import analysis
+from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Term
+from relume.transfer.frozen import Frozen, tiles_of
+from relume.transfer.stream import columns_of, stream
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+class TermImage:
+    """State of one term.
+
+    Attributes:
+        target: bands of each curve in the newest look. effective: those that `image` shows; None where it shows nothing.
+        active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
+        image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
+        outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
+    """
+
+    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64) -> None:
+        self._theta_o = np.arccos(cos_theta_o)
+        self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
+        self.effective: dict[str, F64] | None = None
+        self.active: str | None = None
+        self.shown: F64 | None = None
+        self.is_composed = False
+        self.set_document(document)
+
+    @property
+    def term(self) -> Term:
+        """The declaration of the term's model."""
+        return TERMS[self.document["model"]]
+
+    def set_document(self, document: Mapping[str, Any]) -> None:
+        """A new target; another model starts from nothing."""
+        previous = getattr(self, "document", None)
+        self.document = document
+        if previous is not None and previous["model"] != document["model"]:
+            self.effective = self.active = self.shown = None
+        self.target = {curve.name: curve_bands(document, curve) for curve in self.term.curves if not curve.outgoing}
+        self.outgoing = self._outgoing()
+        self.is_composed = False
+
+    def show_default(self, images: F32) -> None:
+        """Start from the stored image of the target curves. images: (samples, 3) float32"""
+        tiles, _, samples = self.image.shape
+        padded = np.zeros((tiles * samples, 3), np.float32)
+        padded[: len(images)] = images
+        self.image[:] = padded.reshape(tiles, samples, 3).transpose(0, 2, 1)
+        self.effective = dict(self.target)
+        self.is_composed = False
+
+    def _outgoing(self) -> F32 | None:
+        curves = [curve for curve in self.term.curves if curve.outgoing]
+        if not curves:
+            return None
+        values = [curve_values(self.document, curve, self._theta_o) for curve in curves]
+        return np.prod(values, axis=0).astype(np.float32)
+
+    def differing(self) -> list[str]:
+        """Curves whose target the image does not show."""
+        if self.effective is None:
+            return list(self.target)
+        return [name for name, bands in self.target.items() if not np.array_equal(bands, self.effective[name])]
+
+    def is_exact(self) -> bool:
+        """Whether the image shows the target."""
+        return self.effective is not None and not self.differing()
+
+    def dormant_key(self, active: str, *, of_target: bool) -> Hashable:
+        """What a frozen operator depends on besides the view and the material."""
+        bands = self.target if of_target or self.effective is None else self.effective
+        return (
+            self.document["model"],
+            active,
+            *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name != active),
+        )
+
+    def adopt(self, frozen: Frozen, active: str) -> None:
+        """Go on with an operator whose dormant curves are those of the target.
+
+        Where the image showed other dormant curves it is made anew from all coefficients.
+        """
+        others = [name for name in self.differing() if name != active]
+        self.active = active
+        if self.effective is None or others:
+            self.image[:] = 0
+            self.shown = analysis(self.target[active])
+            stream(frozen.transport, columns_of(self.shown), self.image)
+            self.effective = dict(self.target)
+            self.is_composed = False
+        else:
+            self.shown = analysis(self.effective[active])
+
+    def step(self, frozen: Frozen, max_coefficients: int | None) -> int:
+        """Bring the active curve towards its target (eqs. 29 to 31); returns the number of coefficients moved."""
+        assert self.active is not None and self.effective is not None and self.shown is not None
+        if np.array_equal(self.target[self.active], self.effective[self.active]):
+            return 0
+        perfect = analysis(self.target[self.active])
+        change = perfect - self.shown
+        budget = change.size if max_coefficients is None else 3 * max_coefficients
+        moved = int(np.count_nonzero(change))
+        if moved > budget:
+            weight = np.abs(change) * frozen.importance
+            change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
+            self.shown = self.shown + change
+            self.effective = {**self.effective, self.active: np.full_like(perfect, np.nan)}  # shows no curve exactly
+        else:
+            self.shown = perfect
+            self.effective = {**self.effective, self.active: self.target[self.active]}
+        stream(frozen.transport, columns_of(change), self.image)
+        self.is_composed = False
+        return min(moved, budget)

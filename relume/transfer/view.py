@@ -1,0 +1,141 @@
+"""A baked view opened for rendering: its samples by material, and how they make pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import ChunkDamagedError
+from relume.trace.view_samples import BACKGROUND
+from relume.transfer.base import StoreReader
+from relume.transfer.projector import Receivers
+from relume.transfer.stored import read_receivers
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+
+TILE_PIXELS = 64
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's samples, sorted by material.
+
+    Attributes:
+        bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
+        first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int64
+        order: (n,) int32. weight: share of its pixel, in that order. (n,) float32
+        cos_theta_o: of the samples on surfaces. (surface samples,) float64
+    """
+
+    name: str
+    width: int
+    height: int
+    store: StoreReader = field(repr=False)
+    bounds: NDArray[np.int64]
+    pixel: NDArray[np.uint32]
+    first: NDArray[np.int64]
+    order: NDArray[np.int32]
+    weight: F32
+    textures: dict[str, F32]
+    cos_theta_o: NDArray[np.float64]
+
+    @property
+    def num_view_samples(self) -> int:
+        """Samples, background included."""
+        return len(self.pixel)
+
+    @property
+    def num_surface_samples(self) -> int:
+        """Samples on surfaces; they come first."""
+        return int(self.bounds[-1])
+
+    def rows(self, material: int) -> slice:
+        """The samples of a material."""
+        return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
+
+    def receivers(self, material: int) -> Receivers:
+        """A material's samples as points that light arrives at; reads the store."""
+        rows = self.rows(material)
+        visible = self.store.read(f"views/{self.name}/visibility", rows.start, rows.stop)
+        return read_receivers(self.store, self.name, rows.start, rows.stop, visible)
+
+    def images(self, material: int) -> F32:
+        """Image of each term of the default look, before colour and textures. (samples, terms, 3) float32"""
+        rows = self.rows(material)
+        return np.asarray(self.store.read(f"views/{self.name}/images", rows.start, rows.stop), np.float32)
+
+    def background(self) -> F32:
+        """Radiance of the samples after the surfaces. (n, 3) float32"""
+        return np.asarray(self.store.read(f"views/{self.name}/diffuse", self.num_surface_samples), np.float32)
+
+    def material_ids(self) -> NDArray[np.uint16]:
+        """The material that covers most of each pixel, 65535 where that is the background. (height, width)"""
+        material = np.full(self.num_view_samples, BACKGROUND, np.uint16)
+        for index in range(len(self.bounds) - 1):
+            material[self.rows(index)] = index
+        ids = np.full(self.width * self.height, BACKGROUND, np.uint16)
+        by_weight = np.argsort(self.weight, kind="stable")  # the heaviest of a pixel is written last
+        pixel_of = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        ids[pixel_of[by_weight]] = material[self.order[by_weight]]
+        return ids.reshape(self.height, self.width)
+
+    @cached_property
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture: x, y, width, height in pixels."""
+        return [
+            (x, y, min(TILE_PIXELS, self.width - x), min(TILE_PIXELS, self.height - y))
+            for y in range(0, self.height, TILE_PIXELS)
+            for x in range(0, self.width, TILE_PIXELS)
+        ]
+
+    @cached_property
+    def tiles_of_material(self) -> list[list[Tile]]:
+        """Tiles with at least one pixel of each material."""
+        columns = -(-self.width // TILE_PIXELS)
+        touched = []
+        for index in range(len(self.bounds) - 1):
+            pixel = self.pixel[self.rows(index)]
+            codes = pixel // self.width // TILE_PIXELS * columns + pixel % self.width // TILE_PIXELS
+            touched.append([self.all_tiles[code] for code in np.unique(codes)])
+        return touched
+
+
+def open_view(store: StoreReader, name: str) -> View:
+    """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
+
+    Raises:
+        ChunkDamagedError: arrays of the store do not fit each other.
+    """
+    width, height = store.attributes["size"]
+    prefix = f"views/{name}"
+    pixel = store.read(f"{prefix}/pixel")
+    material = store.read(f"{prefix}/material")
+    weight = store.read(f"{prefix}/weight")
+    num_materials = len(store.attributes["materials"])
+    surface = int(np.searchsorted(material, BACKGROUND))
+    if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(np.diff(material.astype(np.int64)) < 0):
+        raise ChunkDamagedError(prefix, "its samples do not fit its size")
+    if surface and int(material[surface - 1]) >= num_materials:
+        raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
+    order = np.argsort(pixel, kind="stable").astype(np.int32)
+    eye = np.asarray(store.attributes["views"][name]["eye"])
+    towards = eye - store.read(f"{prefix}/position", 0, surface)
+    normal = store.read(f"{prefix}/normal", 0, surface)
+    cosine = np.einsum("nc,nc->n", normal, towards) / np.linalg.norm(towards, axis=1)
+    return View(
+        name=name,
+        width=width,
+        height=height,
+        store=store,
+        bounds=np.searchsorted(material[:surface], np.arange(num_materials + 1)).astype(np.int64),
+        pixel=pixel,
+        first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
+        order=order,
+        weight=np.ascontiguousarray(weight[order], np.float32),
+        textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
+        cos_theta_o=np.clip(cosine, 0, 1),
+    )
