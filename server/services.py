@@ -32,7 +32,7 @@ class Services:
     """What routes use.
 
     Attributes:
-        session_slots: one is held by each live session.
+        session_slots: one is held by each live session. import_slots: one by each import that runs.
     """
 
     settings: Settings
@@ -44,7 +44,10 @@ class Services:
     transfers: TransferPool
     house: House
     session_slots: threading.BoundedSemaphore
+    import_slots: asyncio.Semaphore
 
+
+MAX_IMPORTS = 2
 
 OpenLibrary = Callable[[int], Library]
 OpenBakes = Callable[[Settings], BakeService]
@@ -80,8 +83,18 @@ async def open_services(
     await asyncio.to_thread(service.start)
     renders.start()
     try:
-        slots = threading.BoundedSemaphore(settings.max_sessions)
-        yield Services(settings, metrics, service, looks, renders, threads, transfers, house, slots)
+        yield Services(
+            settings=settings,
+            metrics=metrics,
+            bakes=service,
+            looks=looks,
+            renders=renders,
+            threads=threads,
+            transfers=transfers,
+            house=house,
+            session_slots=threading.BoundedSemaphore(settings.max_sessions),
+            import_slots=asyncio.Semaphore(MAX_IMPORTS),
+        )
     finally:
         await asyncio.to_thread(renders.close)
         await asyncio.to_thread(service.close)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from relume.brdf.curves import curve_bands, generated_bands
@@ -236,18 +237,25 @@ class FrameLoop:
         start_s = time.perf_counter()
         try:
             future = self._work.long(self._picture.freeze, lambda p: progress.__setitem__(0, p), self._cancel.is_set)
-            while True:
-                shown = min(1.0, max(0.0, progress[0]))
-                await self._wire.send(StatusMessage(state="freezing", what=what, progress=shown))
-                if (await asyncio.wait({future}, timeout=STATUS_S))[0]:
-                    break
-            future.result()
-            self._metrics.freeze.observe(time.perf_counter() - start_s)
-            await self._wire.send(StatusMessage(state="ready", what=what, progress=1.0))
-        except CancelledError:
-            return
+            await self._tell_until_done(future, what, progress)
         finally:
             self._freezing_for = frozenset()
+        await self._wire.send(StatusMessage(state="ready", what=what, progress=progress[0]))
+        error = future.exception()
+        if error is None:
+            self._metrics.freeze.observe(time.perf_counter() - start_s)
+        elif not isinstance(error, CancelledError):
+            raise error
+
+    async def _tell_until_done(self, future: asyncio.Future[None], what: str, progress: Sequence[float]) -> None:
+        """Say how far it is, each per cent once."""
+        told = -1.0
+        while not future.done():
+            shown = round(min(1.0, max(0.0, progress[0])), 2)
+            if shown != told:
+                told = shown
+                await self._wire.send(StatusMessage(state="freezing", what=what, progress=shown))
+            await asyncio.wait({future}, timeout=STATUS_S)
 
     async def _send_curve(self, target: Target) -> None:
         """The touched curve in this look, where its term has changed since it was last sent."""

@@ -1,4 +1,4 @@
-"""Where heavy work runs: quick steps of pictures in one pool, long ones (opening, freezing, importing) in another."""
+"""Where heavy work runs: quick steps of pictures in one pool, long ones (opening, freezing) in another."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
+NUM_LONG = 8  # more than cores: a view that is opened must not wait until others have frozen theirs
 
 
 class Threads:
@@ -18,7 +19,7 @@ class Threads:
     def __init__(self) -> None:
         num_cores = os.cpu_count() or 1
         self.quick = ThreadPoolExecutor(max(2, num_cores), "relume-frame")
-        self.long = ThreadPoolExecutor(max(2, num_cores // 2), "relume-long")
+        self.long = ThreadPoolExecutor(NUM_LONG, "relume-long")
 
     def close(self) -> None:
         """Take no more work; what runs is finished."""

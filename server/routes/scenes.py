@@ -34,7 +34,8 @@ async def import_scene(
     scene: SceneFile, services: Shared, response: Response, environment: EnvironmentFile = None, name: SceneName = ""
 ) -> SceneBody:
     """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
-    identity = await run_in_threadpool(_import, scene, environment, name, services)
+    async with services.import_slots:
+        identity = await run_in_threadpool(_import, scene, environment, name, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 
