@@ -33,6 +33,7 @@ function Name({ saved }: { saved: SavedLook }) {
       maxLength={MAX_NAME}
       defaultValue={saved.name}
       ref={(input) => input?.focus()}
+      onFocus={(event) => event.currentTarget.select()}
       onBlur={(event) => take(event.currentTarget.value)}
       onKeyDown={(event) => {
         event.stopPropagation();

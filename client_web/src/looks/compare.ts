@@ -3,7 +3,7 @@ import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
-import { fetchPicture, whenExact } from "../state/live";
+import { fetchPicture } from "../state/live";
 import { defaultLook, exact, look, scene, viewName, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
@@ -60,7 +60,6 @@ export function toggleWipe(): void {
 export async function saveLook(): Promise<void> {
   const current = look.value;
   if (current === null) return;
-  await whenExact();
   const name = freeName(shelf.value.map((entry) => entry.name));
   keepThumbnail(name, thumbnail(stage.capture(), current.display));
   await addLook(name, current);
