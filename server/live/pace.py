@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-TARGET_MS = 5.0
-MIN_COEFFICIENTS, MAX_COEFFICIENTS = 8, 4096
+TARGET_MS = 4.0
+MIN_COEFFICIENTS, MAX_COEFFICIENTS = 8, 512
 
 
 class Pace:
@@ -13,10 +13,9 @@ class Pace:
         self.max_coefficients = 32
 
     def learn(self, update_ms: float, exact: bool) -> None:
-        """An inexact step spent its whole budget: scale it to the target. An exact one that was quick: allow more."""
-        if not exact:
-            factor = min(4.0, max(0.25, TARGET_MS / max(update_ms, 1e-3)))
-            self.max_coefficients = int(self.max_coefficients * factor)
-        elif update_ms < TARGET_MS:
-            self.max_coefficients *= 2
-        self.max_coefficients = min(MAX_COEFFICIENTS, max(MIN_COEFFICIENTS, self.max_coefficients))
+        """Scale the budget to the target; a step that was exact and quick may not have spent it: allow more."""
+        factor = min(4.0, max(0.25, TARGET_MS / max(update_ms, 1e-3)))
+        if exact and factor > 1.0:
+            factor = 2.0
+        scaled = round(self.max_coefficients * factor)
+        self.max_coefficients = min(MAX_COEFFICIENTS, max(MIN_COEFFICIENTS, scaled))

@@ -76,6 +76,15 @@ def test_pace_settles_where_steps_take_the_target() -> None:
     assert pace.max_coefficients == pytest.approx(TARGET_MS / ms_per_coefficient, rel=0.1)
 
 
+def test_pace_spends_less_where_exact_steps_take_too_long() -> None:
+    pace = Pace()
+    for _ in range(20):
+        pace.learn(0.1, exact=True)
+    before = pace.max_coefficients
+    pace.learn(2 * TARGET_MS, exact=True)
+    assert pace.max_coefficients == before // 2
+
+
 def test_pace_is_bounded() -> None:
     pace = Pace()
     for _ in range(50):
