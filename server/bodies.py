@@ -140,7 +140,7 @@ class DryRunBody(Body):
 
 
 class RenderRequest(Body):
-    """A batch of exact pictures; looks may be partial."""
+    """A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default."""
 
     bake: Id
     view: Name

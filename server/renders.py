@@ -23,6 +23,7 @@ from relume.imageio import write_image
 from server.bodies import RenderRequest
 from server.errors import BusyError, problem_of
 from server.live.ports import Library, Transfer
+from server.shrink import shrink
 from server.tables import RenderRow
 
 log = logging.getLogger(__name__)
@@ -136,7 +137,8 @@ class RenderQueue:
             return
         request = status.request
         look = looks.validate(partial, transfer.default_look)
-        image = self._library.render(transfer, request.view, look, request.size)
+        image = self._library.render(transfer, request.view, look)
+        image = image if request.size is None else shrink(image, request.size)
         write_image(path, image, look.display.exposure, look.display.tone_map)
 
     def _pack(self, status: RenderStatus) -> None:

@@ -54,7 +54,7 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default. */
 export interface RenderRequest {
   bake: string;
   view: string;

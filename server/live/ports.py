@@ -74,11 +74,11 @@ class Library:
     Attributes:
         open_transfer: path of a published store -> transfer; heavy.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
-        render: (transfer, view name, complete look, size or None) -> (H, W, 3) linear radiance; heavy.
+        render: (transfer, view name, complete look) -> (H, W, 3) linear radiance in the baked size; heavy.
         cache_used_bytes: what the frozen caches hold now.
     """
 
     open_transfer: Callable[[Path], Transfer]
     make_picture: Callable[[Any, str], Picture]
-    render: Callable[[Any, str, Any, tuple[int, int] | None], F32]
+    render: Callable[[Any, str, Any], F32]
     cache_used_bytes: Callable[[], int]

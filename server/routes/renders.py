@@ -18,15 +18,12 @@ from server.routes.bakes import ready_bake
 from server.services import Shared
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
-MAX_PIXELS = 16 * 1024 * 1024
 MEDIA_TYPES = {"exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
 
 
 @router.post("", status_code=202)
 async def submit_render(request: RenderRequest, services: Shared, response: Response) -> RenderBody:
     """Queue a batch; every look is checked first."""
-    if request.size is not None and request.size[0] * request.size[1] > MAX_PIXELS:
-        raise ParameterError("size", list(request.size), f"at most {MAX_PIXELS:,} pixels")
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
         await run_in_threadpool(_check, request, transfer)
@@ -38,6 +35,10 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
 def _check(request: RenderRequest, transfer: Transfer) -> None:
     if request.view not in transfer.views:
         raise ParameterError("view", request.view, "one of " + ", ".join(transfer.views)[:400])
+    view = transfer.views[request.view]
+    if request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
+        baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
+        raise ParameterError("size", list(request.size), baked)
     for index, partial in enumerate(request.looks):
         try:
             looks.complete(partial, transfer.default_look)

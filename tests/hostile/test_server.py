@@ -331,6 +331,7 @@ def test_look_beyond_its_size_is_413(client: TestClient) -> None:
         {"looks": [{"environment": {"scale": -1}}]},
         {"format": "exe"},
         {"size": [0, 1]},
+        {"size": [161, 96]},
         {"size": [16384, 16384]},
         {"size": [10**12, 1]},
         {"surprise": 1},

@@ -186,9 +186,9 @@ class Control:
     def _picture(self, transfer: FakeTransfer, view: str) -> FakePicture:
         return FakePicture(transfer, transfer.views[view], self)
 
-    def _render(self, transfer: FakeTransfer, view: str, look: Any, size: tuple[int, int] | None) -> np.ndarray:
-        width, height = size or (transfer.views[view].width, transfer.views[view].height)
-        return np.full((height, width, 3), exact_pixel(look), np.float32)
+    def _render(self, transfer: FakeTransfer, view: str, look: Any) -> np.ndarray:
+        shape = transfer.views[view].height, transfer.views[view].width, 3
+        return np.full(shape, exact_pixel(look), np.float32)
 
 
 def exact_pixel(look: Any) -> float:

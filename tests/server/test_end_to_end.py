@@ -52,7 +52,7 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
 def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) -> None:
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
     scene = real.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
-    request = {"scene": scene["id"], "size": [WIDTH, HEIGHT], "lights": 200}
+    request: dict[str, Any] = {"scene": scene["id"], "size": [WIDTH, HEIGHT], "lights": 200}
     bake = wait_until_done(real, real.post("/api/bakes", json=request).headers["location"])
     assert bake["state"] == "ready", bake["problem"]
 
@@ -87,5 +87,6 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
     tolerance = rendered.max(axis=-1, keepdims=True) / 256 + 1e-4
     assert rendered.max() > 0.01
     assert np.all(np.abs(picture - rendered) <= tolerance)
+    assert real.get(real.get(f"/api/scenes/{scene['id']}").json()["thumbnail"]).status_code == 200
     assert probe["material"] == name
     assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
