@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import CancelledError as FutureCancelledError
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,7 +40,7 @@ class BakeRunner:
     """One run of a bake whose lease `owner` holds.
 
     Attributes:
-        window: how many tasks are handed out at once; the rest wait here, so that a cancel takes effect at once.
+        window: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect at once.
         changed: called after every change of the ledger.
         stopped: the service is closing; the bake stays `running` for the next start.
     """
@@ -48,7 +49,7 @@ class BakeRunner:
     job: Job
     owner: str
     executor: Executor
-    window: int
+    window: Callable[[], int]
     changed: Callable[[], None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
@@ -80,8 +81,9 @@ class BakeRunner:
             return _size(target)
         if not staging.exists():
             self.ledger.forget_tasks(job.bake_id)
-        plan = self.ledger.bake(job.bake_id).plan
-        scene, progress = scene_of(job.data_dir, job.scene_id), Progress(plan)
+        status = self.ledger.bake(job.bake_id)
+        shown = status.progress if self.ledger.finished_tasks(job.bake_id) else 0.0
+        scene, progress = scene_of(job.data_dir, job.scene_id), Progress(status.plan, shown)
         fill.begin(job.method, scene, job.recipe, staging)
         for stage in range(len(job.method.stages)):
             self._run_stage(scene, stage, progress)
@@ -106,7 +108,9 @@ class BakeRunner:
                 waiting.append((task, 1))
         self._beat(progress)
         while waiting or self._flying:
-            while waiting and len(self._flying) < self.window:
+            room = self.window() - len(self._flying)
+            while waiting and room > 0:
+                room -= 1
                 task, attempt = waiting.popleft()
                 self._flying[self.executor.submit(run_task, job, task)] = task, attempt
             finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
@@ -118,6 +122,8 @@ class BakeRunner:
         task, attempt = self._flying.pop(future)
         try:
             cost = future.result()
+        except FutureCancelledError as error:  # nobody here cancels a task
+            raise RelumeError("the scheduler went away; start it, then bake again; finished parts are kept") from error
         except Exception as error:
             if not _is_lost_process(error):
                 raise
@@ -145,7 +151,7 @@ class BakeRunner:
             finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
             for future in finished:
                 task, attempt = self._flying.pop(future)
-                if future.exception() is None:
+                if not future.cancelled() and future.exception() is None:
                     try:
                         self.ledger.finish_task(self.job.bake_id, task, future.result(), attempt)
                     except IntegrityError:  # the bake was deleted

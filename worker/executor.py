@@ -72,6 +72,9 @@ class Executors:
     def cluster(self) -> Executor:
         """The Dask cluster. Raises PlanError where the scheduler does not answer."""
         with self._lock:
+            if self._client is not None and self._client.status != "running":  # the scheduler went away
+                self._client.close(timeout=0)
+                self._client = None
             if self._client is None:
                 self._client = self._connect()
             executor: Executor = self._client.get_executor(pure=False)

@@ -19,13 +19,20 @@ class Progress:
     from its start, so what is left then is divided among its rows. Rate and time left are those of the stage that runs.
     """
 
-    def __init__(self, plan: Plan, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, plan: Plan, shown: float = 0.0, clock: Callable[[], float] = time.monotonic) -> None:
+        """
+        Args:
+            shown: what people have seen already, before an interruption.
+            clock: seconds.
+        """
         self._clock = clock
         self._num_rays = max(1, plan.num_rays)
         self._rays = 0
-        self._base = self._shown = self._done = 0.0
+        self._base = self._done = 0.0
+        self._shown = shown
         self._rows = self._largest = 0
-        self._begin()
+        self._rays_here, self._gained = 0, 0.0
+        self._began, self._last_s = clock(), 0.0
 
     def begin_stage(self, tasks: Collection[Task], last: bool) -> None:
         """Note the tasks of a stage."""

@@ -202,7 +202,7 @@ class BakeService:
             job=Job(self.data_dir, status.id, status.scene, status.recipe, method),
             owner=self._owner,
             executor=executor,
-            window=1 if tiny else 2 * self._executors.cluster_threads(),
+            window=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
             changed=self._board.changed,
             stopped=self._closing.is_set,
         ).run()

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -19,6 +20,8 @@ from worker.database import open_database
 from worker.executor import TINY_BAKE_RAYS
 from worker.ledger import Ledger
 from worker.paths import bake_path
+from worker.scenes import register_scene
+from worker.service import BakeService
 from worker.status import bake_id
 
 IDENTITY = bake_id(tiny_scene().id, RECIPE)
@@ -101,3 +104,73 @@ def test_two_processes_bake_one_recipe_once(tmp_path: Path, expected: str) -> No
     assert [finish(process)[-1].split()[0] for process in both] == ["ready", "ready"]
     assert set(Counter(log.read_text().split()).values()) == {1}
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
+
+
+def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scheduler and workers of a real cluster die in the middle; with new ones the bake goes on where it stopped."""
+    monkeypatch.setenv("PYTHONPATH", str(PROGRAM.parent))
+    log = tmp_path / "log"
+    method = FakeMethod(num_rays=LARGE, delay_s=0.1, log=str(log))
+    with Cluster() as cluster:
+        service = BakeService(tmp_path / "data", scheduler=cluster.address, methods={"fake": method})
+        register_scene(service.data_dir, service.ledger, tiny_scene())
+        with service:
+            service.submit(tiny_scene().id, RECIPE)
+            wait_for(log, 8)
+            cluster.kill()
+            with service.subscribe(IDENTITY) as changes:
+                status = list(changes)[-1]
+            assert status.state == "failed"
+            assert "scheduler" in (status.problem or "")
+            cluster.start()
+            service.submit(tiny_scene().id, RECIPE)
+            with service.subscribe(IDENTITY) as changes:
+                assert [status.state for status in changes][-1] == "ready"
+    assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
+
+
+class Cluster:
+    """A scheduler and a `relume worker` that joins it, as processes."""
+
+    def __init__(self) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.processes: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> None:
+        scheduler = [
+            "distributed.cli.dask_scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            str(self.port),
+            "--no-dashboard",
+        ]
+        for arguments in (scheduler, ["cli.main", "worker", "--scheduler", self.address, "--processes", "1"]):
+            command = [sys.executable, "-m", *arguments]
+            self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+            self._wait_for_port()
+
+    def kill(self) -> None:
+        for process in self.processes:
+            process.kill()
+            process.wait()
+        self.processes.clear()
+
+    def _wait_for_port(self) -> None:
+        for _ in range(600):
+            try:
+                socket.create_connection(("127.0.0.1", self.port), timeout=1).close()
+            except OSError:
+                time.sleep(0.05)
+            else:
+                return
+        pytest.fail("the scheduler did not start")
+
+    def __enter__(self) -> "Cluster":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()

@@ -23,7 +23,7 @@ class Clock:
 def run(seconds: float, done_before: int = 0) -> list[dict[str, float | None]]:
     """Fields after each second; each of ten tasks takes `seconds`, one at a time."""
     clock = Clock()
-    progress = Progress(PLAN, clock)
+    progress = Progress(PLAN, clock=clock)
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
     progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 0.1, 0.1), here=True)
     progress.begin_stage(TASKS, last=True)

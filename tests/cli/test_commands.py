@@ -1,0 +1,216 @@
+"""The `relume` command: what it prints, how it fails, what Ctrl-C does. Real bakes of a tiny scene."""
+
+import json
+import os
+import pty
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.main import main
+from relume.scene.archive import make_scene
+from relume.scene.model import Camera, Environment, Material, Mesh
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import register_scene
+from worker.status import BakeStatus
+
+RELUME = [sys.executable, "-m", "cli.main"]
+TINY = ["--size", "32x24", "--lights", "100"]
+
+
+def open_ledger(data: Path) -> Ledger:
+    return Ledger(open_database(f"sqlite:///{data / 'relume.db'}"))
+
+
+def only_bake(data: Path) -> BakeStatus:
+    ledger = open_ledger(data)
+    (status,) = ledger.bakes()
+    ledger.close()
+    return status
+
+
+@pytest.fixture
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A data folder with one scene, "quad": a white square that fills the picture."""
+    positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+    normals = np.tile(np.array([[0, 0, 1]], np.float32), (4, 1))
+    zeros = np.zeros((4, 4), np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    mesh = Mesh("quad", positions, normals, zeros, zeros[:, :2].copy(), faces, 0)
+    camera = np.eye(4)
+    camera[2, 3] = 1.5
+    material = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
+    light = Environment("white", np.ones((16, 32, 3), np.float32))
+    scene = make_scene("quad", [mesh], [material], [Camera("front", camera, 0.8), Camera("back", camera, 0.9)], light)
+    folder = tmp_path / "data"
+    folder.mkdir()
+    ledger = open_ledger(folder)
+    register_scene(folder, ledger, scene)
+    ledger.close()
+    monkeypatch.setenv("RELUME_DATA", str(folder))
+    return folder
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys; from cli.main import main; main(['--help']); "
+        "heavy = {'numpy', 'zarr', 'numba', 'fastapi', 'distributed', 'sqlalchemy'} & set(sys.modules); "
+        "sys.exit(str(heavy) if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for command in ("demo", "import", "bake", "render", "serve", "worker", "reference", "bench"):
+        assert re.search(rf"^  {command} ", done.stdout, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nonsense"], "nonsense"),
+        (["bake"], "SCENE"),
+        (["bake", "nowhere"], "no scene 'nowhere'"),
+        (["bake", "../../etc"], "no scene"),
+        (["bake", "quad", "--size", "0x9"], "640x480"),
+        (["bake", "quad", "--size", "99999x99999"], "pixels"),
+        (["bake", "quad", "--lights", "0"], "at least 1"),
+        (["bake", "quad", "--lights", "many"], "valid integer"),
+        (["bake", "quad", "--method", "magic"], "direct"),
+        (["bake", "quad", "--view", "top"], "front"),
+        (["import", "no-such-file.glb"], "no-such-file.glb"),
+        (["reference", "nowhere", "--spp", "4", "--output", "x.exr"], "no scene"),
+        (["reference", "quad", "--spp", "0", "--output", "x.exr"], "spp"),
+        (["worker", "--scheduler", "nonsense"], "tcp://"),
+        (["serve", "--port", "0"], "port"),
+    ],
+)
+def test_failure_is_one_line_on_stderr(
+    data: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    if arguments[0] == "reference":
+        pytest.importorskip("relume.reference", reason="relume.reference is not there yet")
+    assert main(arguments) != 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert err.startswith("relume: ")
+    assert words in err
+    assert "Traceback" not in err
+
+
+def test_verbose_shows_the_trace(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bake", "nowhere", "--verbose"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_bake_prints_its_id_and_the_second_time_too(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bake", "quad", "--view", "front", *TINY]) == 0
+    first = capsys.readouterr().out
+    status = only_bake(data)
+    assert (first, status.state, status.recipe.views) == (f"{status.id}\n", "ready", ("front",))
+    assert (data / "bakes" / f"{status.id}.zarr" / "manifest.json").exists()
+    assert main(["bake", status.scene[:6], "--view", "front", *TINY]) == 0
+    assert capsys.readouterr().out == first
+
+
+def test_bake_without_watch_is_left_in_the_queue(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bake", "quad", "--no-watch", *TINY]) == 0
+    assert capsys.readouterr().out == f"{only_bake(data).id}\n"
+    assert only_bake(data).state == "queued"
+
+
+def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from worker.models import SceneRow
+
+    ledger = open_ledger(data)
+    with ledger.sessions.begin() as session:
+        empty = json.dumps({"views": [], "materials": [], "warnings": [], "num_triangles": 0})
+        session.add(SceneRow(id="f" * 16, name="quad", created=0.0, summary=empty))
+    ledger.close()
+    assert main(["bake", "quad", *TINY]) == 1
+    assert "f" * 16 in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 5000])
+def test_look_that_is_no_object_is_refused(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
+) -> None:
+    pytest.importorskip("relume.transfer.render", reason="relume.transfer.render is not there yet")
+    (tmp_path / "look.json").write_text(text)
+    output = tmp_path / "x.png"
+    assert main(["render", "quad", "--look", str(tmp_path / "look.json"), "--output", str(output)]) == 1
+    assert "--look" in capsys.readouterr().err
+    assert not output.exists()
+
+
+def test_render_writes_the_picture_that_the_light_says(data: Path, tmp_path: Path) -> None:
+    pytest.importorskip("relume.transfer.render", reason="relume.transfer.render is not there yet")
+    import OpenImageIO
+
+    assert main(["bake", "quad", "--view", "front", *TINY]) == 0
+    look = tmp_path / "look.json"
+    look.write_text(json.dumps({"materials": {"White": {"terms": [{"model": "lambert", "color": [0.5, 0.25, 1.0]}]}}}))
+    assert main(["render", "quad", "--look", str(look), "--output", str(tmp_path / "x.exr")]) == 0
+    pixels = OpenImageIO.ImageBuf(str(tmp_path / "x.exr")).get_pixels(OpenImageIO.FLOAT)
+    assert pixels.shape[:2] == (24, 32)
+    # white light from everywhere on a flat open surface: radiance is the albedo
+    np.testing.assert_allclose(pixels[12, 16, :3], [0.5, 0.25, 1.0], rtol=0.02)
+
+
+def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        assert main(["serve", "--port", port]) == 1
+    err = capsys.readouterr().err
+    assert port in err
+    assert len(err.splitlines()) == 1
+
+
+LONG = ["bake", "quad", "--size", "800x600", "--lights", "1500"]
+
+
+def wait_for_state(data: Path, state: str) -> None:
+    for _ in range(1200):
+        ledger = open_ledger(data)
+        states = [status.state for status in ledger.bakes()]
+        ledger.close()
+        if states == [state]:
+            return
+        time.sleep(0.05)
+    pytest.fail(f"the bake did not become {state}")
+
+
+def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data: Path) -> None:
+    process = subprocess.Popen([*RELUME, *LONG], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    wait_for_state(data, "running")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "cancelled; finished parts are kept" in err
+    assert "Traceback" not in err
+    assert only_bake(data).state == "cancelled"
+    assert subprocess.run([*RELUME, *LONG], capture_output=True, check=False).returncode == 0
+    assert only_bake(data).state == "ready"
+
+
+def test_interrupt_at_a_terminal_asks_and_can_leave_the_bake_running(data: Path) -> None:
+    controller, terminal = pty.openpty()
+    process = subprocess.Popen([*RELUME, *LONG], stdin=terminal, stdout=terminal, stderr=terminal, process_group=0)
+    os.close(terminal)
+    wait_for_state(data, "running")
+    process.send_signal(signal.SIGINT)
+    shown = b""
+    while b"background?" not in shown:
+        shown += os.read(controller, 4096)
+    os.write(controller, b"y\n")
+    assert process.wait(timeout=60) == 0
+    assert only_bake(data).state in ("running", "ready")
+    wait_for_state(data, "ready")
+    os.close(controller)
