@@ -84,7 +84,8 @@ def _merge(
         Index of the ray that stands for each group, the pixel (of the edge pixels) it belongs to, and its weight.
     """
     positions_a_pixel = len(_POSITIONS)
-    mesh = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1).reshape(num_pixels, -1)
+    mesh = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
+    mesh = mesh.reshape(num_pixels, positions_a_pixel)
     normal = surface_at(geometry, hits, directions).normal.reshape(num_pixels, positions_a_pixel, 3)
     group = np.full((num_pixels, positions_a_pixel), -1)
     for leader in range(positions_a_pixel):
