@@ -48,7 +48,6 @@ def bake(
         if not watch:
             typer.echo(identity)
             return 0
-        service.start()
         return _watch(service, settings, identity, record.name)
     finally:
         service.close()
@@ -73,11 +72,12 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str) 
     from cli.follow import follow
 
     began = time.monotonic()
-    with service.subscribe(identity) as changes:
-        try:
+    try:
+        service.start()
+        with service.subscribe(identity) as changes:
             status = follow(changes, label)
-        except KeyboardInterrupt:
-            return _interrupted(service, settings, identity)
+    except KeyboardInterrupt:
+        return _interrupted(service, settings, identity)
     return _report(status, time.monotonic() - began)
 
 

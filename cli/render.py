@@ -16,7 +16,7 @@ def render(scene: SceneName, output: Output, look: LookFile = None, view: View =
     """Render one exact frame of a baked scene."""
     from cli.house import complete_look, find_bake, find_scene, open_bakes, open_settings
     from cli.picture import check_output, save
-    from relume.transfer.direct import open_transfer
+    from relume.transfer.opened import open_transfer
     from relume.transfer.render import render_image
 
     check_output(output)
