@@ -18,6 +18,11 @@ interface Props {
   onRemove: (() => void) | null;
 }
 
+/** "half angle θh" is known by its last word. */
+function symbol(label: string): string {
+  return label.split(" ").at(-1) ?? label;
+}
+
 function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: number }) {
   const open = selectedTerm.value === index ? selectedCurve.value : null;
   const info = model.curves.find((curve) => curve.name === open);
@@ -27,13 +32,15 @@ function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: n
         {model.curves.map((curve) => (
           <button
             key={curve.name}
+            title={curve.label}
+            aria-label={curve.label}
             aria-expanded={curve.name === open}
             onClick={() => {
               selectedTerm.value = index;
               selectedCurve.value = curve.name === open ? null : curve.name;
             }}
           >
-            {curve.label}
+            {curve.name === open ? curve.label : symbol(curve.label)}
             {term.curves?.[curve.name] !== undefined && <span class="dot" title="Drawn by hand" aria-label="drawn by hand" />}
           </button>
         ))}

@@ -1,5 +1,5 @@
 /** Under the picture: the probed pixel on the left, zoom on the right. */
-import { drawn, falseColour, look, probe } from "../state/store";
+import { drawn, exposure, falseColour, probe, toneMap } from "../state/store";
 import { formatNumber } from "../ui/scale";
 import { stage } from "./stage";
 import { toDisplay } from "./tonemap";
@@ -10,8 +10,7 @@ function Probe() {
   const at = probe.value;
   const radiance = at === null ? null : stage.radiance(at.x, at.y);
   if (at === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
-  const { exposure, tone_map } = look.value?.display ?? { exposure: 0, tone_map: "agx" };
-  const shown = toDisplay(radiance, exposure, tone_map).map((v) => Math.round(255 * v));
+  const shown = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
   const material = stage.material(at.x, at.y);
   return (
     <span class="probe">

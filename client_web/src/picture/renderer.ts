@@ -1,12 +1,11 @@
 /** The WebGL2 side of the picture. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
 import type { Tile } from "../protocol";
 import type { Pixels } from "./pixels";
-import { FRAGMENT, VERTEX } from "./shaders";
-import { allocate, makeProgram, makeTexture } from "./textures";
+import { fragment, VERTEX, type Features } from "./shaders";
+import { allocate, makeTexture, Program } from "./gl";
 
 const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uIds"] as const;
 type Unit = (typeof UNITS)[number];
-const TONE_MAP_INDEX: Record<string, number> = { none: 0, linear: 0, agx: 1, filmic: 2 };
 /** Screen pixels per picture pixel from which the pixels themselves are shown. */
 const NEAREST_FROM = 6;
 
@@ -25,9 +24,8 @@ export interface DrawState {
 
 export class Renderer {
   private readonly gl: WebGL2RenderingContext;
-  private program!: WebGLProgram;
+  private programs = new Map<string, Program>();
   private textures!: Record<Unit, WebGLTexture>;
-  private uniforms = new Map<string, WebGLUniformLocation | null>();
   private size: [number, number] = [1, 1];
 
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -40,13 +38,10 @@ export class Renderer {
   /** Build everything anew, at the start and after the context was lost. */
   restore(): void {
     const { gl } = this;
-    this.program = makeProgram(gl, VERTEX, FRAGMENT);
-    this.uniforms.clear();
+    this.programs.clear();
     this.textures = Object.fromEntries(
       UNITS.map((unit) => [unit, makeTexture(gl, unit === "uIds" ? gl.NEAREST : gl.LINEAR)]),
     ) as Record<Unit, WebGLTexture>;
-    gl.useProgram(this.program);
-    UNITS.forEach((unit, index) => gl.uniform1i(this.uniform(unit), index));
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
     this.setBrush(1, 1, new Uint8Array(1));
@@ -54,9 +49,16 @@ export class Renderer {
     this.setDisplay(new ImageData(1, 1));
   }
 
-  private uniform(name: string): WebGLUniformLocation | null {
-    if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.program, name));
-    return this.uniforms.get(name) ?? null;
+  private use(features: Features): Program {
+    const key = JSON.stringify(features);
+    let program = this.programs.get(key);
+    if (program === undefined) {
+      program = new Program(this.gl, VERTEX, fragment(features));
+      this.programs.set(key, program);
+      this.gl.useProgram(program.handle);
+      UNITS.forEach((unit, index) => this.gl.uniform1i(program?.at(unit) ?? null, index));
+    } else this.gl.useProgram(program.handle);
+    return program;
   }
 
   setPicture(pixels: Pixels): void {
@@ -99,8 +101,28 @@ export class Renderer {
     const { gl, canvas } = this;
     if (gl.isContextLost()) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.useProgram(this.program);
-    const magnified = state.place[2] / this.size[0] >= NEAREST_FROM;
+    const program = this.use({
+      toneMap: state.toneMap === "agx" || state.toneMap === "filmic" ? state.toneMap : "none",
+      falseColour: state.falseColour,
+      shrunk: state.place[2] < this.size[0],
+      displayReferred: state.displayReferred,
+      compare: state.wipe > 0,
+      brush: state.brush,
+      outline: state.hover >= 0,
+    });
+    this.bindTextures(state.place[2] / this.size[0] >= NEAREST_FROM);
+    gl.uniform2f(program.at("uCanvas"), canvas.width, canvas.height);
+    gl.uniform4f(program.at("uPlace"), ...state.place);
+    gl.uniform2f(program.at("uSize"), ...this.size);
+    gl.uniform1f(program.at("uGain"), 2 ** state.exposure);
+    gl.uniform1f(program.at("uWipe"), state.wipe);
+    gl.uniform1i(program.at("uHover"), state.hover);
+    gl.uniform3f(program.at("uSurround"), ...state.surround);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  private bindTextures(magnified: boolean): void {
+    const { gl } = this;
     UNITS.forEach((unit, index) => {
       gl.activeTexture(gl.TEXTURE0 + index);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
@@ -108,17 +130,5 @@ export class Renderer {
         gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
       }
     });
-    gl.uniform2f(this.uniform("uCanvas"), canvas.width, canvas.height);
-    gl.uniform4f(this.uniform("uPlace"), ...state.place);
-    gl.uniform2f(this.uniform("uSize"), ...this.size);
-    gl.uniform1f(this.uniform("uGain"), 2 ** state.exposure);
-    gl.uniform1i(this.uniform("uToneMap"), TONE_MAP_INDEX[state.toneMap] ?? 0);
-    gl.uniform1i(this.uniform("uFalseColour"), Number(state.falseColour));
-    gl.uniform1i(this.uniform("uDisplayReferred"), Number(state.displayReferred));
-    gl.uniform1f(this.uniform("uWipe"), state.wipe);
-    gl.uniform1i(this.uniform("uBrushOn"), Number(state.brush));
-    gl.uniform1i(this.uniform("uHover"), state.hover);
-    gl.uniform3f(this.uniform("uSurround"), ...state.surround);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 }

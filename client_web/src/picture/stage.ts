@@ -136,8 +136,8 @@ class Stage {
     const { on, at } = store.wipe.value;
     return {
       transform,
-      exposure: store.look.value?.display.exposure ?? 0,
-      toneMap: store.look.value?.display.tone_map ?? "agx",
+      exposure: store.exposure.value,
+      toneMap: store.toneMap.value,
       falseColour: store.falseColour.value,
       wipe: this.reference === null ? -1 : store.showBefore.value ? 2 : on ? at : -1,
       hover: hovered === null || this.ids === null ? -1 : store.materialNames.value.indexOf(hovered),

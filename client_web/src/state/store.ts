@@ -20,6 +20,9 @@ export const viewName = signal("");
 export const view = computed(() => views.value.find((v) => v.name === viewName.value) ?? null);
 
 export const look = signal<Look | null>(null);
+/** The look's part that costs no round trip; apart, so that other edits do not redraw the picture twice. */
+export const exposure = computed(() => look.value?.display.exposure ?? 0);
+export const toneMap = computed(() => look.value?.display.tone_map ?? "agx");
 /** The scene's own look, for resets. */
 export const defaultLook = signal<Look | null>(null);
 export const history = new History();

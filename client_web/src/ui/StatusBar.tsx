@@ -65,7 +65,7 @@ export function StatusBar() {
           )}
         </span>
       )}
-      {memory !== null && <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>}
+      {memory !== null && memory > 0 && <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>}
       <span class="announce" role="status" aria-live="polite">
         {announced.value}
       </span>
