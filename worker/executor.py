@@ -7,6 +7,7 @@ the first larger one.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import tempfile
@@ -73,7 +74,8 @@ class Executors:
         """The Dask cluster. Raises PlanError where the scheduler does not answer."""
         with self._lock:
             if self._client is not None and self._client.status != "running":  # the scheduler went away
-                self._client.close(timeout=0)
+                with contextlib.suppress(Exception):  # nobody is there to say goodbye to
+                    self._client.close(timeout=1)
                 self._client = None
             if self._client is None:
                 self._client = self._connect()

@@ -125,7 +125,8 @@ def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pyt
             cluster.start()
             service.submit(tiny_scene().id, RECIPE)
             with service.subscribe(IDENTITY) as changes:
-                assert [status.state for status in changes][-1] == "ready"
+                status = list(changes)[-1]
+            assert (status.state, status.problem) == ("ready", None)
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
 
 
