@@ -24,7 +24,8 @@ export type Connection = "connecting" | "open" | "reconnecting" | "closed";
 export interface SessionHandlers {
   connection(state: Connection, retryInMs: number): void;
   hello(message: HelloMessage): void;
-  frame(frame: Frame): void;
+  /** Resolves when the frame is on the screen. */
+  frame(frame: Frame): Promise<void>;
   status(message: StatusMessage): void;
   problem(message: ProblemMessage, lastGood: Look | null): void;
   probe(message: ProbeAnswer): void;
@@ -102,8 +103,8 @@ export class Session {
     try {
       const frame = parseFrame(data);
       this.queue.confirm(frame.header.revision);
-      this.handlers.frame(frame);
-      this.send({ type: "ack", frame: frame.header.frame });
+      const acknowledge = () => void this.send({ type: "ack", frame: frame.header.frame });
+      this.handlers.frame(frame).then(acknowledge, acknowledge);
     } catch (error) {
       if (!(error instanceof FrameError)) throw error;
       this.handlers.broken(error.message);

@@ -26,6 +26,12 @@ function copyTile(target: Pixels, tile: Tile, words: Uint32Array): void {
   }
 }
 
+/** The payload as words, copied only where the header's length left it unaligned. */
+function wordsOf(bytes: Uint8Array): Uint32Array {
+  const aligned = bytes.byteOffset % 4 === 0 ? bytes : bytes.slice();
+  return new Uint32Array(aligned.buffer, aligned.byteOffset, aligned.byteLength / 4);
+}
+
 function wordsFromFloats(bytes: Uint8Array): Uint32Array {
   const floats = new Float32Array(bytes.slice().buffer);
   const words = new Uint32Array(floats.length / 3);
@@ -37,8 +43,7 @@ function wordsFromFloats(bytes: Uint8Array): Uint32Array {
 
 /** Write a frame's tiles into the picture and return each tile's words, ready for upload. */
 export function applyFrame(target: Pixels, frame: Frame): { tile: Tile; words: Uint32Array }[] {
-  const words =
-    frame.header.format === "f32" ? wordsFromFloats(frame.payload) : new Uint32Array(frame.payload.slice().buffer);
+  const words = frame.header.format === "f32" ? wordsFromFloats(frame.payload) : wordsOf(frame.payload);
   let offset = 0;
   return frame.header.tiles.map((tile) => {
     const count = tile[2] * tile[3];

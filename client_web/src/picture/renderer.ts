@@ -66,6 +66,11 @@ export class Renderer {
     allocate(this.gl, this.textures.uPicture, pixels.width, pixels.height, pixels.words);
   }
 
+  /** The same picture, all pixels anew. */
+  updatePicture(pixels: Pixels): void {
+    this.uploadTiles([{ tile: [0, 0, pixels.width, pixels.height], words: pixels.words }]);
+  }
+
   setReference(pixels: Pixels): void {
     allocate(this.gl, this.textures.uReference, pixels.width, pixels.height, pixels.words);
   }

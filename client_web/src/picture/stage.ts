@@ -10,6 +10,7 @@ import { Renderer } from "./renderer";
 import { decodeRgb9e5 } from "./rgb9e5";
 import { shownWidth, toScreen, type Canvas } from "./transform";
 
+const MAX_WAIT_MS = 250;
 const BACKGROUND = 65535;
 const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
 
@@ -23,6 +24,7 @@ class Stage {
   private revision = 0;
   private drawnThisFrame = false;
   private queued = false;
+  private waiting: (() => void)[] = [];
   /** While a frame of another look is fetched, the canvas keeps what it shows. */
   held = false;
 
@@ -57,7 +59,7 @@ class Stage {
     if (this.display !== null) renderer.setDisplay(this.display);
   }
 
-  /** Take a frame of a session; pictures of another size replace what was there. */
+  /** Take a frame of a session and draw it; a picture of another size replaces what was there. */
   async show(frame: Frame): Promise<void> {
     const { width, height, kind, format, revision } = frame.header;
     if (kind === "brush") return this.showBrush(frame);
@@ -69,10 +71,18 @@ class Stage {
     }
     if (frame.header.tiles.length > 0) {
       this.display = null;
-      this.renderer?.uploadTiles(applyFrame(this.pixels, frame));
+      this.uploadTiles(frame);
     }
     this.revision = revision;
-    this.present();
+    return this.present();
+  }
+
+  private uploadTiles(frame: Frame): void {
+    const tiles = applyFrame(this.pixels, frame);
+    // one big upload is quicker than many small ones of the same size
+    const area = tiles.reduce((sum, { words }) => sum + words.length, 0);
+    if (area > this.pixels.words.length / 2) this.renderer?.updatePicture(this.pixels);
+    else this.renderer?.uploadTiles(tiles);
   }
 
   private showBrush(frame: Frame): void {
@@ -87,13 +97,22 @@ class Stage {
     this.display = await createImageBitmap(blob, { colorSpaceConversion: "none" });
     this.renderer?.setDisplay(this.display);
     this.revision = frame.header.revision;
-    this.present();
+    return this.present();
   }
 
-  /** Draw a new frame at once; a second one in the same animation frame waits for the next. */
-  private present(): void {
-    if (this.drawnThisFrame) this.redraw();
-    else this.draw();
+  /** Draw a new frame at once; a second one in the same animation frame waits for the next. Resolves when it is drawn,
+   * so that acknowledgements keep the server at the screen's pace. */
+  private present(): Promise<void> {
+    if (!this.drawnThisFrame || document.hidden) {
+      this.draw();
+      return Promise.resolve();
+    }
+    this.redraw();
+    // a tab that is hidden meanwhile gets no animation frames
+    return new Promise((done) => {
+      this.waiting.push(done);
+      window.setTimeout(done, MAX_WAIT_MS);
+    });
   }
 
   redraw(): void {
@@ -102,6 +121,7 @@ class Stage {
     requestAnimationFrame(() => {
       this.queued = false;
       this.draw();
+      for (const done of this.waiting.splice(0)) done();
     });
   }
 

@@ -80,11 +80,11 @@ function showViews(of: Session, views: HelloMessage["views"], name: string): voi
   void loadIds(of.bake, name);
 }
 
-function takeFrame(from: Session, frame: Frame): void {
+async function takeFrame(from: Session, frame: Frame): Promise<void> {
   if (from === incoming && frame.header.kind !== "brush") swap(from);
   if (from !== session || frame.header.view !== store.viewName.peek()) return;
-  void stage.show(frame).catch(showError);
-  if (frame.header.kind === "brush") return;
+  await stage.show(frame).catch(showError);
+  if (frame.header.kind === "brush" || from !== session) return;
   store.exact.value = frame.header.exact && frame.header.revision >= from.revision;
   store.freezing.value = null;
   if (!store.exact.value) return;
