@@ -37,7 +37,9 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; a failure is one line on stderr."""
     verbose = "--verbose" in arguments
-    logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, format="%(levelname)s %(name)s: %(message)s")
+    handler = logging.StreamHandler()
+    handler.setLevel(logging.INFO if verbose else logging.ERROR)  # of the handler: libraries set their loggers' own
+    logging.basicConfig(level=handler.level, format="%(levelname)s %(name)s: %(message)s", handlers=[handler])
     try:
         result = app([a for a in arguments if a != "--verbose"], prog_name="relume", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
