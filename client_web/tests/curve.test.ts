@@ -4,7 +4,7 @@ import { joined, readChannels, writeChannels } from "../src/curve/channels";
 import { bandSamples, fitPoints, MAX_POINTS, Stroke } from "../src/curve/fit";
 import { pchip } from "../src/curve/pchip";
 import { addPoint, mergeStroke, MIN_GAP, movePoint, removePoint, scaleStretch, shiftStretch } from "../src/curve/points";
-import { mainStretch } from "../src/curve/stretch";
+import { mainStretch, shareOf } from "../src/curve/stretch";
 import type { Point } from "../src/protocol";
 
 const LINEAR: Axes = { stretched: false, log: false, top: 5 };
@@ -213,6 +213,12 @@ describe("channels", () => {
     expect(readChannels({ bands: [ramp, ramp, ramp] }, 64)[2]).toEqual(flat[0]);
     expect(readChannels({ bands: ramp, channels: "g" }, 64).map((c) => c === null)).toEqual([true, false, true]);
   });
+});
+
+test("a pixel's share through a curve, and nothing where only rounding is left", () => {
+  expect(shareOf([[0.1, 0.1], [0.05, 0.05], [0, 0]], [0.4, 0.2, 0])).toBeCloseTo(0.5, 12);
+  expect(shareOf([[1e-12, -1e-12], [0, 0], [0, 0]], [0.4, 0.2, 0])).toBe(0);
+  expect(shareOf([[1], [1], [1]], [0, 0, 0])).toBe(0);
 });
 
 test("mainStretch finds the narrowest run that carries the light", () => {

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { FrameError, parseFrame } from "../src/net/frame";
-import { applyFrame, brushImage, emptyPixels } from "../src/picture/pixels";
+import { applyFrame, brushImage, emptyPixels, normalised } from "../src/picture/pixels";
 import { decodeRgb9e5, encodeRgb9e5 } from "../src/picture/rgb9e5";
 
 const HEADER = {
@@ -105,5 +105,7 @@ describe("applyFrame", () => {
   test("a brush has one byte a pixel", () => {
     const frame = parseFrame(pack({ ...HEADER, kind: "brush", format: "r8" }, Uint8Array.from([10, 20, 30, 40])));
     expect([...brushImage(frame)]).toEqual([0, 0, 0, 0, 0, 10, 20, 0, 0, 30, 40, 0]);
+    expect(Math.max(...normalised(brushImage(frame)))).toBe(255);
+    expect(Math.max(...normalised(Uint8Array.from([0, 1])))).toBe(51);
   });
 });

@@ -10,8 +10,9 @@ import { Handles } from "./Handles";
 import { curveModel, largestValue, pointsOf, type CurveModel } from "./model";
 import { MARGIN, Plot, plotX, plotY, type Frame } from "./Plot";
 import { PointTable } from "./PointTable";
-import { Readout } from "./Readout";
+import { Readout, type Contributions } from "./Readout";
 import { active, isStretched, logarithmic, tableOpen, tool } from "./settings";
+import { shareOf } from "./stretch";
 import { StretchBar } from "./StretchBar";
 import { applyScale, applyShift, drawGesture, picked, pointsGesture, selection, stretchGesture, type Gesture, type Hand, type Spot } from "./tools";
 
@@ -70,9 +71,10 @@ function begin(hand: Hand, frame: Frame, spot: Spot): Gesture {
 }
 
 /** A pixel's contributions, where they are of this curve. */
-function contributionsTo(path: string): number[][] | null {
+function contributionsTo(path: string): Contributions | null {
   const answer = probe.value?.answer;
-  return answer?.curve === path ? answer.bands : null;
+  if (answer?.curve !== path || answer.bands === null) return null;
+  return { bands: answer.bands, share: shareOf(answer.bands, answer.radiance) };
 }
 
 function usePlot(model: CurveModel, width: number, ready: boolean) {
@@ -142,6 +144,7 @@ export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
     return clearBrush;
   }, [path, active.value]);
   const points = tool.value === "points" && ready && !pointsBlocked ? pointsOf(model, hand.channels[0] ?? 0, hand.axes) : null;
+  const contributions = contributionsTo(path);
   const light = spot !== null && !dragging ? spot.degrees : null;
   return (
     <div class="curve" ref={measure} onKeyDown={(event) => stretchKey(event, hand)}>
@@ -162,7 +165,7 @@ export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
           drawn={model.channels.map((channel) => channel !== null)}
           together={model.together}
           active={hand.channels}
-          contributions={contributionsTo(path)}
+          contributions={contributions !== null && contributions.share > 0 ? contributions.bands : null}
           stretch={tool.value === "stretch" ? selection.value : null}
           stretchKind="selected"
         >
@@ -170,7 +173,7 @@ export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
           {points !== null && <Handles frame={frame} hand={hand} points={points} />}
         </Plot>
       </svg>
-      <Readout model={model} axes={hand.axes} spot={spot} ready={ready} blocked={pointsBlocked} contributions={contributionsTo(path)} />
+      <Readout model={model} axes={hand.axes} spot={spot} ready={ready} blocked={pointsBlocked} contributions={contributions} />
       {tool.value === "stretch" && <StretchBar hand={hand} />}
       <CurveBar hand={hand} />
       {tableOpen.value && points !== null && <PointTable hand={hand} points={points} />}

@@ -12,13 +12,20 @@ const HINTS = {
   stretch: "Drag across to select a stretch, then drag it up or along.",
 };
 
+export interface Contributions {
+  /** Per channel and band, radiance. */
+  bands: number[][];
+  /** Of the pixel's radiance, 0…1. */
+  share: number;
+}
+
 interface Props {
   model: CurveModel;
   axes: Axes;
   spot: Spot | null;
   ready: boolean;
   blocked: boolean;
-  contributions: number[][] | null;
+  contributions: Contributions | null;
 }
 
 function words({ axes, spot, ready, blocked, contributions }: Props): string {
@@ -28,8 +35,10 @@ function words({ axes, spot, ready, blocked, contributions }: Props): string {
     return `${spot.degrees.toFixed(2)}°  ·  ${value}`;
   }
   if (contributions !== null) {
-    const main = mainStretch(contributions);
-    return main === null ? "No light reaches this pixel through this curve." : `80 % of this pixel's light comes from ${main[0].toFixed(1)}° to ${main[1].toFixed(1)}°`;
+    const main = contributions.share === 0 ? null : mainStretch(contributions.bands);
+    if (main === null) return "Next to none of this pixel's light comes through this curve.";
+    const percent = Math.max(1, Math.round(100 * contributions.share));
+    return `${percent} % of this pixel comes through here, most from ${main[0].toFixed(1)}° to ${main[1].toFixed(1)}°`;
   }
   if (blocked) return "Red, green and blue differ: choose one of them, or join them.";
   if (tool.value === "points" && picked.value?.carried) return "Now click where this point goes. Escape leaves it.";

@@ -1,3 +1,13 @@
+/** Less than this share of a pixel's light is nothing: what is left of it is rounding. */
+const NOTHING = 1e-4;
+
+/** Which part of a pixel's radiance came through a curve, 0…1. */
+export function shareOf(bands: number[][], radiance: readonly number[]): number {
+  const total = radiance.reduce((a, b) => a + b, 0);
+  const through = bands.flat().reduce((a, b) => a + Math.max(0, b), 0);
+  return total > 0 && through > NOTHING * total ? Math.min(1, through / total) : 0;
+}
+
 /** The stretch that carries `share` of a pixel's light: the narrowest run of bands, in degrees. */
 export function mainStretch(bands: number[][], share = 0.8): [from: number, to: number] | null {
   const weights = (bands[0] ?? []).map((_, j) => bands.reduce((sum, channel) => sum + Math.max(0, channel[j] ?? 0), 0));

@@ -54,6 +54,15 @@ export function applyFrame(target: Pixels, frame: Frame): { tile: Tile; words: U
   });
 }
 
+/** Below this share even the brightest pixel is not tinted fully: there is next to nothing to show. */
+const FAINTEST = 5;
+
+/** Stretch an image so that its largest value is 255. */
+export function normalised(values: Uint8Array): Uint8Array {
+  const largest = values.reduce((a, b) => Math.max(a, b), FAINTEST);
+  return values.map((value) => (value * 255) / largest);
+}
+
 /** A brush frame (how much of each pixel comes from a stretch of the curve) as one image, 255 = all of it. */
 export function brushImage(frame: Frame): Uint8Array {
   const { width, height, tiles } = frame.header;

@@ -156,7 +156,7 @@ void main() {
   if (!reference) {
     float share = texture(uBrush, uv).r;
     float grey = dot(colour, vec3(0.2126, 0.7152, 0.0722));
-    colour = mix(vec3(grey * 0.45), ACCENT, sqrt(share) * 0.9);
+    colour = mix(vec3(grey * 0.6), ACCENT, sqrt(share) * 0.9);
   }
 #endif
 #ifdef OUTLINE

@@ -4,7 +4,7 @@ import type { Frame } from "../net/frame";
 import type { Rgb } from "../protocol";
 import { frameDrawn } from "../state/stats";
 import * as store from "../state/store";
-import { applyFrame, brushImage, copyPixels, emptyPixels, type Pixels } from "./pixels";
+import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
 import { Renderer } from "./renderer";
 import { decodeRgb9e5 } from "./rgb9e5";
@@ -87,7 +87,7 @@ class Stage {
 
   private showBrush(frame: Frame): void {
     if (store.brushed.peek() === null) return;
-    this.brush = brushImage(frame);
+    this.brush = normalised(brushImage(frame));
     this.renderer?.setBrush(frame.header.width, frame.header.height, this.brush);
     this.redraw();
   }
