@@ -7,7 +7,7 @@ import { goTo } from "../state/undo";
 import { IconButton } from "../ui/Button";
 import { completed, markLook, saveLook, sideA } from "./compare";
 import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
-import { historyThumbnail } from "./strip";
+import { historyThumbnail, thumbnailsMade } from "./strip";
 
 const MAX_STEPS = 40;
 const MAX_NAME = 80;
@@ -49,6 +49,7 @@ function Picture({ image, text }: { image: string | null; text: string }) {
 }
 
 function SavedTile({ saved }: { saved: SavedLook }) {
+  thumbnailsMade.value;
   const whole = completed(saved.look);
   const shown = JSON.stringify(whole) === JSON.stringify(look.value);
   return (

@@ -3,16 +3,27 @@ import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
 import { drawn, exact, look } from "../state/store";
+import { completed } from "./compare";
 import { thumbnail } from "./image";
+import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
 
 const REST_MS = 350;
 const images = new WeakMap<Look, string>();
-const made = signal(0);
+/** Counts up with every thumbnail. */
+export const thumbnailsMade = signal(0);
 let timer = 0;
 
 export function historyThumbnail(of: Look | undefined): string | null {
-  made.value;
+  thumbnailsMade.value;
   return of === undefined ? null : (images.get(of) ?? null);
+}
+
+/** A saved look that was made elsewhere gets its picture when it is first shown here. */
+function giveToSaved(of: Look, image: string): void {
+  const text = JSON.stringify(of);
+  for (const saved of shelf.peek()) {
+    if (thumbnailOf(saved.name) === null && JSON.stringify(completed(saved.look)) === text) keepThumbnail(saved.name, image);
+  }
 }
 
 // only when the hand rests: a thumbnail must never cost a frame
@@ -23,7 +34,9 @@ effect(() => {
   if (!exact.value || current === null || images.has(current)) return;
   timer = window.setTimeout(() => {
     if (look.peek() !== current || !exact.peek() || stage.held) return;
-    images.set(current, thumbnail(stage.capture(), current.display));
-    made.value += 1;
+    const image = thumbnail(stage.capture(), current.display);
+    images.set(current, image);
+    giveToSaved(current, image);
+    thumbnailsMade.value += 1;
   }, REST_MS);
 });
