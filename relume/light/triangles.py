@@ -1,7 +1,7 @@
 """The environment as spherical triangles of pre-integrated radiance.
 
-Ben-Artzi 2006, section 5.2: hierarchical subdivision of the sphere into triangles, each split into four where the metric
-of structured importance sampling (Agarwal 2003, L · ΔΩ^b) is largest.
+Ben-Artzi 2006, section 5.2: hierarchical subdivision of the sphere into triangles, each split into four where the
+metric of structured importance sampling (Agarwal 2003, L · ΔΩ^b) is largest.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class _Subdivision:
         self.directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
         solid_angles = np.repeat(texel_solid_angles(height, width), width)
         self.power = radiance.reshape(-1, 3).astype(np.float64) * solid_angles[:, None]
-        self.luminous = luminance(self.power)
+        self.luminous = luminance(self.power.astype(np.float32)).astype(np.float64)
         self.mean = float(self.luminous.sum()) / (4 * np.pi)
         self.solid_angles = solid_angles
         self.vertices: list[F64] = list(_OCTAHEDRON)

@@ -1,7 +1,7 @@
 """Embree 4 through its C interface: the packet calls that embreex's own wrapper does not offer.
 
-The library is the one that the embreex wheel bundles. Numba kernels receive `occluded16` and `intersect16` as first-class
-functions and call them without the interpreter: 16 rays a call.
+The library is the one that the embreex wheel bundles. Numba kernels receive `occluded16` and `intersect16` as
+first-class functions and call them without the interpreter: 16 rays a call.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import ctypes
 import glob
 import os
+import weakref
 from dataclasses import dataclass
+from typing import Any
 
 import embreex
-import embreex.rtcore  # noqa: F401  (loads the libraries that the bundled Embree depends on)
+import embreex.rtcore
 import numba as nb
-import numba.experimental.function_type  # noqa: F401  (teaches Numba to type functions given by address)
+import numba.experimental.function_type
 import numpy as np
 from numba.core import types
 from numpy.typing import NDArray
@@ -64,7 +66,7 @@ _device_error = _function("rtcGetDeviceError", ctypes.c_int, _POINTER)
 _device = _new_device(b"threads=1")
 
 
-class _ByAddress(types.WrapperAddressProtocol):  # type: ignore[misc]
+class _ByAddress(types.WrapperAddressProtocol):
     """A C function that Numba calls by address; typed, so that compiled kernels are cached on disk."""
 
     def __init__(self, name: str) -> None:
@@ -74,7 +76,7 @@ class _ByAddress(types.WrapperAddressProtocol):  # type: ignore[misc]
         assert self._address is not None
         return self._address
 
-    def signature(self) -> object:
+    def signature(self) -> Any:
         return PacketCall
 
 
@@ -133,5 +135,5 @@ class EmbreeScene:
             raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
         return cls(scene)
 
-    def __del__(self) -> None:
-        _release_scene(self.handle)
+    def __post_init__(self) -> None:
+        weakref.finalize(self, _release_scene, self.handle).atexit = False

@@ -47,7 +47,9 @@ def merge(scene: Scene) -> Geometry:
         raise SceneError("the scene has no triangles; add a mesh")
     first = np.cumsum([0, *(len(mesh.positions) for mesh in scene.meshes)])
     positions = np.concatenate([mesh.positions for mesh in scene.meshes])
-    faces = np.concatenate([mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)])
+    faces = np.concatenate(
+        [mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)]
+    )
     counts = [len(mesh.faces) for mesh in scene.meshes]
     # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
     reach = float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))

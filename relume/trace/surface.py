@@ -121,7 +121,7 @@ def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) ->
 
 
 def _towards(normal: F32, directions: F32) -> F32:
-    """Bend shading normals that face away from the viewer just into view, so that no sample is lost to interpolation."""
+    """Bend shading normals that face away from the viewer just into view: interpolation must lose no sample."""
     facing = -np.einsum("nc,nc->n", normal, directions)
     lacking = np.maximum(0.01 - facing, 0)[:, None]
     return _unit(normal - lacking * directions, -directions)

@@ -78,7 +78,9 @@ def _pyramid(key: _ByIdentity) -> MipMap:
 
 def _halve(image: F32) -> F32:
     height, width = image.shape[:2]
-    padded = np.pad(image, ((0, height % 2 if height > 1 else 1), (0, width % 2 if width > 1 else 1), (0, 0)), mode="edge")
+    padded = np.pad(
+        image, ((0, height % 2 if height > 1 else 1), (0, width % 2 if width > 1 else 1), (0, 0)), mode="edge"
+    )
     return np.asarray(
         (padded[0::2, 0::2] + padded[1::2, 0::2] + padded[0::2, 1::2] + padded[1::2, 1::2]) / 4, np.float32
     )
@@ -90,5 +92,5 @@ def _wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int
         return np.clip(index, 0, size - 1).astype(np.int64)
     if wrap == "mirror":
         folded = np.mod(index, 2 * size)
-        return np.minimum(folded, 2 * size - 1 - folded).astype(np.int64)
-    return np.mod(index, size).astype(np.int64)
+        return np.asarray(np.minimum(folded, 2 * size - 1 - folded), np.int64)
+    return np.asarray(np.mod(index, size), np.int64)

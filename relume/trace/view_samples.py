@@ -1,7 +1,7 @@
 """View samples: the points of a view whose radiance makes its pixels.
 
 One sample a pixel, more where material, normal or depth change across it (docs/method.md, "View samples"): eight
-positions are traced in such a pixel and those that see the same thing are merged, so that a silhouette has eight levels of
+positions are traced in such a pixel and those that see the same thing are merged: a silhouette has eight levels of
 coverage for two or three samples.
 """
 
@@ -30,7 +30,7 @@ _DEPTH_EDGE = 0.02
 
 @dataclass(frozen=True)
 class ViewSamples:
-    """Samples sorted by material, then along a Morton curve, so that neighbours in memory are neighbours in the picture.
+    """Samples sorted by material, then along a Morton curve: neighbours in memory are neighbours in the picture.
 
     Attributes:
         pixel: row-major index. (n,) uint32
@@ -88,12 +88,12 @@ def _merge(
     mesh = mesh.reshape(num_pixels, positions_a_pixel)
     normal = surface_at(geometry, hits, directions).normal.reshape(num_pixels, positions_a_pixel, 3)
     group = np.full((num_pixels, positions_a_pixel), -1)
-    for leader in range(positions_a_pixel):
+    for candidate in range(positions_a_pixel):
         # rays of the same mesh with nearly the same normal as the first that has no group yet
-        cosine = np.einsum("pkc,pc->pk", normal, normal[:, leader])
-        same = (group < 0) & (mesh == mesh[:, leader : leader + 1]) & ((cosine > _COS_EDGE) | (mesh < 0))
-        same &= (group[:, leader] < 0)[:, None]
-        group[same] = leader
+        cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
+        same = (group < 0) & (mesh == mesh[:, candidate : candidate + 1]) & ((cosine > _COS_EDGE) | (mesh < 0))
+        same &= (group[:, candidate] < 0)[:, None]
+        group[same] = candidate
     pixel, leader = np.nonzero(group == np.arange(positions_a_pixel))
     size = (group[pixel] == leader[:, None]).sum(axis=1)
     return pixel * positions_a_pixel + leader, pixel, (size / positions_a_pixel).astype(np.float32)

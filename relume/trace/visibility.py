@@ -94,7 +94,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
         counts.append(
             _trace(
                 occluded16, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits
-            )  # fmt: skip
+            )
         )
 
     began = time.perf_counter()

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.model import Scene
@@ -119,8 +118,15 @@ class StoreReader(Protocol):
 class TransferMethod(Protocol):
     """How one paper's light transport is baked."""
 
-    name: str
-    stages: tuple[str, ...]
+    @property
+    def name(self) -> str:
+        """What recipes call it."""
+        ...
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Names of its stages, in order."""
+        ...
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Cost of a bake; pure, traces nothing. Raises PlanError where the recipe does not fit the scene."""

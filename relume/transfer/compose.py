@@ -1,4 +1,4 @@
-"""From term images to the radiance of view samples: colours, textures and outgoing curves multiply the finished terms."""
+"""From term images to the radiance of view samples: colours, textures, outgoing curves multiply finished terms."""
 
 from __future__ import annotations
 
@@ -35,7 +35,14 @@ def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, repl
 
 
 def add_term(
-    image: F32, color: F32, texture: F32, outgoing: F32 | None, has_texture: bool, first: int, replace: bool, radiance: F32
+    image: F32,
+    color: F32,
+    texture: F32,
+    outgoing: F32 | None,
+    has_texture: bool,
+    first: int,
+    replace: bool,
+    radiance: F32,
 ) -> None:
     """Add one term of a material to the view's radiance, or begin with it.
 

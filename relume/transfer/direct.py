@@ -5,10 +5,10 @@ scene's own look, so that the first picture needs no projection. Stages: "sample
 samples), then "visibility" (rows of each view).
 
     lights/nodes, node_directions, direction, power         relume.light.triangles.TriangleLights
-    views/<view>/pixel, weight, material                     every sample; background samples last
-    views/<view>/position, normal, tangent, diffuse, specular
-    views/<view>/visibility                                  samples on surfaces only, as the next one
-    views/<view>/images                                      Σ_j c_j T_j of each term of the default look
+    views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
+    views/<k>/position, normal, tangent, diffuse, specular
+    views/<k>/visibility                                     samples on surfaces only, as the next one
+    views/<k>/images                                         Σ_j c_j T_j of each term of the default look
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from relume.brdf.registry import TERMS
 from relume.errors import PlanError
 from relume.light.triangles import MAX_LIGHTS, MIN_LIGHTS, TriangleLights, subdivide
 from relume.look import default_look
+from relume.parallel import for_ranges
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
@@ -60,7 +61,7 @@ class DirectMethod:
             raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(known)}")
         if not recipe.views or len(set(recipe.views)) != len(recipe.views):
             raise PlanError("name each view once, and at least one")
-        if not (16 <= width and 16 <= height and width * height <= MAX_PIXELS):
+        if not (width >= 16 and height >= 16 and width * height <= MAX_PIXELS):
             raise PlanError(f"{width}×{height} pixels were asked for; give at least 16×16, at most {MAX_PIXELS} in all")
         if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
             raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
@@ -86,7 +87,7 @@ class DirectMethod:
             "num_lights": recipe.num_lights,
             "look": default_look(scene.materials),
             "materials": [material.name for material in scene.materials],
-            "views": {view: {"eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views},
+            "views": [{"name": view, "eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views],
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
@@ -95,8 +96,8 @@ class DirectMethod:
             return [Task(0, 0, "", 0, 0), *(Task(0, k + 1, view, 0, 0) for k, view in enumerate(recipe.views))]
         ranges = [
             (view, start, min(start + SHARD_ROWS, rows))
-            for view in recipe.views
-            for rows in [self._num_surface_samples(view, store)]
+            for k, view in enumerate(recipe.views)
+            for rows in [self._num_surface_samples(k, store)]
             for start in range(0, rows, SHARD_ROWS)
         ]
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
@@ -108,44 +109,43 @@ class DirectMethod:
         bits = (store.shape("lights/nodes")[0] + 7) // 8
         num_images = self._num_images(scene)
         specs = []
-        for view in recipe.views:
-            rows = self._num_surface_samples(view, store)
+        for k in range(len(recipe.views)):
+            rows = self._num_surface_samples(k, store)
             for name, width, dtype in (("visibility", (bits,), "uint8"), ("images", (num_images, 3), "float32")):
                 specs.append(
-                    ArraySpec(
-                        f"views/{view}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width)
-                    )
+                    ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
                 )
         return specs
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
         """One task; nothing is random, so the same task gives the same bits anywhere."""
         if task.stage == 1:
-            return self._visibility(scene, task, store)
+            return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
             lights = subdivide(scene.environment.radiance, recipe.num_lights)
             names = ("nodes", "node_directions", "direction", "power")
             return Written({f"lights/{name}": getattr(lights, name) for name in names}, 0, 0.0)
         samples = sample_view(scene, self._geometry_of(scene), task.view, recipe.size)
         surface = samples.surface
-        arrays = {
+        arrays: dict[str, NDArray[Any]] = {
             "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
             "position": surface.position, "normal": surface.normal, "tangent": surface.tangent,
             "diffuse": surface.diffuse, "specular": surface.specular,
         }  # fmt: skip
-        return Written({f"views/{task.view}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
+        prefix = f"views/{recipe.views.index(task.view)}"
+        return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
 
-    def _visibility(self, scene: Scene, task: Task, store: StoreReader) -> Written:
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         lights = read_lights(store)
         geometry = self._geometry_of(scene)
-        prefix = f"views/{task.view}"
+        prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
         traced = trace_visibility(geometry.embree, position, normal, lights.direction)
-        receivers = read_receivers(store, task.view, task.start, task.stop, traced.visible)
+        receivers = read_receivers(store, k, task.start, task.stop, traced.visible)
         material = store.read(f"{prefix}/material", task.start, task.stop)
         images = _default_images(scene, material, lights, receivers, self._num_images(scene))
-        arrays = {f"{prefix}/visibility": traced.visible, f"{prefix}/images": images}
+        arrays: dict[str, NDArray[Any]] = {f"{prefix}/visibility": traced.visible, f"{prefix}/images": images}
         return Written(arrays, traced.num_rays, traced.trace_s)
 
     def _geometry_of(self, scene: Scene) -> Geometry:
@@ -159,8 +159,8 @@ class DirectMethod:
         return max(1, *(len(material.terms) for material in scene.materials))
 
     @staticmethod
-    def _num_surface_samples(view: str, store: StoreReader) -> int:
-        return int(np.searchsorted(store.read(f"views/{view}/material"), BACKGROUND))
+    def _num_surface_samples(k: int, store: StoreReader) -> int:
+        return int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND))
 
 
 def _default_images(
@@ -170,10 +170,21 @@ def _default_images(
     look = default_look(scene.materials)
     images = np.zeros((len(material), num_images, 3), np.float32)
     for index in np.unique(material):
-        first, last = np.searchsorted(material, [index, index + 1])
+        first, last = (int(row) for row in np.searchsorted(material, [index, index + 1]))
         for k, document in enumerate(look["materials"][scene.materials[index].name]["terms"]):
-            term = TERMS[document["model"]]
-            bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-            projector = Projector(term, contract(term, bands, None), lights, receivers)
-            images[first:last, k] = projector.project(int(first), int(last))[:, 0]
+            _term_image(document, lights, receivers, first, images[first:last, k])
     return images
+
+
+def _term_image(
+    document: dict[str, Any], lights: TriangleLights, receivers: Receivers, first: int, image: NDArray[np.float32]
+) -> None:
+    """Image of one term over the receivers from `first` on; written to image (n, 3)."""
+    term = TERMS[document["model"]]
+    contraction = contract(term, {curve.name: curve_bands(document, curve) for curve in term.curves}, None)
+
+    def project(start: int, stop: int) -> None:
+        projector = Projector(term, contraction, lights, receivers)
+        image[start:stop] = projector.project(first + start, first + stop)[:, 0]
+
+    for_ranges(project, len(image), CHUNK_ROWS)

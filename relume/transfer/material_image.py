@@ -51,7 +51,7 @@ class MaterialImage:
         return (term for term in self.terms if not term.is_exact())
 
     def compose(self, radiance: F32) -> bool:
-        """Write the material's samples into the view's radiance; False where nothing has changed since the last time."""
+        """Write the material's samples into the view's radiance; False where nothing has changed since."""
         if self._is_current and all(term.is_composed for term in self.terms):
             return False
         for k, term in enumerate(self.terms):

@@ -57,7 +57,7 @@ def open_transfer(path: Path) -> Transfer:
             num_lights=found["num_lights"],
             default_look=found["look"],
             material_names=tuple(found["materials"]),
-            views={name: open_view(store, name) for name in found["views"]},
+            views={view["name"]: open_view(store, k) for k, view in enumerate(found["views"])},
         )
     except KeyError as error:
         raise StoreError(f"the store says nothing about {error}; delete the bake and bake again") from error

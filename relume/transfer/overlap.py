@@ -1,8 +1,8 @@
 """How much of a triangle lies in each band of an angle: Ben-Artzi 2006, appendix A.
 
-Only the angle at the three corners is needed: where the angle is linear over the triangle, the area below a value y grows
-quadratically from the smallest corner to the middle one and from there to the largest. What lies beyond the last band
-counts to it: angles are clamped to its end.
+Only the angle at the three corners is needed: where the angle is linear over the triangle, the area below a value y
+grows quadratically from the smallest corner to the middle one and from there to the largest. What lies beyond the last
+band counts to it: angles are clamped to its end.
 """
 
 from __future__ import annotations

@@ -264,7 +264,9 @@ class Picture:
                 if material.num_samples:
                     return _Need(material, term, active)
         if touched is not None and touched.material.num_samples and touched.active in touched.term.target:
-            current = touched.term.active == touched.active and self._operator(touched.material, touched.term) is not None
+            current = (
+                touched.term.active == touched.active and self._operator(touched.material, touched.term) is not None
+            )
             if not current and touched.term.is_exact():
                 return touched
         return None

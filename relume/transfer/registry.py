@@ -1,4 +1,4 @@
-"""The list of transfer methods. To add one: write its module beside this one and add it here; tests/contract runs over it."""
+"""The list of transfer methods. To add one: write its module beside this one and add it here."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -20,7 +21,7 @@ _TILES_A_RANGE = 4
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def pack_rgb9e5(red, green, blue):  # type: ignore[no-untyped-def]
+def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     """One pixel as 32 bits: three 9-bit mantissas, red lowest, and a 5-bit exponent they share."""
     red = min(max(red, np.float32(0)), _LARGEST)
     green = min(max(green, np.float32(0)), _LARGEST)
@@ -29,7 +30,7 @@ def pack_rgb9e5(red, green, blue):  # type: ignore[no-untyped-def]
     if not largest > 0:
         return np.uint32(0)
     _, exponent = math.frexp(largest)
-    shared = max(0, np.int64(exponent) + _BIAS)
+    shared: Any = max(0, exponent + _BIAS)
     scale = np.float32(math.ldexp(1.0, _MANTISSA_BITS + _BIAS - shared))
     if np.int64(largest * scale + np.float32(0.5)) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
         shared += 1
@@ -78,13 +79,8 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], scale: float) -> F
     sizes = table[:, 2] * table[:, 3]
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
-    for_ranges(
-        lambda start, stop: _resolve(
-            radiance, np.float32(scale), view.first, view.order, view.weight, view.width, table, offsets, start, stop, out
-        ),
-        len(table),
-        _TILES_A_RANGE,
-    )  # fmt: skip
+    args = (radiance, np.float32(scale), view.first, view.order, view.weight, view.width, table, offsets)
+    for_ranges(lambda start, stop: _resolve(*args, start, stop, out), len(table), _TILES_A_RANGE)
     return out
 
 

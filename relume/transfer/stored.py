@@ -18,14 +18,14 @@ def read_lights(store: StoreReader) -> TriangleLights:
     return TriangleLights(nodes, directions, direction, power)
 
 
-def read_receivers(store: StoreReader, view: str, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
-    """Samples [start, stop) of a view as points that light arrives at."""
-    eye = np.asarray(store.attributes["views"][view]["eye"], np.float32)
-    position = store.read(f"views/{view}/position", start, stop)
+def read_receivers(store: StoreReader, k: int, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
+    """Samples [start, stop) of the k-th view as points that light arrives at."""
+    eye = np.asarray(store.attributes["views"][k]["eye"], np.float32)
+    position = store.read(f"views/{k}/position", start, stop)
     towards = eye - position
     return Receivers(
-        store.read(f"views/{view}/normal", start, stop),
-        store.read(f"views/{view}/tangent", start, stop),
+        store.read(f"views/{k}/normal", start, stop),
+        store.read(f"views/{k}/tangent", start, stop),
         (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32),
         visible,
     )

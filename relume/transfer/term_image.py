@@ -1,7 +1,7 @@
 """The live image of one term of one material: which curve is free, what it shows, what it should show.
 
-Exactness is tracked as in eqs. 29 to 31, Ben-Artzi 2006: the image belongs to the effective coefficients, and a step adds
-T · (c_perfect − c_effective), the most important coefficients first where there is no time for all.
+Exactness is tracked as in eqs. 29 to 31, Ben-Artzi 2006: the image belongs to the effective coefficients, and a step
+adds T · (c_perfect − c_effective), the most important coefficients first where there is no time for all.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
+from relume.errors import EditError
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.stream import columns_of, stream
 
@@ -27,7 +28,8 @@ class TermImage:
     """State of one term.
 
     Attributes:
-        target: bands of each curve in the newest look. effective: those that `image` shows; None where it shows nothing.
+        target: bands of each curve in the newest look.
+        effective: those that `image` shows; None where it shows nothing.
         active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
@@ -71,7 +73,7 @@ class TermImage:
         if not curves:
             return None
         values = [curve_values(self.document, curve, self._theta_o) for curve in curves]
-        return np.prod(values, axis=0).astype(np.float32)
+        return np.asarray(np.prod(values, axis=0), np.float32)
 
     def differing(self) -> list[str]:
         """Curves whose target the image does not show."""
@@ -110,7 +112,8 @@ class TermImage:
 
     def step(self, frozen: Frozen, max_coefficients: int | None) -> int:
         """Bring the active curve towards its target (eqs. 29 to 31); returns the number of coefficients moved."""
-        assert self.active is not None and self.effective is not None and self.shown is not None
+        if self.active is None or self.effective is None or self.shown is None:
+            raise EditError("the term has no frozen operator; freeze it first")
         if np.array_equal(self.target[self.active], self.effective[self.active]):
             return 0
         perfect = analysis(self.target[self.active])

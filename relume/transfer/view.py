@@ -32,6 +32,7 @@ class View:
     """
 
     name: str
+    index: int
     width: int
     height: int
     store: StoreReader = field(repr=False)
@@ -60,17 +61,17 @@ class View:
     def receivers(self, material: int) -> Receivers:
         """A material's samples as points that light arrives at; reads the store."""
         rows = self.rows(material)
-        visible = self.store.read(f"views/{self.name}/visibility", rows.start, rows.stop)
-        return read_receivers(self.store, self.name, rows.start, rows.stop, visible)
+        visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
+        return read_receivers(self.store, self.index, rows.start, rows.stop, visible)
 
     def images(self, material: int) -> F32:
         """Image of each term of the default look, before colour and textures. (samples, terms, 3) float32"""
         rows = self.rows(material)
-        return np.asarray(self.store.read(f"views/{self.name}/images", rows.start, rows.stop), np.float32)
+        return np.asarray(self.store.read(f"views/{self.index}/images", rows.start, rows.stop), np.float32)
 
     def background(self) -> F32:
         """Radiance of the samples after the surfaces. (n, 3) float32"""
-        return np.asarray(self.store.read(f"views/{self.name}/diffuse", self.num_surface_samples), np.float32)
+        return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
 
     def material_ids(self) -> NDArray[np.uint16]:
         """The material that covers most of each pixel, 65535 where that is the background. (height, width)"""
@@ -104,14 +105,15 @@ class View:
         return touched
 
 
-def open_view(store: StoreReader, name: str) -> View:
+def open_view(store: StoreReader, index: int) -> View:
     """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
 
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
     width, height = store.attributes["size"]
-    prefix = f"views/{name}"
+    found = store.attributes["views"][index]
+    prefix = f"views/{index}"
     pixel = store.read(f"{prefix}/pixel")
     material = store.read(f"{prefix}/material")
     weight = store.read(f"{prefix}/weight")
@@ -122,12 +124,13 @@ def open_view(store: StoreReader, name: str) -> View:
     if surface and int(material[surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
-    eye = np.asarray(store.attributes["views"][name]["eye"])
+    eye = np.asarray(found["eye"])
     towards = eye - store.read(f"{prefix}/position", 0, surface)
     normal = store.read(f"{prefix}/normal", 0, surface)
     cosine = np.einsum("nc,nc->n", normal, towards) / np.linalg.norm(towards, axis=1)
     return View(
-        name=name,
+        name=found["name"],
+        index=index,
         width=width,
         height=height,
         store=store,
