@@ -52,16 +52,14 @@ export class Session {
   constructor(
     readonly bake: string,
     private readonly handlers: SessionHandlers,
-  ) {
-    this.connect();
-  }
+  ) {}
 
   /** Of the newest edit that was sent. */
   get revision(): number {
     return this.queue.revision;
   }
 
-  private connect(): void {
+  connect(): void {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
     url.protocol = url.protocol.replace("http", "ws");

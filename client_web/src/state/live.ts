@@ -46,6 +46,7 @@ export function connect(bake: string): void {
   const opened: Session = new Session(bake, handlersOf(() => opened));
   if (session === null) session = opened;
   else incoming = opened;
+  opened.connect();
 }
 
 async function loadIds(bake: string, view: string): Promise<void> {
@@ -82,6 +83,7 @@ function showViews(of: Session, views: HelloMessage["views"], name: string): voi
 
 async function takeFrame(from: Session, frame: Frame): Promise<void> {
   if (from === incoming && frame.header.kind !== "brush") swap(from);
+  if (store.coming.peek()?.id === from.bake) store.coming.value = null;
   if (from !== session || frame.header.view !== store.viewName.peek()) return;
   await stage.show(frame).catch(showError);
   if (frame.header.kind === "brush" || from !== session) return;
@@ -107,8 +109,7 @@ function handlersOf(self: () => Session): SessionHandlers {
   const current = () => self() === session;
   return {
     connection(state, retryInMs) {
-      // the first call comes from the constructor, before there is a session to compare with
-      if (session !== null && !(incoming === null || current())) return;
+      if (!current()) return;
       store.connection.value = state;
       store.retryInMs.value = retryInMs;
     },
@@ -145,6 +146,7 @@ function handlersOf(self: () => Session): SessionHandlers {
       editSent(revision, inputTime);
     },
     ended(reason) {
+      if (self() === incoming) incoming = null;
       showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
     },
     broken: (text) => showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),

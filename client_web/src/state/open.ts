@@ -64,13 +64,15 @@ export function follow(bake: BakeBody): void {
   });
 }
 
+/** The bake that a session was opened on last. */
+let opened: string | null = null;
+
 /** Open a session on a finer bake once; it takes over when its first picture is there. */
 function swapTo(bake: string): void {
-  if (store.page.peek() !== "editor" || bake === store.bake.peek() || bake === swapping) return;
-  swapping = bake;
+  if (store.page.peek() !== "editor" || bake === store.bake.peek() || bake === opened) return;
+  opened = bake;
   connect(bake);
 }
-let swapping: string | null = null;
 
 // somebody else's bake of this scene takes over only where it is finer
 whenBakeIsReady((id) => {
@@ -82,7 +84,7 @@ whenBakeIsReady((id) => {
   });
 });
 
-async function bakePreview(scene: SceneBody): Promise<string | null> {
+async function bakePreview(scene: SceneBody): Promise<string> {
   const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview" });
   store.coming.value = preview;
   const end = preview.state === "ready" ? preview : await bakeEnd(preview.id, (news) => (store.coming.value = news));
@@ -102,14 +104,14 @@ export async function openScene(id: string, place: Place = placeFromUrl(`?scene=
     const [scene, models] = await Promise.all([api.getScene(id), api.listModels()]);
     store.models.value = models;
     reset(scene);
-    swapping = null;
     restorePlace(scene, place);
     const bakes = await bakesOf(scene);
     store.bakes.value = bakes;
     const ready = bakes.filter((bake) => bake.state === "ready");
     const shown = ready.find((bake) => bake.id === place.bake) ?? ready[0];
     const running = bakes.find((bake) => bake.state === "running" || bake.state === "queued");
-    connect(shown?.id ?? ((await bakePreview(scene)) as string));
+    opened = shown?.id ?? (await bakePreview(scene));
+    connect(opened);
     if (preset !== undefined) await startFullBake(scene, preset);
     else if (running !== undefined) follow(running);
     else if (shown === undefined) await startFullBake(scene, "good");
