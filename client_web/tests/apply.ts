@@ -8,7 +8,10 @@ export function applyPatch<T>(document: T, patch: readonly PatchOp[]): T {
       root = structuredClone(value);
       continue;
     }
-    const keys = path.slice(1).split("/").map((k) => k.replaceAll("~1", "/").replaceAll("~0", "~"));
+    const keys = path
+      .slice(1)
+      .split("/")
+      .map((k) => k.replaceAll("~1", "/").replaceAll("~0", "~"));
     const last = keys.pop() as string;
     const parent = keys.reduce((node, key) => {
       if (!(key in (node as object))) throw new Error(`${path}: no ${key}`);

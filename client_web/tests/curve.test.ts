@@ -3,7 +3,15 @@ import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "..
 import { joined, readChannels, writeChannels } from "../src/curve/channels";
 import { bandSamples, fitPoints, MAX_POINTS, Stroke } from "../src/curve/fit";
 import { pchip } from "../src/curve/pchip";
-import { addPoint, mergeStroke, MIN_GAP, movePoint, removePoint, scaleStretch, shiftStretch } from "../src/curve/points";
+import {
+  addPoint,
+  mergeStroke,
+  MIN_GAP,
+  movePoint,
+  removePoint,
+  scaleStretch,
+  shiftStretch,
+} from "../src/curve/points";
 import { mainStretch, shareOf } from "../src/curve/stretch";
 import type { Point } from "../src/protocol";
 
@@ -35,13 +43,20 @@ function expectValid(points: readonly Point[]): void {
 
 describe("pchip", () => {
   test("agrees with SciPy's PchipInterpolator", () => {
-    const expected = [3.9901352042921996, 3.8645408171687987, 2.8278019562285146, 1.5, 1.5833968399126148, 1.9979931920947007, 1.6703953823953823, 0.07727827609427632];
+    const expected = [
+      3.9901352042921996, 3.8645408171687987, 2.8278019562285146, 1.5, 1.5833968399126148, 1.9979931920947007,
+      1.6703953823953823, 0.07727827609427632,
+    ];
     const curve = pchip(POINTS);
     [1, 4, 8, 12.5, 20, 39, 60, 89].forEach((x, i) => expect(curve(x)).toBeCloseTo(expected[i] as number, 10));
   });
 
   test("goes through its points, is constant outside and does not overshoot", () => {
-    const curve = pchip([[10, 1], [20, 5], [30, 5.1]]);
+    const curve = pchip([
+      [10, 1],
+      [20, 5],
+      [30, 5.1],
+    ]);
     expect([curve(0), curve(10), curve(20), curve(30), curve(90)]).toEqual([1, 1, 5, 5.1, 5.1]);
     for (let x = 10; x <= 30; x += 0.1) expect(curve(x)).toBeLessThanOrEqual(5.1 + 1e-12);
   });
@@ -58,7 +73,8 @@ describe("axes", () => {
     { stretched: true, log: true, top: 400 },
   ])("there and back: %o", (axes) => {
     for (const x of [0, 0.3, 7, 45, 90]) expect(degreesAt(axes, xFraction(axes, x))).toBeCloseTo(x, 9);
-    for (const y of [axes.top, axes.top / 3, axes.top / 100]) expect(valueAt(axes, yFraction(axes, y))).toBeCloseTo(y, 9);
+    for (const y of [axes.top, axes.top / 3, axes.top / 100])
+      expect(valueAt(axes, yFraction(axes, y))).toBeCloseTo(y, 9);
     expect(valueAt(axes, 0)).toBe(0);
     expect(yFraction(axes, 0)).toBe(0);
   });
@@ -85,7 +101,10 @@ describe("fitPoints", () => {
   });
 
   test("a constant needs two points", () => {
-    expect(fitPoints(bandSamples(Array<number>(64).fill(1)), LINEAR)).toEqual([[0, 1], [90, 1]]);
+    expect(fitPoints(bandSamples(Array<number>(64).fill(1)), LINEAR)).toEqual([
+      [0, 1],
+      [90, 1],
+    ]);
   });
 });
 
@@ -156,7 +175,10 @@ describe("points", () => {
   });
 
   test("two always stay", () => {
-    const two: Point[] = [[0, 1], [90, 0]];
+    const two: Point[] = [
+      [0, 1],
+      [90, 0],
+    ];
     expect(removePoint(two, 0)).toEqual(two);
     expect(removePoint(POINTS, 1)).toHaveLength(POINTS.length - 1);
   });
@@ -190,8 +212,14 @@ describe("stretches", () => {
 });
 
 describe("channels", () => {
-  const red: Point[] = [[0, 1], [90, 0]];
-  const rest: Point[] = [[0, 2], [90, 1]];
+  const red: Point[] = [
+    [0, 1],
+    [90, 0],
+  ];
+  const rest: Point[] = [
+    [0, 2],
+    [90, 1],
+  ];
 
   test("equal channels share one object, and reading gives back what was written", () => {
     expect(writeChannels([rest, rest, rest])).toEqual({ points: rest, channels: "rgb" });
@@ -216,8 +244,26 @@ describe("channels", () => {
 });
 
 test("a pixel's share through a curve, and nothing where only rounding is left", () => {
-  expect(shareOf([[0.1, 0.1], [0.05, 0.05], [0, 0]], [0.4, 0.2, 0])).toBeCloseTo(0.5, 12);
-  expect(shareOf([[1e-12, -1e-12], [0, 0], [0, 0]], [0.4, 0.2, 0])).toBe(0);
+  expect(
+    shareOf(
+      [
+        [0.1, 0.1],
+        [0.05, 0.05],
+        [0, 0],
+      ],
+      [0.4, 0.2, 0],
+    ),
+  ).toBeCloseTo(0.5, 12);
+  expect(
+    shareOf(
+      [
+        [1e-12, -1e-12],
+        [0, 0],
+        [0, 0],
+      ],
+      [0.4, 0.2, 0],
+    ),
+  ).toBe(0);
   expect(shareOf([[1], [1], [1]], [0, 0, 0])).toBe(0);
 });
 
@@ -225,5 +271,11 @@ test("mainStretch finds the narrowest run that carries the light", () => {
   const bands = Array<number>(90).fill(0.01);
   bands.fill(10, 3, 7);
   expect(mainStretch([bands, bands, bands])).toEqual([3, 7]);
-  expect(mainStretch([[0, 0], [0, 0], [0, 0]])).toBeNull();
+  expect(
+    mainStretch([
+      [0, 0],
+      [0, 0],
+      [0, 0],
+    ]),
+  ).toBeNull();
 });

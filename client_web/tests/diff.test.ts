@@ -23,7 +23,12 @@ describe("pointers", () => {
   });
 
   test("setting undefined removes the member", () => {
-    const drawn = setAt(LOOK, CURVE, { points: [[0, 1], [90, 0]] });
+    const drawn = setAt(LOOK, CURVE, {
+      points: [
+        [0, 1],
+        [90, 0],
+      ],
+    });
     expect(setAt(drawn, CURVE, undefined)).toEqual(LOOK);
   });
 
@@ -39,8 +44,19 @@ describe("diffLooks", () => {
   });
 
   test("a curve is added, then replaced whole, then removed", () => {
-    const first = setAt(LOOK, CURVE, { points: [[0, 4], [90, 0]] });
-    const second = setAt(first, CURVE, { points: [[0, 4], [12, 1], [90, 0]] });
+    const first = setAt(LOOK, CURVE, {
+      points: [
+        [0, 4],
+        [90, 0],
+      ],
+    });
+    const second = setAt(first, CURVE, {
+      points: [
+        [0, 4],
+        [12, 1],
+        [90, 0],
+      ],
+    });
     expect(diffLooks(LOOK, first).map(({ op, path }) => [op, path])).toEqual([["add", CURVE]]);
     expect(diffLooks(first, second).map(({ op, path }) => [op, path])).toEqual([["replace", CURVE]]);
     expect(diffLooks(second, LOOK)).toEqual([{ op: "remove", path: CURVE }]);
@@ -65,7 +81,18 @@ describe("diffLooks", () => {
       [SIGMA, [0.1, 0.2, 0.3]],
       ["/materials/Teapot/terms/0/model", "ggx"],
       ["/materials/a~1b~0c/terms/0/params", { roughness: 0.3 }],
-      [CURVE, [{ points: [[0, 1], [90, 0]], channels: "r" }]],
+      [
+        CURVE,
+        [
+          {
+            points: [
+              [0, 1],
+              [90, 0],
+            ],
+            channels: "r",
+          },
+        ],
+      ],
       ["/display/exposure", -1.5],
     ];
     let look = LOOK;

@@ -59,7 +59,9 @@ describe("transform", () => {
 
 describe("decodeIds", () => {
   const WIDTH = 5;
-  const values = [0, 1, 300, 65535, 7, 8, 9, 256, 65535, 65535, 1, 2, 3, 4, 5, 500, 400, 300, 200, 100, 12, 13, 14, 15, 65534];
+  const values = [
+    0, 1, 300, 65535, 7, 8, 9, 256, 65535, 65535, 1, 2, 3, 4, 5, 500, 400, 300, 200, 100, 12, 13, 14, 15, 65534,
+  ];
 
   function chunk(type: string, body: Uint8Array): Uint8Array {
     const bytes = new Uint8Array(12 + body.length);

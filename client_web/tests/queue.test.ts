@@ -56,7 +56,10 @@ describe("EditQueue", () => {
   test("a look too long for one message goes in parts that make the same look", () => {
     const points = Array.from({ length: 60 }, (_, i) => [i * 1.5, i / 7]);
     const materials = Object.fromEntries(
-      Array.from({ length: 90 }, (_, i) => [`m${i}`, { terms: [{ model: "ggx", color: [1, 1, 1], curves: { theta_h: { points } } }] }]),
+      Array.from({ length: 90 }, (_, i) => [
+        `m${i}`,
+        { terms: [{ model: "ggx", color: [1, 1, 1], curves: { theta_h: { points } } }] },
+      ]),
     );
     const big = { ...LOOK, materials } as unknown as Look;
     const queue = new EditQueue();
@@ -64,7 +67,10 @@ describe("EditQueue", () => {
     queue.want(big, 1);
     const edits = queue.take();
     expect(edits.length).toBeGreaterThan(1);
-    const start = { ...LOOK, materials: Object.fromEntries(Object.keys(materials).map((name) => [name, { terms: [] }])) };
+    const start = {
+      ...LOOK,
+      materials: Object.fromEntries(Object.keys(materials).map((name) => [name, { terms: [] }])),
+    };
     let look: unknown = start;
     edits.forEach(({ patch, revision }, i) => {
       expect(revision).toBe(i + 1);

@@ -34,7 +34,15 @@ describe("slider scales", () => {
 
 describe("numbers", () => {
   test("are written as people read them", () => {
-    expect([0, 0.2, 12.345, 123.45, 12345, 1e-7, Number.NaN].map(formatNumber)).toEqual(["0", "0.200", "12.35", "123.5", "12345", "1.00e-7", "–"]);
+    expect([0, 0.2, 12.345, 123.45, 12345, 1e-7, Number.NaN].map(formatNumber)).toEqual([
+      "0",
+      "0.200",
+      "12.35",
+      "123.5",
+      "12345",
+      "1.00e-7",
+      "–",
+    ]);
     expect(formatBytes(104_448_000)).toBe("104 MB");
     expect([0.2, 14, 200, 9000].map(formatSeconds)).toEqual(["under a second", "14 s", "3 min", "2.5 h"]);
   });
@@ -61,14 +69,34 @@ describe("terms", () => {
     help: "",
     source: "",
     texture: "specular",
-    parameters: parameters.map((p) => ({ name: p, label: p, minimum: 0, maximum: 1, default: 0.5, unit: "", scale: "linear", help: "" })),
+    parameters: parameters.map((p) => ({
+      name: p,
+      label: p,
+      minimum: 0,
+      maximum: 1,
+      default: 0.5,
+      unit: "",
+      scale: "linear",
+      help: "",
+    })),
     curves: [],
   });
   const models = [model("ggx", ["roughness", "f0"]), model("schlick", ["roughness", "r"])];
 
   test("a new model keeps colour, texture and parameters of the same name", () => {
-    const term = { ...defaultTerm(models[0] as ModelInfo), color: [1, 2, 3] as Rgb, params: { roughness: 0.1, f0: 0.9 }, curves: { theta_h: {} } };
-    expect(withModel(term, "schlick", models)).toEqual({ model: "schlick", color: [1, 2, 3], params: { roughness: 0.1, r: 0.5 }, texture: null, curves: {} });
+    const term = {
+      ...defaultTerm(models[0] as ModelInfo),
+      color: [1, 2, 3] as Rgb,
+      params: { roughness: 0.1, f0: 0.9 },
+      curves: { theta_h: {} },
+    };
+    expect(withModel(term, "schlick", models)).toEqual({
+      model: "schlick",
+      color: [1, 2, 3],
+      params: { roughness: 0.1, r: 0.5 },
+      texture: null,
+      curves: {},
+    });
     expect(withModel(term, "nothing", models)).toBe(term);
   });
 });
@@ -76,7 +104,14 @@ describe("terms", () => {
 test("a place survives the URL", () => {
   const place = { scene: "ab12", bake: "cd34", view: "front & left", material: "a/b~c", term: 2, curve: "theta_h" };
   expect(placeFromUrl(placeToUrl(place))).toEqual(place);
-  expect(placeFromUrl("?term=-3")).toEqual({ scene: null, bake: null, view: null, material: null, term: 0, curve: null });
+  expect(placeFromUrl("?term=-3")).toEqual({
+    scene: null,
+    bake: null,
+    view: null,
+    material: null,
+    term: 0,
+    curve: null,
+  });
   expect(placeFromUrl("?term=zzz").term).toBe(0);
 });
 
@@ -96,11 +131,17 @@ test("free names are free", () => {
 
 test("chords name Shift only beside Ctrl", () => {
   const key = (k: string, ctrlKey = false, shiftKey = false) => chord({ key: k, ctrlKey, shiftKey, metaKey: false });
-  expect([key("?", false, true), key("Z", true, true), key("z", true), key("W")]).toEqual(["?", "Ctrl+Shift+z", "Ctrl+z", "w"]);
+  expect([key("?", false, true), key("Z", true, true), key("z", true), key("W")]).toEqual([
+    "?",
+    "Ctrl+Shift+z",
+    "Ctrl+z",
+    "w",
+  ]);
 });
 
 test("a gauge is read from Prometheus text", () => {
-  const text = "# HELP relume_frozen_cache_bytes x\nrelume_frozen_cache_bytes 1.5e+06\nrelume_frozen_cache_bytes_limit 9\n";
+  const text =
+    "# HELP relume_frozen_cache_bytes x\nrelume_frozen_cache_bytes 1.5e+06\nrelume_frozen_cache_bytes_limit 9\n";
   expect(gauge(text, "relume_frozen_cache_bytes")).toBe(1_500_000);
   expect(gauge(text, "nothing")).toBeNull();
 });

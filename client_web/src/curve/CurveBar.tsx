@@ -21,12 +21,24 @@ export function CurveTools({ hand }: { hand: Hand }) {
     <div class="bar">
       <div class="group" role="group" aria-label="Tool">
         {TOOLS.map(({ name, icon, label, keys }) => (
-          <IconButton key={name} icon={icon} label={label} keys={keys} pressed={tool.value === name} onClick={() => (tool.value = name)} />
+          <IconButton
+            key={name}
+            icon={icon}
+            label={label}
+            keys={keys}
+            pressed={tool.value === name}
+            onClick={() => (tool.value = name)}
+          />
         ))}
       </div>
       <div class="group" role="group" aria-label="Channels">
         {ACTIVE.map((name) => (
-          <button key={name} class={`channel-switch ${name}`} aria-pressed={active.value === name} onClick={() => (active.value = name)}>
+          <button
+            key={name}
+            class={`channel-switch ${name}`}
+            aria-pressed={active.value === name}
+            onClick={() => (active.value = name)}
+          >
             {name.toUpperCase()}
           </button>
         ))}
@@ -59,19 +71,42 @@ export function CurveBar({ hand }: { hand: Hand }) {
   const drawn = hand.channels.some((c) => channels[c] !== null);
   return (
     <div class="bar">
-      <button aria-pressed={near} title="Stretch the angles near 0°, where highlights live" onClick={() => (stretched.value = { ...stretched.value, [info.name]: !near })}>
+      <button
+        aria-pressed={near}
+        title="Stretch the angles near 0°, where highlights live"
+        onClick={() => (stretched.value = { ...stretched.value, [info.name]: !near })}
+      >
         0°↔
       </button>
-      <button aria-pressed={logarithmic.value} title="Logarithmic values (L)" onClick={() => (logarithmic.value = !logarithmic.value)}>
+      <button
+        aria-pressed={logarithmic.value}
+        title="Logarithmic values (L)"
+        onClick={() => (logarithmic.value = !logarithmic.value)}
+      >
         log
       </button>
-      <IconButton icon="eye" label="Pointing at the curve tints the pixels it lights" pressed={lights.value} onClick={() => (lights.value = !lights.value)} />
-      <IconButton icon="table" label="Points as numbers" pressed={tableOpen.value} onClick={() => {
-        tableOpen.value = !tableOpen.value;
-        if (tableOpen.value) tool.value = "points";
-      }} />
+      <IconButton
+        icon="eye"
+        label="Pointing at the curve tints the pixels it lights"
+        pressed={lights.value}
+        onClick={() => (lights.value = !lights.value)}
+      />
+      <IconButton
+        icon="table"
+        label="Points as numbers"
+        pressed={tableOpen.value}
+        onClick={() => {
+          tableOpen.value = !tableOpen.value;
+          if (tableOpen.value) tool.value = "points";
+        }}
+      />
       <span class="spacer" />
-      <IconButton icon="reset" label="Back to the model's own curve" disabled={!drawn} onClick={() => put(hand.model, "Reset curve", () => null, hand.channels)}>
+      <IconButton
+        icon="reset"
+        label="Back to the model's own curve"
+        disabled={!drawn}
+        onClick={() => put(hand.model, "Reset curve", () => null, hand.channels)}
+      >
         Reset
       </IconButton>
     </div>

@@ -14,7 +14,18 @@ import { Readout, type Contributions } from "./Readout";
 import { active, isStretched, logarithmic, tableOpen, tool } from "./settings";
 import { shareOf } from "./stretch";
 import { StretchBar } from "./StretchBar";
-import { applyScale, applyShift, drawGesture, picked, pointsGesture, selection, stretchGesture, type Gesture, type Hand, type Spot } from "./tools";
+import {
+  applyScale,
+  applyShift,
+  drawGesture,
+  picked,
+  pointsGesture,
+  selection,
+  stretchGesture,
+  type Gesture,
+  type Hand,
+  type Spot,
+} from "./tools";
 
 const HIT_PX = 11;
 const MIN_BRUSH_DEGREES = 0.75;
@@ -25,7 +36,9 @@ function useWidth(): [(element: HTMLElement | null) => void, number] {
   const [width, setWidth] = useState(288);
   useEffect(() => {
     if (element === null) return;
-    const observer = new ResizeObserver(([entry]) => entry && setWidth(Math.max(200, Math.round(entry.contentRect.width))));
+    const observer = new ResizeObserver(
+      ([entry]) => entry && setWidth(Math.max(200, Math.round(entry.contentRect.width))),
+    );
     observer.observe(element);
     return () => observer.disconnect();
   }, [element]);
@@ -128,7 +141,14 @@ function usePlot(model: CurveModel, width: number, ready: boolean) {
     setSpot(null);
     clearBrush();
   };
-  return { frame, hand, spot, pointsBlocked, dragging: gesture.current !== null, handlers: { onPointerDown: down, onPointerMove: move, onPointerUp: up, onPointerCancel: up, onPointerLeave: leave } };
+  return {
+    frame,
+    hand,
+    spot,
+    pointsBlocked,
+    dragging: gesture.current !== null,
+    handlers: { onPointerDown: down, onPointerMove: move, onPointerUp: up, onPointerCancel: up, onPointerLeave: leave },
+  };
 }
 
 export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
@@ -143,7 +163,8 @@ export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
     selection.value = null;
     return clearBrush;
   }, [path, active.value]);
-  const points = tool.value === "points" && ready && !pointsBlocked ? pointsOf(model, hand.channels[0] ?? 0, hand.axes) : null;
+  const points =
+    tool.value === "points" && ready && !pointsBlocked ? pointsOf(model, hand.channels[0] ?? 0, hand.axes) : null;
   const contributions = contributionsTo(path);
   const light = spot !== null && !dragging ? spot.degrees : null;
   return (
@@ -169,11 +190,26 @@ export function CurveEditor({ info, term }: { info: CurveInfo; term: Term }) {
           stretch={tool.value === "stretch" ? selection.value : null}
           stretchKind="selected"
         >
-          {light !== null && <line class="cursor" x1={plotX(frame, light)} x2={plotX(frame, light)} y1={MARGIN.top} y2={frame.height - MARGIN.bottom} />}
+          {light !== null && (
+            <line
+              class="cursor"
+              x1={plotX(frame, light)}
+              x2={plotX(frame, light)}
+              y1={MARGIN.top}
+              y2={frame.height - MARGIN.bottom}
+            />
+          )}
           {points !== null && <Handles frame={frame} hand={hand} points={points} />}
         </Plot>
       </svg>
-      <Readout model={model} axes={hand.axes} spot={spot} ready={ready} blocked={pointsBlocked} contributions={contributions} />
+      <Readout
+        model={model}
+        axes={hand.axes}
+        spot={spot}
+        ready={ready}
+        blocked={pointsBlocked}
+        contributions={contributions}
+      />
       {tool.value === "stretch" && <StretchBar hand={hand} />}
       <CurveBar hand={hand} />
       {tableOpen.value && points !== null && <PointTable hand={hand} points={points} />}

@@ -24,7 +24,8 @@ function generatorAt(hand: Hand, degrees: number): number | null {
 
 export function resetPoint(hand: Hand, points: Point[], index: number): void {
   const value = generatorAt(hand, points[index]?.[0] ?? 0);
-  if (value !== null) put(hand.model, "Reset point", () => movePoint(points, index, points[index]?.[0] ?? 0, value), hand.channels);
+  if (value !== null)
+    put(hand.model, "Reset point", () => movePoint(points, index, points[index]?.[0] ?? 0, value), hand.channels);
 }
 
 export function deletePoint(hand: Hand, points: Point[], index: number): void {
@@ -35,7 +36,12 @@ export function deletePoint(hand: Hand, points: Point[], index: number): void {
 function nudge(hand: Hand, points: Point[], index: number, dx: number, dy: number): void {
   const [x, y] = points[index] as Point;
   const height = Math.max(0, yFraction(hand.axes, y) + dy);
-  put(hand.model, "Move point", () => movePoint(points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height)), hand.channels);
+  put(
+    hand.model,
+    "Move point",
+    () => movePoint(points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height)),
+    hand.channels,
+  );
 }
 
 function onKey(event: KeyboardEvent, hand: Hand, points: Point[], index: number): void {

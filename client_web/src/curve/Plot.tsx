@@ -23,7 +23,9 @@ export function plotY(frame: Frame, value: number): number {
 }
 
 function pathOf(frame: Frame, line: readonly Point[]): string {
-  return line.map(([x, y], i) => `${i === 0 ? "M" : "L"}${plotX(frame, x).toFixed(1)} ${plotY(frame, y).toFixed(1)}`).join("");
+  return line
+    .map(([x, y], i) => `${i === 0 ? "M" : "L"}${plotX(frame, x).toFixed(1)} ${plotY(frame, y).toFixed(1)}`)
+    .join("");
 }
 
 function Grid({ frame }: { frame: Frame }) {
@@ -65,7 +67,13 @@ function Contributions({ frame, bands }: { frame: Frame; bands: number[][] }) {
           const y = base - 0.92 * height * Math.max(0, value / largest);
           return `L${plotX(frame, j * width).toFixed(1)} ${y.toFixed(1)}L${plotX(frame, (j + 1) * width).toFixed(1)} ${y.toFixed(1)}`;
         });
-        return <path key={c} class={CHANNEL_CLASSES[c]} d={`M${MARGIN.left} ${base}${steps.join("")}L${plotX(frame, MAX_DEGREES)} ${base}Z`} />;
+        return (
+          <path
+            key={c}
+            class={CHANNEL_CLASSES[c]}
+            d={`M${MARGIN.left} ${base}${steps.join("")}L${plotX(frame, MAX_DEGREES)} ${base}Z`}
+          />
+        );
       })}
     </g>
   );
@@ -85,7 +93,18 @@ interface Props {
   children?: ComponentChildren;
 }
 
-export function Plot({ frame, lines, ghosts, drawn, together, active, contributions, stretch, stretchKind, children }: Props) {
+export function Plot({
+  frame,
+  lines,
+  ghosts,
+  drawn,
+  together,
+  active,
+  contributions,
+  stretch,
+  stretchKind,
+  children,
+}: Props) {
   const shown = together ? [0] : [0, 1, 2];
   const name = (c: number) => (together ? "all" : CHANNEL_CLASSES[c]);
   return (
@@ -102,9 +121,17 @@ export function Plot({ frame, lines, ghosts, drawn, together, active, contributi
       {contributions !== null && <Contributions frame={frame} bands={contributions} />}
       <Grid frame={frame} />
       <g class="curves">
-        {shown.map((c) => ghosts?.[c] && drawn[c] && <path key={`ghost${c}`} class={`ghost ${name(c)}`} d={pathOf(frame, ghosts[c])} />)}
+        {shown.map(
+          (c) =>
+            ghosts?.[c] &&
+            drawn[c] && <path key={`ghost${c}`} class={`ghost ${name(c)}`} d={pathOf(frame, ghosts[c])} />,
+        )}
         {shown.map((c) => (
-          <path key={`line${c}`} class={`line ${name(c)} ${active.includes(c) ? "active" : ""}`} d={pathOf(frame, lines[c] ?? [])} />
+          <path
+            key={`line${c}`}
+            class={`line ${name(c)} ${active.includes(c) ? "active" : ""}`}
+            d={pathOf(frame, lines[c] ?? [])}
+          />
         ))}
       </g>
       {children}

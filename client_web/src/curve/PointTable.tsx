@@ -45,14 +45,37 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
           {points.map(([degrees, value], index) => (
             <tr key={index} class={picked.value?.index === index ? "picked" : ""}>
               <td>
-                <NumberField label={`Point ${index + 1}, angle`} value={degrees} minimum={0} maximum={90} step={0.5} onChange={(x) => move(index, x, value)} />
+                <NumberField
+                  label={`Point ${index + 1}, angle`}
+                  value={degrees}
+                  minimum={0}
+                  maximum={90}
+                  step={0.5}
+                  onChange={(x) => move(index, x, value)}
+                />
               </td>
               <td>
-                <NumberField label={`Point ${index + 1}, value`} value={value} minimum={0} maximum={1e6} step={Math.max(0.01, value / 50)} onChange={(y) => move(index, degrees, y)} />
+                <NumberField
+                  label={`Point ${index + 1}, value`}
+                  value={value}
+                  minimum={0}
+                  maximum={1e6}
+                  step={Math.max(0.01, value / 50)}
+                  onChange={(y) => move(index, degrees, y)}
+                />
               </td>
               <td class="row-actions">
-                <IconButton icon="reset" label={`Point ${index + 1}: back to the model's curve`} onClick={() => resetPoint(hand, points, index)} />
-                <IconButton icon="close" label={`Delete point ${index + 1}`} disabled={points.length <= 2} onClick={() => deletePoint(hand, points, index)} />
+                <IconButton
+                  icon="reset"
+                  label={`Point ${index + 1}: back to the model's curve`}
+                  onClick={() => resetPoint(hand, points, index)}
+                />
+                <IconButton
+                  icon="close"
+                  label={`Delete point ${index + 1}`}
+                  disabled={points.length <= 2}
+                  onClick={() => deletePoint(hand, points, index)}
+                />
               </td>
             </tr>
           ))}

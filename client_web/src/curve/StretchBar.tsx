@@ -9,11 +9,25 @@ export function StretchBar({ hand }: { hand: Hand }) {
     <div class="stretch-bar">
       <label>
         from{" "}
-        <NumberField label="Stretch from, degrees" value={from} minimum={0} maximum={to} step={0.5} onChange={(x) => (selection.value = [x, to])} />
+        <NumberField
+          label="Stretch from, degrees"
+          value={from}
+          minimum={0}
+          maximum={to}
+          step={0.5}
+          onChange={(x) => (selection.value = [x, to])}
+        />
       </label>
       <label>
         to
-        <NumberField label="Stretch to, degrees" value={to} minimum={from} maximum={90} step={0.5} onChange={(x) => (selection.value = [from, x])} />
+        <NumberField
+          label="Stretch to, degrees"
+          value={to}
+          minimum={from}
+          maximum={90}
+          step={0.5}
+          onChange={(x) => (selection.value = [from, x])}
+        />
       </label>
       <span class="spacer" />
       <button title="Shift by −1°" onClick={() => shift(-1)}>

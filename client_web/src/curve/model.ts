@@ -22,7 +22,10 @@ const SAMPLES = 181;
 
 function sampled(points: Point[]): Point[] {
   const curve = pchip(points);
-  const xs = new Set([...Array.from({ length: SAMPLES }, (_, i) => 90 * (i / (SAMPLES - 1)) ** 2), ...points.map((p) => p[0])]);
+  const xs = new Set([
+    ...Array.from({ length: SAMPLES }, (_, i) => 90 * (i / (SAMPLES - 1)) ** 2),
+    ...points.map((p) => p[0]),
+  ]);
   return [...xs].sort((a, b) => a - b).map((x) => [x, curve(x)]);
 }
 
@@ -58,7 +61,12 @@ export function pointsOf(model: CurveModel, channel: number, axes: Axes): Point[
 }
 
 /** Write new points for some channels; null gives a channel back to its generator. */
-export function put(model: CurveModel, label: string, next: (channel: number) => Point[] | null, channels: number[]): void {
+export function put(
+  model: CurveModel,
+  label: string,
+  next: (channel: number) => Point[] | null,
+  channels: number[],
+): void {
   const changed = model.channels.map((points, c) => (channels.includes(c) ? next(c) : points)) as unknown as Channels;
   edit(label, model.path, writeChannels(changed));
 }

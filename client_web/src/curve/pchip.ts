@@ -47,7 +47,10 @@ export function pchip(points: readonly Point[]): (degrees: number) => number {
     const t = (x - x0) / h;
     const [t2, t3] = [t * t, t * t * t];
     const y =
-      (2 * t3 - 3 * t2 + 1) * y0 + (t3 - 2 * t2 + t) * h * (m[low] as number) + (3 * t2 - 2 * t3) * y1 + (t3 - t2) * h * (m[high] as number);
+      (2 * t3 - 3 * t2 + 1) * y0 +
+      (t3 - 2 * t2 + t) * h * (m[low] as number) +
+      (3 * t2 - 2 * t3) * y1 +
+      (t3 - t2) * h * (m[high] as number);
     return Math.max(0, y);
   };
 }

@@ -46,7 +46,13 @@ function fenced(points: readonly Point[], from: number, to: number): Point[] {
 const inside = (x: number, from: number, to: number) => x >= from - MIN_GAP / 2 && x <= to + MIN_GAP / 2;
 
 /** Multiply the values of a stretch. The fences stand one band outside it, so the step is as steep as is resolved. */
-export function scaleStretch(points: readonly Point[], from: number, to: number, factor: number, band: number): Point[] {
+export function scaleStretch(
+  points: readonly Point[],
+  from: number,
+  to: number,
+  factor: number,
+  band: number,
+): Point[] {
   const outer = fenced(points, clampDegrees(from - band), clampDegrees(to + band));
   return fenced(outer, from, to).map(([x, y]) => (inside(x, from, to) ? tidyPoint(x, y * factor) : [x, y]));
 }

@@ -15,7 +15,7 @@ export function mainStretch(bands: number[][], share = 0.8): [from: number, to: 
   if (!(total > 0)) return null;
   let best: [number, number] = [0, weights.length];
   let sum = 0;
-  for (let a = 0, b = 0; b < weights.length; ) {
+  for (let a = 0, b = 0; b < weights.length;) {
     sum += weights[b++] as number;
     while (sum - (weights[a] as number) >= share * total) sum -= weights[a++] as number;
     if (sum >= share * total && b - a < best[1] - best[0]) best = [a, b];

@@ -40,7 +40,12 @@ export function drawGesture(hand: Hand, start: Spot): Gesture {
   const base = hand.channels.map((c) => pointsOf(hand.model, c, hand.axes));
   const move = (spot: Spot) => {
     stroke.add(spot.degrees, Math.max(0, spot.height));
-    put(hand.model, "Draw curve", (c) => mergeStroke(base[hand.channels.indexOf(c)] as Point[], stroke, hand.axes), hand.channels);
+    put(
+      hand.model,
+      "Draw curve",
+      (c) => mergeStroke(base[hand.channels.indexOf(c)] as Point[], stroke, hand.axes),
+      hand.channels,
+    );
   };
   stroke.add(start.degrees, Math.max(0, start.height));
   return { move, up: () => undefined };
@@ -66,7 +71,8 @@ export function pointsGesture(hand: Hand, start: Spot, hit: number): Gesture {
   }
   if (hit < 0) picked.value = index < 0 ? null : { index, carried: false };
   const from = base[index];
-  const [dx, dy] = from === undefined ? [0, 0] : [from[0] - start.degrees, yFraction(hand.axes, from[1]) - start.height];
+  const [dx, dy] =
+    from === undefined ? [0, 0] : [from[0] - start.degrees, yFraction(hand.axes, from[1]) - start.height];
   let moved = false;
   return {
     move(spot) {
@@ -91,7 +97,12 @@ export function applyScale(hand: Hand, [from, to]: [number, number], factor: num
   put(hand.model, "Scale stretch", (c) => scaleStretch(of(c), from, to, factor, band), hand.channels);
 }
 
-export function applyShift(hand: Hand, [from, to]: [number, number], degrees: number, base?: Point[][]): [number, number] {
+export function applyShift(
+  hand: Hand,
+  [from, to]: [number, number],
+  degrees: number,
+  base?: Point[][],
+): [number, number] {
   const shift = Math.min(90 - to, Math.max(-from, degrees));
   const of = (c: number) => base?.[hand.channels.indexOf(c)] ?? pointsOf(hand.model, c, hand.axes);
   put(hand.model, "Shift stretch", (c) => shiftStretch(of(c), from, to, shift), hand.channels);

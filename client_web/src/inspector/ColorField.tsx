@@ -37,7 +37,12 @@ export function ColorField({ label, value, initial, onChange }: Props) {
           />
         </label>
       ))}
-      <IconButton icon="reset" label={`Reset ${label}`} disabled={!changed} onClick={() => initial && onChange(initial)} />
+      <IconButton
+        icon="reset"
+        label={`Reset ${label}`}
+        disabled={!changed}
+        onClick={() => initial && onChange(initial)}
+      />
     </div>
   );
 }

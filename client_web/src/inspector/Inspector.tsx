@@ -40,7 +40,9 @@ export function Inspector() {
   if (material === null || terms.value.length === 0) {
     return (
       <aside class="panel inspector" aria-label="Inspector">
-        <p class="hint">Click something in the picture, or choose a material on the left, to change how it reflects light.</p>
+        <p class="hint">
+          Click something in the picture, or choose a material on the left, to change how it reflects light.
+        </p>
       </aside>
     );
   }
@@ -67,7 +69,11 @@ export function Inspector() {
               ? () => {
                   selectedCurve.value = null;
                   selectedTerm.value = 0;
-                  replaceTerms("Remove term", material, terms.value.filter((_, i) => i !== index));
+                  replaceTerms(
+                    "Remove term",
+                    material,
+                    terms.value.filter((_, i) => i !== index),
+                  );
                 }
               : null
           }

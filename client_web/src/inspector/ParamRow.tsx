@@ -27,7 +27,9 @@ export function ParamRow({ info, value, initial, onChange }: Props) {
   const link = (
     <IconButton
       icon={parted ? "unlink" : "link"}
-      label={parted ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`}
+      label={
+        parted ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`
+      }
       pressed={parted}
       onClick={toggle}
     />

@@ -41,7 +41,9 @@ function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: n
             }}
           >
             {curve.name === open ? curve.label : symbol(curve.label)}
-            {term.curves?.[curve.name] !== undefined && <span class="dot" title="Drawn by hand" aria-label="drawn by hand" />}
+            {term.curves?.[curve.name] !== undefined && (
+              <span class="dot" title="Drawn by hand" aria-label="drawn by hand" />
+            )}
           </button>
         ))}
       </div>
@@ -64,7 +66,12 @@ export function TermCard({ material, term, index, onRemove }: Props) {
   return (
     <section class={`card ${open ? "" : "folded"}`} aria-label={`Term ${index + 1}: ${model?.label ?? term.model}`}>
       <header>
-        <button class="icon fold" aria-expanded={open} aria-label={open ? "Open term" : "Unfold this term"} onClick={() => selectTerm(index)}>
+        <button
+          class="icon fold"
+          aria-expanded={open}
+          aria-label={open ? "Open term" : "Unfold this term"}
+          onClick={() => selectTerm(index)}
+        >
           {open ? "▾" : "▸"}
         </button>
         {!open && <span class="patch" style={{ background: toHex(term.color) }} />}

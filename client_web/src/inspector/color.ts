@@ -9,7 +9,13 @@ export function strength(color: Rgb): number {
 
 export function toHex(color: Rgb): string {
   const scale = strength(color);
-  return `#${color.map((v) => Math.round(255 * srgbEncode(v / scale)).toString(16).padStart(2, "0")).join("")}`;
+  return `#${color
+    .map((v) =>
+      Math.round(255 * srgbEncode(v / scale))
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("")}`;
 }
 
 /** The picked colour at the old one's strength; six digits keep the document readable. */

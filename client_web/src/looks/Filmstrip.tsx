@@ -54,15 +54,30 @@ function SavedTile({ saved }: { saved: SavedLook }) {
   const shown = JSON.stringify(whole) === JSON.stringify(look.value);
   return (
     <li class={`tile ${shown ? "shown" : ""}`}>
-      <button class="tile-picture" aria-label={`Show ${saved.name}`} aria-pressed={shown} onClick={() => commit(`Show ${saved.name}`, whole)}>
+      <button
+        class="tile-picture"
+        aria-label={`Show ${saved.name}`}
+        aria-pressed={shown}
+        onClick={() => commit(`Show ${saved.name}`, whole)}
+      >
         <Picture image={thumbnailOf(saved.name)} text={saved.name} />
         {sideA.value?.label === saved.name && <span class="mark">A</span>}
       </button>
       <span class="tile-actions">
-        <button class="icon" title={`Compare with ${saved.name}: keep it as A`} aria-label={`Keep ${saved.name} as A`} onClick={() => void markLook(whole, saved.name)}>
+        <button
+          class="icon"
+          title={`Compare with ${saved.name}: keep it as A`}
+          aria-label={`Keep ${saved.name} as A`}
+          onClick={() => void markLook(whole, saved.name)}
+        >
           A
         </button>
-        <IconButton icon="save" label={`Save the live look over ${saved.name}`} disabled={shown} onClick={() => look.value && void updateLook(saved, look.value)} />
+        <IconButton
+          icon="save"
+          label={`Save the live look over ${saved.name}`}
+          disabled={shown}
+          onClick={() => look.value && void updateLook(saved, look.value)}
+        />
         <IconButton icon="trash" label={`Delete ${saved.name}`} onClick={() => void deleteLook(saved)} />
       </span>
       <Name saved={saved} />
@@ -75,7 +90,12 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
   const undone = count > history.cursor.value;
   return (
     <li class={`tile step ${current ? "shown" : ""} ${undone ? "undone" : ""}`}>
-      <button class="tile-picture" aria-label={`Go to step ${count}: ${label}`} aria-current={current ? "step" : undefined} onClick={() => goTo(count)}>
+      <button
+        class="tile-picture"
+        aria-label={`Go to step ${count}: ${label}`}
+        aria-current={current ? "step" : undefined}
+        onClick={() => goTo(count)}
+      >
         <Picture image={historyThumbnail(of)} text={label} />
       </button>
       <span class="tile-name" title={label}>
@@ -88,7 +108,10 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
 function Steps() {
   const strip = useRef<HTMLUListElement>(null);
   const steps = history.steps.value;
-  useEffect(() => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" }), [history.cursor.value, steps.length]);
+  useEffect(
+    () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" }),
+    [history.cursor.value, steps.length],
+  );
   const first = Math.max(0, steps.length - MAX_STEPS);
   // steps that are not of the look (a look was deleted) show the picture before them
   let last: Look | undefined = steps[0]?.before ?? look.value ?? undefined;
@@ -111,7 +134,12 @@ export function Filmstrip() {
   return (
     <section class="filmstrip" aria-label="Looks">
       <h2>Looks</h2>
-      <button class="save" onClick={() => void saveLook()} disabled={look.value === null} title="Save the live look (Ctrl+S)">
+      <button
+        class="save"
+        onClick={() => void saveLook()}
+        disabled={look.value === null}
+        title="Save the live look (Ctrl+S)"
+      >
         <span class="plus">＋</span>
         Save look
       </button>

@@ -47,7 +47,9 @@ export async function exportExr(): Promise<void> {
   if (id === null || current === null) return;
   await attempt(async () => {
     note("Rendering the EXR on the server…");
-    const render = await finished(await startRender({ bake: id, view: viewName.value, looks: [{ ...current }], format: "exr" }));
+    const render = await finished(
+      await startRender({ bake: id, view: viewName.value, looks: [{ ...current }], format: "exr" }),
+    );
     download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, fileName("exr"));
   });
 }

@@ -52,6 +52,9 @@ export function thumbnail(pixels: Pixels, display: Display): string {
 export function pngBlob(pixels: Pixels, display: Display): Promise<Blob> {
   const canvas = canvasOf(displayed(pixels, display));
   return new Promise((resolve, reject) => {
-    canvas.toBlob((blob) => (blob === null ? reject(new Error("The picture could not be written as PNG.")) : resolve(blob)), "image/png");
+    canvas.toBlob(
+      (blob) => (blob === null ? reject(new Error("The picture could not be written as PNG.")) : resolve(blob)),
+      "image/png",
+    );
   });
 }

@@ -36,28 +36,38 @@ function fits(look: Partial<Look>): boolean {
 
 async function read(entry: LookEntry): Promise<SavedLook> {
   const response = await request(path(entry.name));
-  return { name: entry.name, etag: response.headers.get("etag") ?? entry.etag, look: (await response.json()) as Partial<Look> };
+  return {
+    name: entry.name,
+    etag: response.headers.get("etag") ?? entry.etag,
+    look: (await response.json()) as Partial<Look>,
+  };
 }
 
 export async function refreshShelf(): Promise<void> {
   await attempt(async () => {
     const entries = (await (await request("/api/looks")).json()) as LookEntry[];
     const looks = await Promise.allSettled(entries.slice(0, MAX_READ).map(read));
-    shelf.value = looks.flatMap((result) => (result.status === "fulfilled" && fits(result.value.look) ? [result.value] : []));
+    shelf.value = looks.flatMap((result) =>
+      result.status === "fulfilled" && fits(result.value.look) ? [result.value] : [],
+    );
   });
 }
 
 function conflict(error: unknown, name: string): never {
   if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
     void refreshShelf();
-    throw new Error(`“${name}” was changed elsewhere meanwhile. Nothing was overwritten; look at the new version first.`);
+    throw new Error(
+      `“${name}” was changed elsewhere meanwhile. Nothing was overwritten; look at the new version first.`,
+    );
   }
   throw error;
 }
 
 async function write(name: string, look: Partial<Look>, etag: string | null): Promise<void> {
   const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
-  const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) => conflict(error, name));
+  const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) =>
+    conflict(error, name),
+  );
   const saved = { name, etag: response.headers.get("etag") ?? "", look };
   const known = shelf.value.some((entry) => entry.name === name);
   shelf.value = known ? shelf.value.map((entry) => (entry.name === name ? saved : entry)) : [...shelf.value, saved];
@@ -65,7 +75,9 @@ async function write(name: string, look: Partial<Look>, etag: string | null): Pr
 
 async function erase(name: string): Promise<void> {
   const etag = shelf.value.find((entry) => entry.name === name)?.etag ?? "*";
-  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) => conflict(error, name));
+  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) =>
+    conflict(error, name),
+  );
   shelf.value = shelf.value.filter((entry) => entry.name !== name);
 }
 
@@ -78,16 +90,28 @@ async function perform(label: string, redo: () => Promise<void>, undo: () => Pro
 }
 
 export function addLook(name: string, look: Look): Promise<void> {
-  return perform(`Save ${name}`, () => write(name, look, null), () => erase(name));
+  return perform(
+    `Save ${name}`,
+    () => write(name, look, null),
+    () => erase(name),
+  );
 }
 
 export function deleteLook({ name, look }: SavedLook): Promise<void> {
-  return perform(`Delete ${name}`, () => erase(name), () => write(name, look, null));
+  return perform(
+    `Delete ${name}`,
+    () => erase(name),
+    () => write(name, look, null),
+  );
 }
 
 export function updateLook({ name, look: before }: SavedLook, look: Look): Promise<void> {
   const etag = () => shelf.value.find((entry) => entry.name === name)?.etag ?? null;
-  return perform(`Update ${name}`, () => write(name, look, etag()), () => write(name, before, etag()));
+  return perform(
+    `Update ${name}`,
+    () => write(name, look, etag()),
+    () => write(name, before, etag()),
+  );
 }
 
 export function renameLook({ name, look }: SavedLook, to: string): Promise<void> {
@@ -97,5 +121,9 @@ export function renameLook({ name, look }: SavedLook, to: string): Promise<void>
     if (image !== null) keepThumbnail(b, image);
     await erase(a);
   };
-  return perform(`Rename ${name}`, () => move(name, to), () => move(to, name));
+  return perform(
+    `Rename ${name}`,
+    () => move(name, to),
+    () => move(to, name),
+  );
 }

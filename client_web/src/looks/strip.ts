@@ -22,7 +22,8 @@ export function historyThumbnail(of: Look | undefined): string | null {
 function giveToSaved(of: Look, image: string): void {
   const text = JSON.stringify(of);
   for (const saved of shelf.peek()) {
-    if (thumbnailOf(saved.name) === null && JSON.stringify(completed(saved.look)) === text) keepThumbnail(saved.name, image);
+    if (thumbnailOf(saved.name) === null && JSON.stringify(completed(saved.look)) === text)
+      keepThumbnail(saved.name, image);
   }
 }
 

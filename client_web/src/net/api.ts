@@ -1,5 +1,14 @@
 /** REST calls; failures become ApiError with the server's own words (RFC 9457). */
-import type { BakeBody, BakeRequest, DryRunBody, ModelInfo, Problem, RenderBody, RenderRequest, SceneBody } from "../protocol";
+import type {
+  BakeBody,
+  BakeRequest,
+  DryRunBody,
+  ModelInfo,
+  Problem,
+  RenderBody,
+  RenderRequest,
+  SceneBody,
+} from "../protocol";
 
 export class ApiError extends Error {
   constructor(
@@ -11,7 +20,10 @@ export class ApiError extends Error {
 }
 
 /** What a problem document says, in one sentence. */
-export function problemText(problem: Problem | string | null | undefined, fallback = "The server could not do that."): string {
+export function problemText(
+  problem: Problem | string | null | undefined,
+  fallback = "The server could not do that.",
+): string {
   if (problem == null) return fallback;
   if (typeof problem === "string") return problem;
   return problem.detail ?? problem.title ?? fallback;

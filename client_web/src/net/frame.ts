@@ -21,7 +21,12 @@ function checkTiles(tiles: unknown, width: number, height: number): asserts tile
   for (const tile of tiles) {
     const [x, y, w, h] = Array.isArray(tile) && tile.length === 4 ? (tile as unknown[]) : [];
     const inside =
-      isCount(x, width) && isCount(y, height) && isCount(w, width) && isCount(h, height) && x + w <= width && y + h <= height;
+      isCount(x, width) &&
+      isCount(y, height) &&
+      isCount(w, width) &&
+      isCount(h, height) &&
+      x + w <= width &&
+      y + h <= height;
     if (!inside) throw new FrameError("a frame came with a tile outside the picture");
   }
 }

@@ -13,7 +13,12 @@ function Swatch({ material }: { material: MaterialLook | undefined }) {
   const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
   const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);
   const light = glossy === undefined ? body : toHex(glossy.color);
-  return <span class="swatch" style={{ background: `radial-gradient(circle at 35% 30%, ${light} 4%, ${body} 48%, #111 130%)` }} />;
+  return (
+    <span
+      class="swatch"
+      style={{ background: `radial-gradient(circle at 35% 30%, ${light} 4%, ${body} 48%, #111 130%)` }}
+    />
+  );
 }
 
 function Materials() {
@@ -23,14 +28,23 @@ function Materials() {
     event.preventDefault();
     event.stopPropagation();
     const items = [...(event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=option]")];
-    items[Math.min(items.length - 1, Math.max(0, items.indexOf(document.activeElement as HTMLElement) + step))]?.focus();
+    items[
+      Math.min(items.length - 1, Math.max(0, items.indexOf(document.activeElement as HTMLElement) + step))
+    ]?.focus();
   };
   const focusable = selectedMaterial.value ?? materialNames.value[0];
   return (
-    <div class="materials" role="listbox" aria-label="Materials" onKeyDown={move} onPointerLeave={() => (hoveredMaterial.value = null)}>
+    <div
+      class="materials"
+      role="listbox"
+      aria-label="Materials"
+      onKeyDown={move}
+      onPointerLeave={() => (hoveredMaterial.value = null)}
+    >
       {materialNames.value.map((name) => {
         const material = look.value?.materials[name];
-        const changed = look.value !== null && JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
+        const changed =
+          look.value !== null && JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
         return (
           <button
             key={name}

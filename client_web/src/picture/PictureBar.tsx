@@ -39,7 +39,11 @@ export function PictureBar() {
     <div class="picture-bar">
       <Probe />
       <span class="spacer" />
-      <button aria-pressed={falseColour.value} title="Luminance in stops, as colours (E)" onClick={() => (falseColour.value = !falseColour.value)}>
+      <button
+        aria-pressed={falseColour.value}
+        title="Luminance in stops, as colours (E)"
+        onClick={() => (falseColour.value = !falseColour.value)}
+      >
         False colour
       </button>
       <button class="icon" aria-label="Zoom out" title="Zoom out (−)" onClick={() => zoomBy(1 / 1.25)}>

@@ -14,7 +14,10 @@ import { WipeHandle } from "./WipeHandle";
 const CLICK_PX = 4;
 const PAN_PX = 48;
 
-function pixelAt(canvas: HTMLCanvasElement, event: PointerEvent | WheelEvent): { x: number; y: number; px: number; py: number } {
+function pixelAt(
+  canvas: HTMLCanvasElement,
+  event: PointerEvent | WheelEvent,
+): { x: number; y: number; px: number; py: number } {
   const box = canvas.getBoundingClientRect();
   const [x, y] = [event.clientX - box.left, event.clientY - box.top];
   const [u, v] = toPicture(transform.peek(), stage.canvasSize(), x, y);
@@ -89,7 +92,12 @@ function usePointer() {
 function onKey(event: KeyboardEvent): void {
   const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
   if (step === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
-  transform.value = pan(transform.peek(), stage.canvasSize(), (step[0] as number) * PAN_PX, (step[1] as number) * PAN_PX);
+  transform.value = pan(
+    transform.peek(),
+    stage.canvasSize(),
+    (step[0] as number) * PAN_PX,
+    (step[1] as number) * PAN_PX,
+  );
   event.preventDefault();
 }
 

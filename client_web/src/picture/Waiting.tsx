@@ -10,7 +10,12 @@ function words(): { text: string; progress: number | null } {
     const text = next.state === "queued" ? "The preview waits for its turn" : `Baking a preview${left}`;
     return { text, progress: next.progress };
   }
-  const text = { reconnecting: "Waiting for the server", closed: "There is no picture to show", connecting: "Opening the scene", open: "Waiting for the first picture" };
+  const text = {
+    reconnecting: "Waiting for the server",
+    closed: "There is no picture to show",
+    connecting: "Opening the scene",
+    open: "Waiting for the first picture",
+  };
   return { text: text[connection.value], progress: null };
 }
 

@@ -30,7 +30,10 @@ export class Renderer {
 
   constructor(readonly canvas: HTMLCanvasElement) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, desynchronized: true });
-    if (gl === null) throw new Error("This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.");
+    if (gl === null)
+      throw new Error(
+        "This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.",
+      );
     this.gl = gl;
     this.restore();
   }

@@ -25,7 +25,13 @@ void main() {
 /** Source of a variant. */
 export function fragment(features: Features): string {
   const defines = [
-    features.falseColour ? "FALSE_COLOUR" : features.toneMap === "agx" ? "AGX" : features.toneMap === "filmic" ? "FILMIC" : "PLAIN",
+    features.falseColour
+      ? "FALSE_COLOUR"
+      : features.toneMap === "agx"
+        ? "AGX"
+        : features.toneMap === "filmic"
+          ? "FILMIC"
+          : "PLAIN",
     features.shrunk && "SHRUNK",
     features.displayReferred && "DISPLAY_REFERRED",
     features.compare && "COMPARE",

@@ -18,12 +18,20 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
     panel.current?.scrollIntoView({ block: "nearest" });
   }, [scene.id]);
   return (
-    <section class="bake-dialog" ref={panel} tabIndex={-1} aria-label={`Bake ${scene.name}`} onKeyDown={(event) => event.key === "Escape" && onClose()}>
+    <section
+      class="bake-dialog"
+      ref={panel}
+      tabIndex={-1}
+      aria-label={`Bake ${scene.name}`}
+      onKeyDown={(event) => event.key === "Escape" && onClose()}
+    >
       <header class="panel-head">
         <h2>Bake “{scene.name}”</h2>
         <IconButton icon="close" label="Close" onClick={onClose} />
       </header>
-      <p>A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.</p>
+      <p>
+        A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.
+      </p>
       {scene.warnings.length > 0 && (
         <ul class="warnings">
           {scene.warnings.map((warning) => (

@@ -36,7 +36,8 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
   const [sent, setSent] = useState<number | null>(null);
   const take = (files: File[]) => {
     const next = sortFiles(files, chosen);
-    if (next.refused.length > 0) showError(`${next.refused.join(", ")}: give a scene as .glb and an environment as .hdr or .exr.`);
+    if (next.refused.length > 0)
+      showError(`${next.refused.join(", ")}: give a scene as .glb and an environment as .hdr or .exr.`);
     setChosen(next);
   };
   const over = useDrop(take);
@@ -55,7 +56,12 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
         <b>Drop a .glb and an .hdr anywhere</b>, or{" "}
         <label class="file">
           choose files
-          <input type="file" multiple accept=".glb,.hdr,.exr" onChange={(event) => take([...(event.currentTarget.files ?? [])])} />
+          <input
+            type="file"
+            multiple
+            accept=".glb,.hdr,.exr"
+            onChange={(event) => take([...(event.currentTarget.files ?? [])])}
+          />
         </label>
         . Without an environment the scene gets a plain sky.
       </p>
@@ -68,7 +74,11 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
             <span>{sent < 1 ? `Sending, ${Math.round(100 * sent)} %` : "The server reads the scene…"}</span>
           </>
         ) : (
-          <button class="primary" disabled={chosen.scene === null} onClick={() => chosen.scene && void send(chosen.scene)}>
+          <button
+            class="primary"
+            disabled={chosen.scene === null}
+            onClick={() => chosen.scene && void send(chosen.scene)}
+          >
             Import
           </button>
         )}

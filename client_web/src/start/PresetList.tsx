@@ -61,7 +61,11 @@ export function PresetList({ scene, action, onChoose }: Props) {
             <b>{label}</b> {help}
           </span>
           <Plan plan={plans[name]} />
-          <button class={name === "good" ? "primary" : ""} disabled={plans[name] instanceof Error} onClick={() => onChoose(name)}>
+          <button
+            class={name === "good" ? "primary" : ""}
+            disabled={plans[name] instanceof Error}
+            onClick={() => onChoose(name)}
+          >
             {action}
           </button>
         </li>

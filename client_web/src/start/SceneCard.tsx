@@ -17,12 +17,17 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
-        {scene.thumbnail === null ? <CardProgress scene={scene} onReady={onReady} /> : <img src={scene.thumbnail} alt="" loading="lazy" />}
+        {scene.thumbnail === null ? (
+          <CardProgress scene={scene} onReady={onReady} />
+        ) : (
+          <img src={scene.thumbnail} alt="" loading="lazy" />
+        )}
       </button>
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>
         <small>
-          {formatCount(scene.triangles)} triangles · {scene.materials.length} materials · {scene.views.length} {scene.views.length === 1 ? "view" : "views"}
+          {formatCount(scene.triangles)} triangles · {scene.materials.length} materials · {scene.views.length}{" "}
+          {scene.views.length === 1 ? "view" : "views"}
         </small>
         {scene.warnings.length > 0 && (
           <details>

@@ -34,13 +34,22 @@ export function StartPage() {
         <p>Edit materials in the finished picture, with its real shadows, while you drag a curve.</p>
       </header>
       <DropZone onImported={imported} />
-      {planned !== null && <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(preset) => open(planned, preset)} />}
+      {planned !== null && (
+        <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(preset) => open(planned, preset)} />
+      )}
       <h2>Scenes</h2>
       {scenes === null && <p class="quiet">Looking for scenes…</p>}
       {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop a .glb above, or run the demo.</p>}
       <ul class="cards">
         {scenes?.map((scene) => (
-          <SceneCard key={scene.id} scene={scene} onOpen={() => open(scene)} onBake={() => setPlanned(scene)} onDelete={() => remove(scene)} onReady={() => void refresh()} />
+          <SceneCard
+            key={scene.id}
+            scene={scene}
+            onOpen={() => open(scene)}
+            onBake={() => setPlanned(scene)}
+            onDelete={() => remove(scene)}
+            onReady={() => void refresh()}
+          />
         ))}
       </ul>
     </main>

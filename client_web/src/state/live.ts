@@ -43,7 +43,10 @@ export function disconnect(): void {
 /** Open a session; where there is one already, it goes on until the new one has a picture. */
 export function connect(bake: string): void {
   incoming?.close();
-  const opened: Session = new Session(bake, handlersOf(() => opened));
+  const opened: Session = new Session(
+    bake,
+    handlersOf(() => opened),
+  );
   if (session === null) session = opened;
   else incoming = opened;
   opened.connect();
@@ -149,7 +152,8 @@ function handlersOf(self: () => Session): SessionHandlers {
       if (self() === incoming) incoming = null;
       showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
     },
-    broken: (text) => showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),
+    broken: (text) =>
+      showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),
   };
 }
 

@@ -60,7 +60,8 @@ export function follow(bake: BakeBody): void {
   stopFollowing = followBake(bake.id, (news) => {
     store.coming.value = news;
     if (news.state === "ready") swapTo(news.id);
-    if (news.state === "failed") showError(`The bake failed: ${api.problemText(news.problem)} The picture stays as it is.`);
+    if (news.state === "failed")
+      showError(`The bake failed: ${api.problemText(news.problem)} The picture stays as it is.`);
   });
 }
 
@@ -99,7 +100,11 @@ export async function startFullBake(scene: SceneBody, preset: Preset): Promise<v
   else follow(full);
 }
 
-export async function openScene(id: string, place: Place = placeFromUrl(`?scene=${id}`), preset?: Preset): Promise<void> {
+export async function openScene(
+  id: string,
+  place: Place = placeFromUrl(`?scene=${id}`),
+  preset?: Preset,
+): Promise<void> {
   await attempt(async () => {
     const [scene, models] = await Promise.all([api.getScene(id), api.listModels()]);
     store.models.value = models;

@@ -14,7 +14,10 @@ export function selectTerm(index: number): void {
 export function select(material: string | null): void {
   if (material === selectedMaterial.value) return;
   const own = (material === null ? undefined : look.value?.materials[material]?.terms) ?? [];
-  const index = Math.max(0, own.findIndex((term) => modelOf(term)?.texture !== "diffuse"));
+  const index = Math.max(
+    0,
+    own.findIndex((term) => modelOf(term)?.texture !== "diffuse"),
+  );
   const term = own[index];
   batch(() => {
     selectedMaterial.value = material;

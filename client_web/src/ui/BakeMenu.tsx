@@ -11,7 +11,12 @@ export function BakeMenu() {
   const size = view.value;
   return (
     <div class="menu" onKeyDown={(event) => event.key === "Escape" && setOpen(false)}>
-      <button aria-expanded={open} disabled={current === null} title="Bake again, finer or coarser" onClick={() => setOpen(!open)}>
+      <button
+        aria-expanded={open}
+        disabled={current === null}
+        title="Bake again, finer or coarser"
+        onClick={() => setOpen(!open)}
+      >
         {size === null ? "Bake" : `${size.width}×${size.height}`} ▾
       </button>
       {open && current !== null && (

@@ -99,7 +99,12 @@ export function Slider(props: Props) {
           onDone={() => setTyping(false)}
         />
       ) : (
-        <button class="value" title="Type a number" aria-label={`${label}: ${shown}; type a number`} onClick={() => setTyping(true)}>
+        <button
+          class="value"
+          title="Type a number"
+          aria-label={`${label}: ${shown}; type a number`}
+          onClick={() => setTyping(true)}
+        >
           {shown}
         </button>
       )}

@@ -11,7 +11,8 @@ function resize(width: number): void {
 
 export function Splitter() {
   const move = (event: PointerEvent) => {
-    if ((event.currentTarget as HTMLElement).hasPointerCapture(event.pointerId)) resize(window.innerWidth - event.clientX);
+    if ((event.currentTarget as HTMLElement).hasPointerCapture(event.pointerId))
+      resize(window.innerWidth - event.clientX);
   };
   const key = (event: KeyboardEvent) => {
     const step = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];

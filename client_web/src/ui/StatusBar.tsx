@@ -14,7 +14,9 @@ function connectionWords(): string {
     case "connecting":
       return "Connecting…";
     case "reconnecting":
-      return retryInMs.value > 0 ? `Connection lost. Edits are kept; trying again in ${formatSeconds(retryInMs.value / 1000)}` : "Reconnecting…";
+      return retryInMs.value > 0
+        ? `Connection lost. Edits are kept; trying again in ${formatSeconds(retryInMs.value / 1000)}`
+        : "Reconnecting…";
     case "closed":
       return "Not connected";
   }
@@ -39,7 +41,11 @@ function bakeWords(): string {
 export function StatusBar() {
   const memory = useMemory();
   // announced: only what changes seldom, without the numbers that run
-  const announced = useComputed(() => [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords()].filter(Boolean).join(". "));
+  const announced = useComputed(() =>
+    [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords()]
+      .filter(Boolean)
+      .join(". "),
+  );
   const running = coming.value !== null && (coming.value.state === "running" || coming.value.state === "queued");
   return (
     <footer class="status">
@@ -60,12 +66,16 @@ export function StatusBar() {
           {running && (
             <>
               <progress max={1} value={coming.value.progress} aria-label="Bake" />
-              <button onClick={() => coming.value && void attempt(() => cancelBake(coming.value?.id ?? ""))}>Cancel</button>
+              <button onClick={() => coming.value && void attempt(() => cancelBake(coming.value?.id ?? ""))}>
+                Cancel
+              </button>
             </>
           )}
         </span>
       )}
-      {memory !== null && memory > 0 && <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>}
+      {memory !== null && memory > 0 && (
+        <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>
+      )}
       <span class="announce" role="status" aria-live="polite">
         {announced.value}
       </span>

@@ -5,7 +5,19 @@ import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
 import { chooseView } from "../state/live";
 import { leave } from "../state/open";
-import { filmstripOpen, helpOpen, history, inspectorOpen, look, outlineOpen, scene, showBefore, viewName, views, wipe } from "../state/store";
+import {
+  filmstripOpen,
+  helpOpen,
+  history,
+  inspectorOpen,
+  look,
+  outlineOpen,
+  scene,
+  showBefore,
+  viewName,
+  views,
+  wipe,
+} from "../state/store";
 import { redo, undo } from "../state/undo";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
@@ -32,7 +44,14 @@ function Compare() {
       <button class="letter" title={`Keep this picture as A (A). A is: ${label}`} onClick={markA}>
         A
       </button>
-      <IconButton icon="wipe" label="Wipe between A and the live picture" keys="W" pressed={wipe.value.on} disabled={none} onClick={toggleWipe} />
+      <IconButton
+        icon="wipe"
+        label="Wipe between A and the live picture"
+        keys="W"
+        pressed={wipe.value.on}
+        disabled={none}
+        onClick={toggleWipe}
+      />
       <button
         title="Show A while held (B)"
         aria-pressed={showBefore.value}
@@ -68,7 +87,12 @@ function Display() {
         unit="EV"
         onChange={(value) => edit("Exposure", "/display/exposure", value)}
       />
-      <select aria-label="Tone map" title="Tone map" value={display.tone_map} onChange={(event) => edit("Tone map", "/display/tone_map", event.currentTarget.value)}>
+      <select
+        aria-label="Tone map"
+        title="Tone map"
+        value={display.tone_map}
+        onChange={(event) => edit("Tone map", "/display/tone_map", event.currentTarget.value)}
+      >
         {TONE_MAPS.map(({ name, label }) => (
           <option key={name} value={name}>
             {label}
@@ -82,9 +106,24 @@ function Display() {
 function Panels() {
   return (
     <div class="group" role="group" aria-label="Panels">
-      <IconButton icon="left" label="Scene panel" pressed={outlineOpen.value} onClick={() => (outlineOpen.value = !outlineOpen.value)} />
-      <IconButton icon="bottom" label="Looks" pressed={filmstripOpen.value} onClick={() => (filmstripOpen.value = !filmstripOpen.value)} />
-      <IconButton icon="right" label="Inspector" pressed={inspectorOpen.value} onClick={() => (inspectorOpen.value = !inspectorOpen.value)} />
+      <IconButton
+        icon="left"
+        label="Scene panel"
+        pressed={outlineOpen.value}
+        onClick={() => (outlineOpen.value = !outlineOpen.value)}
+      />
+      <IconButton
+        icon="bottom"
+        label="Looks"
+        pressed={filmstripOpen.value}
+        onClick={() => (filmstripOpen.value = !filmstripOpen.value)}
+      />
+      <IconButton
+        icon="right"
+        label="Inspector"
+        pressed={inspectorOpen.value}
+        onClick={() => (inspectorOpen.value = !inspectorOpen.value)}
+      />
     </div>
   );
 }
@@ -113,7 +152,13 @@ export function TopBar() {
       </div>
       <IconButton icon="share" label="Copy the address" onClick={() => void share()} />
       <Panels />
-      <IconButton icon="help" label="Keyboard map" keys="?" pressed={helpOpen.value} onClick={() => (helpOpen.value = !helpOpen.value)} />
+      <IconButton
+        icon="help"
+        label="Keyboard map"
+        keys="?"
+        pressed={helpOpen.value}
+        onClick={() => (helpOpen.value = !helpOpen.value)}
+      />
     </header>
   );
 }

@@ -5,7 +5,16 @@ import { logarithmic, tool } from "../curve/settings";
 import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
 import { edit } from "../state/edit";
 import { redo, undo } from "../state/undo";
-import { falseColour, filmstripOpen, helpOpen, inspectorOpen, look, outlineOpen, showBefore, wipe } from "../state/store";
+import {
+  falseColour,
+  filmstripOpen,
+  helpOpen,
+  inspectorOpen,
+  look,
+  outlineOpen,
+  showBefore,
+  wipe,
+} from "../state/store";
 
 export interface Action {
   group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";

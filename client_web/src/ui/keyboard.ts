@@ -5,7 +5,9 @@ import { ACTIONS, onWipeKey, type Action } from "./actions";
 import { chord } from "./chord";
 
 function typing(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.matches("input:not([type=color]), textarea, select, [contenteditable]");
+  return (
+    target instanceof HTMLElement && target.matches("input:not([type=color]), textarea, select, [contenteditable]")
+  );
 }
 
 function actionOf(event: KeyboardEvent): Action | undefined {
