@@ -6,7 +6,7 @@ T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Be
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,25 +80,32 @@ def freeze(
     squares = np.zeros((3, num_bands))
     lock, done = threading.Lock(), [0]
 
-    def tile_range(first: int, last: int) -> None:
+    def step(first: int, last: int) -> None:
+        """Project, transform and lay out padded samples [first, last)."""
+        if cancelled():
+            raise CancelledError("freezing was cancelled")
         projector = Projector(term, contraction, lights, receivers)
-        for tile in range(first, last):
-            block = transport[tile]
-            for start in range(0, samples, _SAMPLES_A_STEP):
-                if cancelled():
-                    raise CancelledError("freezing was cancelled")
-                begin = min(tile * samples + start, num_samples)
-                end = min(tile * samples + min(start + _SAMPLES_A_STEP, samples), num_samples)
-                rows = np.ascontiguousarray(projector.project(begin, end).transpose(2, 0, 1)).reshape(-1, num_bands)
-                forward(rows)
-                block[:, :, start : start + end - begin] = rows.reshape(3, -1, num_bands).transpose(0, 2, 1)
-                block[:, :, start + end - begin : start + _SAMPLES_A_STEP] = 0
-                with lock:
-                    done[0] += _SAMPLES_A_STEP
-                    progress(min(1.0, done[0] / max(1, tiles * samples)))
-            length = np.einsum("cjs,cjs->cj", block, block, dtype=np.float64)
+        for begin, end in _within_tiles(first, last, samples):
+            filled = max(begin, min(end, num_samples))
+            rows = np.zeros((3, end - begin, num_bands), np.float32)
+            if filled > begin:
+                rows[:, : filled - begin] = projector.project(begin, filled).transpose(2, 0, 1)
+            forward(rows.reshape(-1, num_bands))
+            tile, offset = divmod(begin, samples)
+            transport[tile, :, :, offset : offset + end - begin] = rows.transpose(0, 2, 1)
             with lock:
-                np.add(squares, length, out=squares)
+                np.add(squares, np.einsum("csj,csj->cj", rows, rows, dtype=np.float64), out=squares)
+        with lock:
+            done[0] += last - first
+            progress(done[0] / (tiles * samples))
 
-    for_ranges(tile_range, tiles, 1)
+    for_ranges(step, tiles * samples, _SAMPLES_A_STEP)
     return Frozen(transport, np.sqrt(squares))
+
+
+def _within_tiles(first: int, last: int, samples: int) -> Iterator[tuple[int, int]]:
+    """[first, last) cut where a tile of so many samples ends."""
+    while first < last:
+        end = min(last, (first // samples + 1) * samples)
+        yield first, end
+        first = end
