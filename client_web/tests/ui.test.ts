@@ -7,7 +7,7 @@ import { sortFiles } from "../src/start/files";
 import { gauge } from "../src/state/metrics";
 import { placeFromUrl, placeToUrl } from "../src/state/url";
 import { chord } from "../src/ui/chord";
-import { formatBytes, formatNumber, formatSeconds, fromFraction, parseNumber, toFraction } from "../src/ui/scale";
+import { formatBytes, formatNumber, formatSeconds, fromFraction, parseNumber, tickLabel, toFraction } from "../src/ui/scale";
 
 describe("slider scales", () => {
   const log = { minimum: 0.01, maximum: 1, scale: "log" } as const;
@@ -45,6 +45,10 @@ describe("numbers", () => {
     ]);
     expect(formatBytes(104_448_000)).toBe("104 MB");
     expect([0.2, 14, 200, 9000].map(formatSeconds)).toEqual(["under a second", "14 s", "3 min", "2.5 h"]);
+  });
+
+  test("are short on an axis and keep their noughts", () => {
+    expect([0.0001, 0.375, 12.5, 20, 1000, 200000].map(tickLabel)).toEqual(["0.0001", "0.375", "12.5", "20", "1000", "2e5"]);
   });
 
   test("are read with point or comma, and only when they are numbers", () => {

@@ -1,7 +1,7 @@
 /** The plot itself, without hands: grid, contributions of a pixel, ghost, curves. */
 import type { ComponentChildren } from "preact";
 import type { Point } from "../protocol";
-import { formatNumber } from "../ui/scale";
+import { tickLabel } from "../ui/scale";
 import { MAX_DEGREES, xFraction, xTicks, yFraction, yTicks, type Axes } from "./axes";
 
 export interface Frame {
@@ -37,7 +37,7 @@ function Grid({ frame }: { frame: Frame }) {
         <g key={value}>
           <line x1={MARGIN.left} x2={right} y1={plotY(frame, value)} y2={plotY(frame, value)} />
           <text x={MARGIN.left - 5} y={plotY(frame, value) + 3.5} text-anchor="end">
-            {formatNumber(value).replace(/\.?0+$/, "")}
+            {tickLabel(value)}
           </text>
         </g>
       ))}

@@ -63,7 +63,7 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
             onChange={(event) => take([...(event.currentTarget.files ?? [])])}
           />
         </label>
-        . Without an environment the scene gets a plain sky.
+        . Without an environment the scene is lit by a studio.
       </p>
       <div class="chosen">
         <span class={chosen.scene ? "" : "quiet"}>Scene: {chosen.scene?.name ?? "none"}</span>

@@ -49,6 +49,12 @@ export function formatNumber(value: number): string {
   return value.toFixed(3);
 }
 
+/** A round number on an axis: no trailing noughts. */
+export function tickLabel(value: number): string {
+  const rounded = Number(value.toPrecision(3));
+  return rounded >= 1e5 ? rounded.toExponential().replace("e+", "e") : String(rounded);
+}
+
 /** A number that somebody typed, with point or comma; null where it is none. */
 export function parseNumber(text: string): number | null {
   const cleaned = text.trim().replace(",", ".");
