@@ -92,9 +92,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
 
     def kernel(start: int, stop: int) -> None:
         counts.append(
-            _trace(
-                occluded16, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits
-            )
+            _trace(occluded16, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits)
         )
 
     began = time.perf_counter()

@@ -1,13 +1,25 @@
-"""Frozen operators, shared by all sessions that agree on everything dormant; held under a byte budget."""
+"""Frozen operators and images, shared by all sessions that agree on everything dormant; held under a byte budget."""
 
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from typing import Protocol, TypeVar
 
 from relume.errors import MemoryBudgetError
-from relume.transfer.frozen import Frozen
+
+
+class Sized(Protocol):
+    """What a cache may hold."""
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        ...
+
+
+Entry = TypeVar("Entry", bound=Sized)
 
 
 class FrozenCache:
@@ -15,7 +27,7 @@ class FrozenCache:
 
     def __init__(self, budget_bytes: int) -> None:
         self.budget_bytes = budget_bytes
-        self._entries: OrderedDict[Hashable, Frozen] = OrderedDict()
+        self._entries: OrderedDict[Hashable, Sized] = OrderedDict()
         self._making: dict[Hashable, threading.Lock] = {}
         self._lock = threading.Lock()
         self._used = 0
@@ -25,14 +37,15 @@ class FrozenCache:
         """What the entries hold now."""
         return self._used
 
-    def find(self, key: Hashable) -> Frozen | None:
-        """The entry, now the most recently used, or None."""
+    def find(self, key: Hashable, kind: type[Entry]) -> Entry | None:
+        """The entry, now the most recently used, or None where there is none of that kind."""
         with self._lock:
             if key in self._entries:
                 self._entries.move_to_end(key)
-            return self._entries.get(key)
+            found = self._entries.get(key)
+            return found if isinstance(found, kind) else None
 
-    def get(self, key: Hashable, num_bytes: int, make: Callable[[], Frozen]) -> Frozen:
+    def get(self, key: Hashable, kind: type[Entry], num_bytes: int, make: Callable[[], Entry]) -> Entry:
         """The entry; made by `make` where there is none, room for its `num_bytes` being made first.
 
         Raises:
@@ -46,26 +59,26 @@ class FrozenCache:
             making = self._making.setdefault(key, threading.Lock())
         try:
             with making:
-                found = self.find(key)
+                found = self.find(key, kind)
                 return found if found is not None else self._insert(key, num_bytes, make)
         finally:
             with self._lock:
                 self._making.pop(key, None)
 
-    def _insert(self, key: Hashable, num_bytes: int, make: Callable[[], Frozen]) -> Frozen:
+    def _insert(self, key: Hashable, num_bytes: int, make: Callable[[], Entry]) -> Entry:
         with self._lock:
             self._make_room(num_bytes)
             self._used += num_bytes  # reserved, so that two freezes at once stay under the budget together
         try:
-            frozen = make()
+            made = make()
         except BaseException:
             with self._lock:
                 self._used -= num_bytes
             raise
         with self._lock:
-            self._entries[key] = frozen
-            self._used += frozen.num_bytes - num_bytes
-        return frozen
+            self._entries[key] = made
+            self._used += made.num_bytes - num_bytes
+        return made
 
     def _make_room(self, num_bytes: int) -> None:
         while self._entries and self._used + num_bytes > self.budget_bytes:

@@ -1,14 +1,12 @@
 """Method `direct`: environment light, fixed views, shadows, no bounces (Ben-Artzi 2006).
 
-The bake keeps rays, not answers: per view sample one visibility bit a light triangle, and the image of each term of the
-scene's own look, so that the first picture needs no projection. Stages: "samples" (the light triangles, and each view's
-samples), then "visibility" (rows of each view).
+The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
+triangles, and each view's samples), then "visibility" (rows of each view).
 
     lights/nodes, node_directions, direction, power         relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular
-    views/<k>/visibility                                     samples on surfaces only, as the next one
-    views/<k>/images                                         Σ_j c_j T_j of each term of the default look
+    views/<k>/visibility                                     samples on surfaces only
 """
 
 from __future__ import annotations
@@ -20,19 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.curves import curve_bands
-from relume.brdf.registry import TERMS
 from relume.errors import PlanError
-from relume.light.triangles import MAX_LIGHTS, MIN_LIGHTS, TriangleLights, subdivide
+from relume.light.triangles import MAX_LIGHTS, MIN_LIGHTS, subdivide
 from relume.look import default_look
-from relume.parallel import for_ranges
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
-from relume.transfer.projector import Projector, Receivers, contract
-from relume.transfer.stored import read_lights, read_receivers
+from relume.transfer.stored import read_lights
 
 CHUNK_ROWS, SHARD_ROWS = 1024, 16_384
 MAX_PIXELS = 4096 * 4096
@@ -68,13 +62,12 @@ class DirectMethod:
         samples_a_view = int(_SAMPLES_A_PIXEL * width * height)
         samples = samples_a_view * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
-        image_bytes = 12 * self._num_images(scene)
         return Plan(
             num_view_samples=samples,
             num_rays=samples * recipe.num_lights,
-            store_bytes=samples * (bits + image_bytes + _SURFACE_BYTES),
+            store_bytes=samples * (bits + _SURFACE_BYTES),
             # the sampling stage holds eight rays of each edge pixel with their surfaces, the others one shard
-            peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + image_bytes + 400) + 200_000_000,
+            peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + 200) + 200_000_000,
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -103,19 +96,20 @@ class DirectMethod:
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """Visibility and images; the arrays of the first stage are made by its tasks."""
+        """The visibility of each view; the arrays of the first stage are made by its tasks."""
         if stage == 0:
             return []
         bits = (store.shape("lights/nodes")[0] + 7) // 8
-        num_images = self._num_images(scene)
-        specs = []
-        for k in range(len(recipe.views)):
-            rows = self._num_surface_samples(k, store)
-            for name, width, dtype in (("visibility", (bits,), "uint8"), ("images", (num_images, 3), "float32")):
-                specs.append(
-                    ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
-                )
-        return specs
+        return [
+            ArraySpec(
+                f"views/{k}/visibility",
+                (self._num_surface_samples(k, store), bits),
+                "uint8",
+                (CHUNK_ROWS, bits),
+                (SHARD_ROWS, bits),
+            )
+            for k in range(len(recipe.views))
+        ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
         """One task; nothing is random, so the same task gives the same bits anywhere."""
@@ -142,11 +136,7 @@ class DirectMethod:
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
         traced = trace_visibility(geometry.embree, position, normal, lights.direction)
-        receivers = read_receivers(store, k, task.start, task.stop, traced.visible)
-        material = store.read(f"{prefix}/material", task.start, task.stop)
-        images = _default_images(scene, material, lights, receivers, self._num_images(scene))
-        arrays: dict[str, NDArray[Any]] = {f"{prefix}/visibility": traced.visible, f"{prefix}/images": images}
-        return Written(arrays, traced.num_rays, traced.trace_s)
+        return Written({f"{prefix}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 
     def _geometry_of(self, scene: Scene) -> Geometry:
         with self._lock:
@@ -155,36 +145,5 @@ class DirectMethod:
             return self._geometry[1]
 
     @staticmethod
-    def _num_images(scene: Scene) -> int:
-        return max(1, *(len(material.terms) for material in scene.materials))
-
-    @staticmethod
     def _num_surface_samples(k: int, store: StoreReader) -> int:
         return int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND))
-
-
-def _default_images(
-    scene: Scene, material: NDArray[np.uint16], lights: TriangleLights, receivers: Receivers, num_images: int
-) -> NDArray[np.float32]:
-    """Image of each term of the scene's own look. (n, num_images, 3) float32"""
-    look = default_look(scene.materials)
-    images = np.zeros((len(material), num_images, 3), np.float32)
-    for index in np.unique(material):
-        first, last = (int(row) for row in np.searchsorted(material, [index, index + 1]))
-        for k, document in enumerate(look["materials"][scene.materials[index].name]["terms"]):
-            _term_image(document, lights, receivers, first, images[first:last, k])
-    return images
-
-
-def _term_image(
-    document: dict[str, Any], lights: TriangleLights, receivers: Receivers, first: int, image: NDArray[np.float32]
-) -> None:
-    """Image of one term over the receivers from `first` on; written to image (n, 3)."""
-    term = TERMS[document["model"]]
-    contraction = contract(term, {curve.name: curve_bands(document, curve) for curve in term.curves}, None)
-
-    def project(start: int, stop: int) -> None:
-        projector = Projector(term, contraction, lights, receivers)
-        image[start:stop] = projector.project(first + start, first + stop)[:, 0]
-
-    for_ranges(project, len(image), CHUNK_ROWS)

@@ -28,9 +28,6 @@ class MaterialImage:
         self.documents = list(documents)
         self.terms = [TermImage(document, self._cos_theta_o) for document in documents]
         self._is_current = False
-        images = view.images(index)
-        for k, term in enumerate(self.terms):
-            term.show_default(images[:, k])
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
         """New targets; terms that stay as they are keep their images."""

@@ -12,6 +12,7 @@ from relume.errors import StoreError
 from relume.light.triangles import TriangleLights
 from relume.store import open_store
 from relume.transfer.base import StoreReader
+from relume.transfer.derived import DerivedImages
 from relume.transfer.stored import read_lights
 from relume.transfer.view import View, open_view
 
@@ -21,7 +22,7 @@ class Transfer:
     """One bake; shared by all pictures of it.
 
     Attributes:
-        key: tells this bake's frozen operators from other bakes' in a shared cache.
+        key: path of the store; tells this bake's frozen operators from other bakes' in a shared cache.
         default_look: the complete look of the scene as it was imported.
     """
 
@@ -33,6 +34,11 @@ class Transfer:
     default_look: dict[str, Any]
     material_names: Sequence[str]
     views: dict[str, View]
+
+    @cached_property
+    def derived(self) -> DerivedImages:
+        """Images of the default look, made once."""
+        return DerivedImages(Path(self.key))
 
     @cached_property
     def lights(self) -> TriangleLights:

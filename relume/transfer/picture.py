@@ -20,6 +20,7 @@ from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import CurvePointer, parse_pointer
 from relume.transfer.resolve import encode, resolve
+from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.stream import columns_of, stream
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import Tile
@@ -46,11 +47,11 @@ class Advance:
 
 @dataclass(frozen=True)
 class _Need:
-    """An operator that must be frozen before the picture can go on."""
+    """What the picture needs to go on: an operator along `active`, or an image where that is None."""
 
     material: MaterialImage
     term: TermImage
-    active: str
+    active: str | None
 
 
 class Picture:
@@ -59,7 +60,7 @@ class Picture:
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
         self._transfer, self._cache = transfer, cache
         self._view = transfer.views[view_name]
-        self._look = validate(transfer.default_look, transfer.default_look)
+        self._default = self._look = validate(transfer.default_look, transfer.default_look)
         self._materials = {
             name: MaterialImage(self._view, index, self._look.materials[name].terms)
             for index, name in enumerate(transfer.material_names)
@@ -92,10 +93,11 @@ class Picture:
         if need is None:
             return None
         name = self._transfer.material_names[need.material.index]
-        return f"{name}, {need.term.term.curve(need.active).label}"
+        label = need.term.term.label if need.active is None else need.term.term.curve(need.active).label
+        return f"{name}, {label}"
 
     def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
-        """Freeze what `waiting` named.
+        """Freeze, or shade, what `waiting` named.
 
         Raises:
             CancelledError: `cancelled` said so; the picture stays as it was.
@@ -104,18 +106,39 @@ class Picture:
         need = self._need()
         if need is None:
             return
-        term, active = need.term, need.active
-        key = self._key(need.material, term, active, of_target=True)
+        if need.active is None:
+            need.term.show(self._shaded(need, progress, cancelled))
+            return
+        need.term.adopt(self._frozen(need, need.active, progress, cancelled), need.active)
+        if self._touched is not None and self._touched_term() != need and self._find(self._touched)[1] is need.term:
+            self._touched = None  # the hand has moved on to another curve of this term
+
+    def _shaded(self, need: _Need, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Shaded:
+        material, term = need.material, need.term
+        key = self._key(material, term, None, of_target=True)
+
+        def make() -> Shaded:
+            receivers = self._view.receivers(material.index)
+            return shade(term.term, term.target, self._transfer.lights, receivers, progress, cancelled)
+
+        def make_once() -> Shaded:
+            name = self._transfer.material_names[material.index]
+            is_default = term.document in self._default.materials[name].terms
+            return self._transfer.derived.get(key[1:], term.image.shape, make) if is_default else make()
+
+        return self._cache.get(key, Shaded, shaded_bytes(material.num_samples), make_once)
+
+    def _frozen(
+        self, need: _Need, active: str, progress: Callable[[float], None], cancelled: Callable[[], bool]
+    ) -> Frozen:
+        material, term = need.material, need.term
 
         def make() -> Frozen:
-            receivers = self._view.receivers(need.material.index)
+            receivers = self._view.receivers(material.index)
             return freeze(term.term, term.target, active, self._transfer.lights, receivers, progress, cancelled)
 
-        num_bands = term.term.curve(active).num_bands
-        frozen = self._cache.get(key, frozen_bytes(need.material.num_samples, num_bands), make)
-        term.adopt(frozen, active)
-        if self._touched is not None and self._touched_term() != need and self._find(self._touched)[1] is term:
-            self._touched = None  # the hand has moved on to another curve of this term
+        num_bytes = frozen_bytes(material.num_samples, term.term.curve(active).num_bands)
+        return self._cache.get(self._key(material, term, active, of_target=True), Frozen, num_bytes, make)
 
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
@@ -240,7 +263,9 @@ class Picture:
             raise ParameterError(str(pointer), pointer.curve, ", ".join(curve.name for curve in term.term.curves))
         return material, term, pointer.curve
 
-    def _key(self, material: MaterialImage, term: TermImage, active: str, *, of_target: bool) -> Hashable:
+    def _key(
+        self, material: MaterialImage, term: TermImage, active: str | None, *, of_target: bool
+    ) -> tuple[Hashable, ...]:
         return (
             self._transfer.key, self._view.name, material.index, term.dormant_key(active, of_target=of_target),
         )  # fmt: skip
@@ -249,7 +274,7 @@ class Picture:
         """The operator that the term's image follows now, unless the cache has dropped it."""
         if term.active is None or term.effective is None:
             return None
-        return self._cache.find(self._key(material, term, term.active, of_target=False))
+        return self._cache.find(self._key(material, term, term.active, of_target=False), Frozen)
 
     def _need(self) -> _Need | None:
         """The next operator to freeze: first what the look lacks, then what the user has opened."""
@@ -259,10 +284,12 @@ class Picture:
                 differing = term.differing()
                 if term.active in differing and self._operator(material, term) is not None:
                     continue  # the hand moves this curve: follow it, the others when it rests
+                if not material.num_samples:
+                    continue
                 preferred = touched.active if touched is not None and touched.term is term else None
-                active = preferred if preferred in differing else differing[0]
-                if material.num_samples:
-                    return _Need(material, term, active)
+                if preferred not in differing:
+                    preferred = None if term.effective is None else differing[0]
+                return _Need(material, term, preferred)
         if touched is not None and touched.material.num_samples and touched.active in touched.term.target:
             current = (
                 touched.term.active == touched.active and self._operator(touched.material, touched.term) is not None

@@ -139,14 +139,19 @@ def _quarter(gamma, nodes, m, share, leaves, shares, num):  # type: ignore[no-un
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _divide(kinds, scale, local, nodes, m, ox, oy, oz, stack, depth, dirs, gamma, share, leaves, shares, num):  # type: ignore[no-untyped-def]
+def _divide(  # type: ignore[no-untyped-def]
+    kinds, scale, local, gamma, nodes, m, ox, oy, oz, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
+):
     """Divide triangle m in four until its angles are linear, depth first (appendix A); chord areas share out the light.
 
     Appends to the corner angles of the leaves (C, 3, n) and their shares (n,); returns their new number.
     """
+    num_curves = kinds.shape[0]
     for corner in range(3):
         for axis in range(3):
             stack[0, corner, axis] = local[axis, nodes[m, corner]]
+        for k in range(num_curves):
+            stack_gamma[0, k, corner] = gamma[k, nodes[m, corner]]
     depth[0] = 0
     top = 1
     while top > 0:
@@ -161,23 +166,28 @@ def _divide(kinds, scale, local, nodes, m, ox, oy, oz, stack, depth, dirs, gamma
             inverse = np.float32(1) / math.sqrt(x * x + y * y + z * z)
             dirs[3 + edge, 0], dirs[3 + edge, 1], dirs[3 + edge, 2] = x * inverse, y * inverse, z * inverse
         bend = np.float32(0)
-        for k in range(kinds.shape[0]):
-            g = gamma[k]
-            for node in range(6):
+        for k in range(num_curves):
+            g = own_gamma[k]
+            for corner in range(3):
+                g[corner] = stack_gamma[top, k, corner]
+            for node in range(3, 6):
                 g[node] = scale[k] * angle_at(kinds[k], dirs[node, 0], dirs[node, 1], dirs[node, 2], ox, oy, oz)
             bend = max(bend, _bend_of(g[0], g[1], g[2], g[3], g[4], g[5]))
-        part = share * _QUARTER**level
+        share = _QUARTER**level
         if bend <= 1:
-            leaves[:, :, num] = gamma[:, :3]
-            shares[num] = part
+            leaves[:, :, num] = own_gamma[:, :3]
+            shares[num] = share
             num += 1
         elif bend <= _QUARTERED_BEND or level == _MAX_DEPTH - 1:
-            num = _quarter(gamma, _OWN_NODES, 0, part, leaves, shares, num)
+            num = _quarter(own_gamma, _OWN_NODES, 0, share, leaves, shares, num)
         else:
             for child in range(4):
                 for corner in range(3):
+                    node = _CHILDREN[child, corner]
                     for axis in range(3):
-                        stack[top + child, corner, axis] = dirs[_CHILDREN[child, corner], axis]
+                        stack[top + child, corner, axis] = dirs[node, axis]
+                    for k in range(num_curves):
+                        stack_gamma[top + child, k, corner] = own_gamma[k, node]
                 depth[top + child] = level + 1
             top += 4
     return num
@@ -280,7 +290,8 @@ def project_points(  # type: ignore[no-untyped-def]
     weight, bend = np.empty((3, capacity), np.float32), np.empty(num_lights, np.float32)
     bent = np.empty(num_lights, np.int64)
     stack, depth = np.empty((3 * _MAX_DEPTH + 4, 3, 3), np.float32), np.empty(3 * _MAX_DEPTH + 4, np.int64)
-    dirs, node_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6), np.float32)
+    stack_gamma = np.empty((3 * _MAX_DEPTH + 4, num_curves, 3), np.float32)
+    dirs, own_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6), np.float32)
     one = np.float32(1)
     for p in range(start, stop):
         row = p - start
@@ -304,8 +315,9 @@ def project_points(  # type: ignore[no-untyped-def]
                 num = _quarter(gamma, nodes, m, one, leaves, shares, num)
             else:
                 num = _divide(
-                    kinds, scale, local, nodes, m, ox, oy, oz, stack, depth, dirs, node_gamma, one, leaves, shares, num
-                )
+                    kinds, scale, local, gamma, nodes, m, ox, oy, oz,
+                    stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num,
+                )  # fmt: skip
             of_entry[before:num] = entry
         _weigh(power, light, shading, of_entry, shares, num, weight)
         _spend(leaves, shares, num, num_bands, bands, is_gray, active, weight, out[row])

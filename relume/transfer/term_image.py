@@ -18,6 +18,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
 from relume.errors import EditError
 from relume.transfer.frozen import Frozen, tiles_of
+from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
 
 F32 = NDArray[np.float32]
@@ -59,13 +60,11 @@ class TermImage:
         self.outgoing = self._outgoing()
         self.is_composed = False
 
-    def show_default(self, images: F32) -> None:
-        """Start from the stored image of the target curves. images: (samples, 3) float32"""
-        tiles, _, samples = self.image.shape
-        padded = np.zeros((tiles * samples, 3), np.float32)
-        padded[: len(images)] = images
-        self.image[:] = padded.reshape(tiles, samples, 3).transpose(0, 2, 1)
+    def show(self, shaded: Shaded) -> None:
+        """Go on from an image of the target curves."""
+        self.image[:] = shaded.image
         self.effective = dict(self.target)
+        self.active = self.shown = None
         self.is_composed = False
 
     def _outgoing(self) -> F32 | None:
@@ -85,8 +84,8 @@ class TermImage:
         """Whether the image shows the target."""
         return self.effective is not None and not self.differing()
 
-    def dormant_key(self, active: str, *, of_target: bool) -> Hashable:
-        """What a frozen operator depends on besides the view and the material."""
+    def dormant_key(self, active: str | None, *, of_target: bool) -> Hashable:
+        """What a frozen operator, or an image where no curve is active, depends on besides view and material."""
         bands = self.target if of_target or self.effective is None else self.effective
         return (
             self.document["model"],

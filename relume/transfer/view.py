@@ -64,11 +64,6 @@ class View:
         visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
         return read_receivers(self.store, self.index, rows.start, rows.stop, visible)
 
-    def images(self, material: int) -> F32:
-        """Image of each term of the default look, before colour and textures. (samples, terms, 3) float32"""
-        rows = self.rows(material)
-        return np.asarray(self.store.read(f"views/{self.index}/images", rows.start, rows.stop), np.float32)
-
     def background(self) -> F32:
         """Radiance of the samples after the surfaces. (n, 3) float32"""
         return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
