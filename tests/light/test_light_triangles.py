@@ -1,0 +1,158 @@
+"""Light triangles: they tile the sphere, keep every texel's light, and are small where there is most of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import studio
+
+from relume.color import luminance
+from relume.errors import PlanError
+from relume.light.environment import texel_directions, texel_solid_angles
+from relume.light.triangles import MAX_LIGHTS, subdivide
+
+
+def solid_angles(lights):
+    """Of each triangle, signed: positive counter-clockwise seen from outside (van Oosterom and Strackee 1983)."""
+    a, b, c = lights.node_directions.T.astype(float)[lights.nodes[:, :3]].transpose(1, 0, 2)
+    a, b, c = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b, c))
+    volume = np.einsum("mc,mc->m", a, np.cross(b, c))
+    dots = 1 + np.einsum("mc,mc->m", a, b) + np.einsum("mc,mc->m", b, c) + np.einsum("mc,mc->m", c, a)
+    return 2 * np.arctan2(volume, dots)
+
+
+def depth_inside(lights, directions):
+    """How deep each direction lies in each triangle: the sine of its distance to the nearest edge. (n, M)"""
+    corners = lights.node_directions.T.astype(float)[lights.nodes[:, :3]]
+    edges = np.cross(corners, np.roll(corners, -1, axis=1))
+    edges /= np.linalg.norm(edges, axis=2, keepdims=True)
+    return np.einsum("mec,nc->nme", edges, directions).min(axis=2)
+
+
+def texel_power(radiance):
+    height, width, _ = radiance.shape
+    return (radiance.astype(float) * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
+
+
+@pytest.fixture(scope="module", params=[8, 100, 1003])
+def lights(request):
+    return subdivide(studio(), request.param)
+
+
+def test_triangles_tile_the_sphere(lights):
+    angles = solid_angles(lights)
+    assert angles.min() > 0
+    assert angles.sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    directions = np.random.default_rng(1).normal(size=(3000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    depth = depth_inside(lights, directions)
+    assert (depth.max(axis=1) > -1e-6).all()
+    assert ((depth > 1e-6).sum(axis=1) <= 1).all()
+
+
+def test_nodes_are_unit_and_midpoints_of_their_edges(lights):
+    nodes = lights.node_directions.T.astype(float)
+    np.testing.assert_allclose(np.linalg.norm(nodes, axis=1), 1, atol=1e-6)
+    for edge, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
+        middle = nodes[lights.nodes[:, a]] + nodes[lights.nodes[:, b]]
+        middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+        np.testing.assert_allclose(nodes[lights.nodes[:, 3 + edge]], middle, atol=1e-6)
+
+
+def test_power_is_the_environments(lights):
+    expected = texel_power(studio()).sum(axis=0)
+    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), expected, rtol=1e-6)
+    assert (lights.power >= 0).all()
+
+
+@pytest.mark.parametrize("num_lights", [8, 100, 700])
+def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
+    radiance = np.random.default_rng(2).random((38, 76, 3), np.float32)  # few texels lie on an edge
+    lights = subdivide(radiance, num_lights)
+    depth = depth_inside(lights, texel_directions(38, 76).reshape(-1, 3).astype(float))
+    owner, power = depth.argmax(axis=1), texel_power(radiance)
+    on_edge = depth.max(axis=1) < 1e-6
+    assert on_edge.mean() < 0.05
+    inside = np.zeros((lights.num_lights, 3))
+    np.add.at(inside, owner[~on_edge], power[~on_edge])
+    touching = np.zeros(lights.num_lights, bool)
+    touching[np.nonzero((depth[on_edge] > -1e-6).any(axis=0))[0]] = True
+    np.testing.assert_allclose(lights.power[~touching], inside[~touching], rtol=1e-5, atol=1e-9)
+    assert (lights.power - inside > -1e-6).all()
+    np.testing.assert_allclose((lights.power - inside).sum(axis=0), power[on_edge].sum(axis=0), atol=1e-5)
+
+
+def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
+    np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
+    depth = np.diagonal(depth_inside(lights, lights.direction.astype(float)))
+    assert (depth > -1e-6).all()
+    radiance = studio()
+    towards = (luminance(texel_power(radiance))[:, None] * texel_directions(32, 64).reshape(-1, 3)).sum(axis=0)
+    weighted = (luminance(lights.power.astype(float))[:, None] * lights.direction).sum(axis=0)
+    cosine = weighted @ towards / np.linalg.norm(weighted) / np.linalg.norm(towards)
+    assert cosine > np.cos(np.radians(1.0))
+
+
+def test_same_environment_gives_the_same_triangles_bit_for_bit():
+    one, two = subdivide(studio(), 300), subdivide(studio(), 300)
+    for name in ("nodes", "node_directions", "direction", "power"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+@pytest.mark.parametrize("asked", [8, 9, 10, 11, 100, 101, 102, 500])
+def test_as_many_as_asked_and_never_more(asked):
+    count = subdivide(studio(), asked).num_lights
+    assert asked - 3 < count <= asked
+    assert (count - 8) % 3 == 0
+
+
+@pytest.mark.parametrize("spot", [(6, 10), (32, 80), (58, 126)])
+def test_small_triangles_lie_on_bright_spots(spot):
+    y, x = spot
+    radiance = np.full((64, 128, 3), 0.1, np.float32)
+    radiance[y - 2 : y + 3, x - 2 : x + 2] = 500.0
+    lights = subdivide(radiance, 500)
+    angles, mean = solid_angles(lights), 4 * np.pi / 500
+    bright = lights.power.sum(axis=1) / angles > 100
+    assert bright.sum() >= 15  # of its twenty texels
+    assert angles[bright].mean() < mean / 10
+    assert angles.max() > mean  # where nothing happens they are large
+
+
+def test_uniform_light_is_divided_evenly():
+    angles = solid_angles(subdivide(np.ones((64, 128, 3), np.float32), 512))
+    assert angles.max() / angles.min() < 12  # one level apart, and an octahedron's children are not alike
+
+
+def test_black_environment_has_black_lights_all_over_the_sphere():
+    lights = subdivide(np.zeros((8, 16, 3), np.float32), 200)
+    assert solid_angles(lights).sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    assert not lights.power.any()
+    np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (2, 4), (3, 5)])
+def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
+    radiance = np.random.default_rng(3).random((*shape, 3), np.float32)
+    lights = subdivide(radiance, 4000)
+    assert lights.num_lights <= 4000
+    assert np.isfinite(lights.direction).all()
+    assert solid_angles(lights).sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), texel_power(radiance).sum(axis=0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("value", [1e-30, 1e6])
+def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
+    radiance = np.zeros((16, 32, 3), np.float32)
+    radiance[4, 9] = [value, 0, value / 2]
+    lights = subdivide(radiance, 1000)
+    lit = lights.power.any(axis=1)
+    assert lit.sum() == 1
+    np.testing.assert_allclose(lights.power[lit][0], texel_power(radiance).sum(axis=0), rtol=1e-6)
+    assert lights.direction[lit][0] @ texel_directions(16, 32)[4, 9] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("asked", [-1, 0, 7, MAX_LIGHTS + 1])
+def test_absurd_counts_are_refused(asked):
+    with pytest.raises(PlanError, match="give 8 to"):
+        subdivide(np.ones((2, 4, 3), np.float32), asked)

@@ -1,0 +1,117 @@
+"""Scenes of a few hundred triangles, made by code: what the numerics' tests trace, bake and freeze."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relume.light.environment import texel_directions
+from relume.scene.archive import make_scene
+from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+
+
+def mesh(name, positions, faces, material, normals=None, tangents=None, uvs=None):
+    """A mesh from lists; flat normals of the first face where none are given."""
+    positions, faces = np.asarray(positions, np.float32), np.asarray(faces, np.uint32)
+    if normals is None:
+        a, b, c = positions[faces[0]]
+        normal = np.cross(b - a, c - a)
+        normals = np.tile(normal / np.linalg.norm(normal), (len(positions), 1))
+    tangents = np.zeros((len(positions), 4)) if tangents is None else tangents
+    uvs = np.zeros((len(positions), 2)) if uvs is None else uvs
+    floats = (np.ascontiguousarray(a, np.float32) for a in (positions, normals, tangents, uvs))
+    return Mesh(name, *floats, faces, material)
+
+
+def quad(name, corners, material, tangent=(1, 0, 0)):
+    """A rectangle, counter-clockwise seen from its outer side, with the unit square as texture coordinates."""
+    uvs = [[0, 1], [1, 1], [1, 0], [0, 0]]
+    return mesh(name, corners, [[0, 1, 2], [0, 2, 3]], material, tangents=np.tile([*tangent, 1.0], (4, 1)), uvs=uvs)
+
+
+def sphere(name, centre, radius, material, rings=12, inside=False):
+    """A ball of 4 · rings² triangles less the poles', smooth normals; `inside`: seen from its inner side."""
+    theta, phi = np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1)
+    theta, phi = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
+    normals = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=1)
+    tangents = np.stack([-np.sin(phi), 0 * phi, np.cos(phi), 1 + 0 * phi], axis=1)
+    uvs = np.stack([phi / (2 * np.pi), theta / np.pi], axis=1)
+    faces = []
+    for ring in range(rings):
+        for k in range(2 * rings):
+            a = ring * (2 * rings + 1) + k
+            b = a + 2 * rings + 1
+            faces += [[a, a + 1, b]] if ring > 0 else []
+            faces += [[a + 1, b + 1, b]] if ring < rings - 1 else []
+    positions = np.asarray(centre) + radius * normals
+    faces = np.asarray(faces)
+    if inside:
+        normals, faces = -normals, faces[:, ::-1]
+    return mesh(name, positions, faces, material, normals, tangents, uvs)
+
+
+def looking(name, eye, target, yfov):
+    """A camera at `eye` that has `target` in its middle, upright."""
+    eye, target = np.asarray(eye, float), np.asarray(target, float)
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0, 1, 0], back)
+    right /= np.linalg.norm(right)
+    to_world = np.eye(4)
+    to_world[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
+    to_world[:3, 3] = eye
+    return Camera(name, to_world, yfov)
+
+
+def studio(height=32, key=60.0):
+    """An environment that is dim and coloured all round, with a warm softbox and a small cold spot."""
+    d = texel_directions(height, 2 * height).astype(float)
+    sky = 0.3 + 0.2 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * d[..., :1] * [1.0, 0.2, -0.6]
+
+    def spot(towards, width):
+        towards = np.asarray(towards) / np.linalg.norm(towards)
+        return np.exp((d @ towards - 1) / width**2)[..., None]
+
+    light = sky + key * spot([-1, 1.5, 1], 0.15) * [1, 0.9, 0.7] + 0.5 * key * spot([2, 1, 0.3], 0.06) * [0.5, 0.7, 1]
+    return np.maximum(light, 0).astype(np.float32)
+
+
+def checker(size=16, squares=8):
+    """A texture of black and white squares."""
+    row = np.arange(size) * squares // size
+    on = (row[:, None] + row) % 2
+    return Texture(np.repeat(on[..., None], 3, axis=2).astype(np.float32))
+
+
+def still_life():
+    """A ball and a wall on a checkered floor, two views, every BRDF model in use."""
+    terms = {
+        "Floor": (
+            {"model": "lambert", "color": [0.6, 0.5, 0.4]},
+            {"model": "ggx", "color": [0.8, 0.8, 0.8], "params": {"roughness": 0.4}},
+        ),
+        "Wall": (
+            {"model": "ashikhmin_shirley", "color": [0.7, 0.9, 1.0]},
+            {"model": "blinn_phong", "color": [0.3, 0.3, 0.2], "params": {"exponent": 30.0}},
+        ),
+        "Ball": (
+            {"model": "lambert", "color": [0.3, 0.05, 0.05]},
+            {"model": "cook_torrance", "color": [0.9, 0.8, 0.7], "params": {"sigma": 0.2, "ior": 1.8}},
+        ),
+    }
+    textures = {"Floor": {"diffuse": checker()}}
+    materials = [Material(name, of, textures.get(name, {})) for name, of in terms.items()]
+    meshes = [
+        quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0),
+        quad("wall", [[-2, 0, -1], [2, 0, -1], [2, 1.2, -1], [-2, 1.2, -1]], 1),
+        sphere("ball", [0.1, 0.5, 0], 0.5, 2, rings=10),
+    ]
+    cameras = [looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), looking("left", [-2.5, 1.5, 1.5], [0, 0.4, 0], 0.7)]
+    return make_scene("still life", meshes, materials, cameras, Environment("studio", studio()))
+
+
+def scene_of(*meshes, camera, environment=None, materials=None) -> Scene:
+    """A scene of some meshes and one camera; white Lambert materials where none are given."""
+    if materials is None:
+        count = 1 + max(m.material for m in meshes)
+        materials = [Material(f"M{k}", ({"model": "lambert", "color": [1, 1, 1]},)) for k in range(count)]
+    radiance = np.ones((4, 8, 3), np.float32) if environment is None else environment
+    return make_scene("tiny", meshes, materials, [camera], Environment("environment", radiance))

@@ -1,0 +1,252 @@
+"""View samples: their weights, their order, silhouettes, textures, normals and what lies behind everything."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
+
+from relume.light.environment import direction_to_uv
+from relume.scene.model import Material, Texture
+from relume.trace.geometry import merge
+from relume.trace.primary import camera_directions
+from relume.trace.texture import MipMap
+from relume.trace.view_samples import BACKGROUND, sample_view
+
+SIZE = (64, 48)
+WHITE = ({"model": "lambert", "color": [1, 1, 1]},)
+
+
+def sampled(scene, size=SIZE, view=None):
+    return sample_view(scene, merge(scene), view or scene.cameras[0].name, size)
+
+
+@pytest.fixture(scope="module")
+def still():
+    scene = still_life()
+    return scene, sampled(scene)
+
+
+def weight_by_pixel(samples, rows, size=SIZE):
+    out = np.zeros(size[0] * size[1])
+    np.add.at(out, samples.pixel[rows], samples.weight[rows])
+    return out
+
+
+def test_shares_of_each_pixel_sum_to_one(still):
+    samples = still[1]
+    np.testing.assert_allclose(weight_by_pixel(samples, slice(None)), 1, atol=1e-6)
+    assert samples.weight.min() >= 1 / 8 - 1e-6
+
+
+def test_sorted_by_material_then_along_the_picture(still):
+    samples = still[1]
+    material = samples.material.astype(int)
+    assert (np.diff(material) >= 0).all()
+    assert set(material) == {0, 1, 2, BACKGROUND}
+    for index in (0, 1, 2):
+        pixel = samples.pixel[material == index].astype(int)
+        y, x = np.divmod(pixel, SIZE[0])
+        step = np.hypot(np.diff(x), np.diff(y))
+        assert np.median(step) <= 2  # neighbours in memory are neighbours in the picture
+    assert samples.num_rays > SIZE[0] * SIZE[1]
+
+
+def test_edges_have_more_samples_and_smooth_places_one(still):
+    scene, samples = still
+    count = np.bincount(samples.pixel, minlength=SIZE[0] * SIZE[1]).reshape(SIZE[1], SIZE[0])
+    assert count.min() == 1
+    assert 2 <= count.max() <= 8
+    several = np.zeros(count.shape, bool)
+    for index in range(3):
+        share = weight_by_pixel(samples, samples.material == index).reshape(count.shape)
+        several |= (share > 0.01) & (share < 0.99)
+    assert (count[several] >= 2).all()
+    assert (count > 1).mean() < 0.25
+    assert (count[-6:-1, 1:-1] == 1).all()  # the floor in the foreground
+
+
+def disc_coverage(radius, size, yfov, distance, fine=32):
+    """Share of each pixel that a disc facing the camera covers, by dense supersampling. (height, width)"""
+    width, height = size
+    half = np.tan(yfov / 2) * distance
+    x = ((np.arange(width * fine) + 0.5) / fine / width * 2 - 1) * half * width / height
+    y = (1 - (np.arange(height * fine) + 0.5) / fine / height * 2) * half
+    inside = x[None] ** 2 + y[:, None] ** 2 < radius**2
+    return inside.reshape(height, fine, width, fine).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("radius", [0.31, 0.5, 0.731])
+def test_silhouette_of_a_disc_covers_what_it_should(radius):
+    turns = np.linspace(0, 2 * np.pi, 256, endpoint=False)
+    rim = np.column_stack([radius * np.cos(turns), radius * np.sin(turns), 0 * turns])
+    faces = [[0, k + 1, (k + 1) % 256 + 1] for k in range(256)]
+    scene = scene_of(mesh("disc", [[0, 0, 0], *rim], faces, 0), camera=looking("c", [0, 0, 2], [0, 0, 0], 0.8))
+    samples = sampled(scene)
+    covered = weight_by_pixel(samples, samples.material == 0).reshape(SIZE[1], SIZE[0])
+    exact = disc_coverage(radius, SIZE, 0.8, 2.0)
+    error = covered - exact
+    rim_pixels = (exact > 0) & (exact < 1)
+    # eight positions cannot cut every slanted edge better: the pattern's discrepancy over half-planes is 0.215
+    assert np.abs(error).max() <= 0.215
+    assert (np.abs(error[rim_pixels]) <= 1 / 8).mean() > 0.95
+    assert np.sqrt(np.mean(error[rim_pixels] ** 2)) < 0.07
+    assert abs(error.sum()) < 0.01 * exact.sum()
+
+
+def test_position_lies_just_off_the_surface_on_the_viewers_side():
+    scene = scene_of(sphere("ball", [0, 0, 0], 1, 0, rings=40), camera=looking("c", [0, 0.5, 4], [0, 0, 0], 0.7))
+    samples, eye = sampled(scene), scene.cameras[0].to_world[:3, 3]
+    solid = samples.material == 0
+    surface = samples.surface
+    away = np.linalg.norm(surface.position[solid].astype(float), axis=1)
+    assert np.abs(away - 1).max() < 0.004  # chords of the facets
+    towards = eye - surface.position[solid]
+    facing = (surface.normal[solid] * towards).sum(axis=1) / np.linalg.norm(towards, axis=1)
+    assert facing.min() > 0
+    outward = surface.position[solid] / away[:, None]
+    assert (surface.normal[solid] * outward).sum(axis=1).min() > np.cos(np.radians(5))
+
+
+def test_frames_are_unit_and_square(still):
+    samples = still[1]
+    solid = samples.material != BACKGROUND
+    normal, tangent = samples.surface.normal[solid], samples.surface.tangent[solid]
+    for v in (normal, tangent):
+        np.testing.assert_allclose(np.linalg.norm(v, axis=1), 1, atol=1e-5)
+    assert np.abs((normal * tangent).sum(axis=1)).max() < 1e-5
+
+
+def test_background_samples_carry_the_environment_behind_them(still):
+    scene, samples = still
+    outside = samples.material == BACKGROUND
+    whole = np.bincount(samples.pixel, minlength=SIZE[0] * SIZE[1])[samples.pixel] == 1
+    rows = np.nonzero(outside & whole)[0]
+    assert len(rows) > 300
+    y, x = np.divmod(samples.pixel[rows].astype(int), SIZE[0])
+    directions = camera_directions(scene.cameras[0], SIZE, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
+    half_pixel = 0.5 * 0.8 / SIZE[1]  # near an edge another position of the pixel may stand for all of it
+    np.testing.assert_allclose(samples.surface.position[rows], directions, atol=half_pixel)
+    directions = samples.surface.position[rows]
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
+    radiance = studio()
+    u, v = direction_to_uv(directions)
+    texel = radiance[(v * 32).astype(int), (u * 64).astype(int)]
+    difference = np.abs(samples.surface.diffuse[rows] - texel).max(axis=1)
+    slope = np.abs(np.diff(radiance, axis=0)).max() + np.abs(np.diff(radiance, axis=1)).max()
+    assert difference.max() <= slope
+    assert np.median(difference) < 0.05
+
+
+def flat_scene(material, repeat=1.0, size=1.0):
+    """A square that fills the picture of a camera which looks straight at it."""
+    square = quad("square", np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * size, 0)
+    square.uvs[:] = square.uvs * repeat
+    camera = looking("c", [0, 0, 2], [0, 0, 0], 2 * np.arctan(0.5))
+    return scene_of(square, camera=camera, materials=[material])
+
+
+def test_texture_lies_where_its_coordinates_say():
+    pixels = np.zeros((48, 48, 3), np.float32)
+    pixels[:24, :, 0], pixels[:, 24:, 1], pixels[..., 2] = 1, 1, 0.25  # red above, green to the right
+    samples = sampled(flat_scene(Material("M", WHITE, {"diffuse": Texture(pixels)})), (48, 48))
+    y, x = np.divmod(samples.pixel.astype(int), 48)
+    inner = (np.abs(x - 23.5) > 2) & (np.abs(y - 23.5) > 2) & (np.minimum(x, y) > 1) & (np.maximum(x, y) < 46)
+    expected = np.stack([y < 24, x >= 24, np.full(len(x), 0.25)], axis=1)
+    np.testing.assert_allclose(samples.surface.diffuse[inner], expected[inner], atol=1e-5)
+    np.testing.assert_array_equal(samples.surface.specular[inner], 1)
+
+
+def test_far_checkers_become_grey_and_near_ones_stay():
+    near = sampled(flat_scene(Material("M", WHITE, {"specular": checker(32, 4)})))
+    values = near.surface.specular[near.material == 0][:, 0]
+    assert ((values < 0.02) | (values > 0.98)).mean() > 0.5
+    far = sampled(flat_scene(Material("M", WHITE, {"specular": checker(64, 64)}), repeat=20.0))
+    grey = far.surface.specular[far.material == 0]
+    assert np.abs(grey - 0.5).max() < 0.05
+
+
+def test_mip_levels_keep_the_mean_and_a_footprint_of_a_texel_the_texels():
+    pixels = np.random.default_rng(3).random((32, 32, 3), np.float32)
+    pyramid = MipMap(Texture(pixels))
+    for level in pyramid.levels:
+        np.testing.assert_allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), rtol=1e-5)
+    y, x = np.divmod(np.arange(32 * 32), 32)
+    uv = np.column_stack([(x + 0.5) / 32, (y + 0.5) / 32]).astype(np.float32)
+    exact = pyramid.sample(uv, np.full(1024, 1 / 32, np.float32))
+    np.testing.assert_allclose(exact, pixels.reshape(-1, 3), atol=2e-5)
+    everything = pyramid.sample(uv, np.full(1024, 5.0, np.float32))
+    np.testing.assert_allclose(everything, np.tile(pixels.mean(axis=(0, 1)), (1024, 1)), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("wrap", "at", "same_as"),
+    [("repeat", 1.3, 0.3), ("repeat", -0.3, 0.7), ("mirror", 1.3, 0.7), ("mirror", -0.3, 0.3), ("clamp", 7.0, 0.999)],
+)
+def test_wrap_modes(wrap, at, same_as):
+    pixels = np.random.default_rng(4).random((16, 16, 3), np.float32)
+    pyramid = MipMap(Texture(pixels, (wrap, "clamp")))
+    footprint = np.full(1, 1 / 16, np.float32)
+    found, expected = (pyramid.sample(np.float32([[u, 0.4]]), footprint) for u in (at, same_as))
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.4, 5.0])
+def test_mapped_normals_are_unit_outward_and_lean_as_the_map_says(strength):
+    lean = np.float32([strength, 0, 1])
+    normals = np.tile(lean / np.linalg.norm(lean), (8, 8, 1)).astype(np.float32)
+    samples = sampled(flat_scene(Material("M", WHITE, normal_map=Texture(normals)), size=3.0))
+    normal = samples.surface.normal[samples.material == 0]
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
+    assert (normal[:, 2] > 0).all()
+    middle = normal[np.abs(samples.pixel[samples.material == 0].astype(int) - 24 * 64 - 32) < 3]
+    np.testing.assert_allclose(middle, np.tile(lean / np.linalg.norm(lean), (len(middle), 1)), atol=0.02)
+
+
+def test_rough_normal_map_keeps_frames_unit_and_on_the_outer_side():
+    rough = np.random.default_rng(5).normal(size=(16, 16, 3)).astype(np.float32)
+    ball = sphere("ball", [0, 0, 0], 1, 0, rings=12)
+    scene = scene_of(
+        ball,
+        camera=looking("c", [0, 0, 4], [0, 0, 0], 0.6),
+        materials=[Material("M", WHITE, normal_map=Texture(rough))],
+    )
+    samples = sampled(scene)
+    solid = samples.material == 0
+    normal, tangent = samples.surface.normal[solid], samples.surface.tangent[solid]
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
+    assert np.abs((normal * tangent).sum(axis=1)).max() < 1e-4
+    towards = scene.cameras[0].to_world[:3, 3] - samples.surface.position[solid]
+    assert ((normal * towards).sum(axis=1) > 0).all()
+
+
+def test_mesh_without_tangents_or_coordinates_has_frames_all_the_same():
+    bare = sphere("ball", [0, 0, 0], 1, 0, rings=8)
+    bare.tangents[:], bare.uvs[:] = 0, 0
+    scene = scene_of(
+        bare,
+        camera=looking("c", [0, 0, 4], [0, 0, 0], 0.6),
+        materials=[Material("M", WHITE, {"diffuse": checker()}, Texture(np.tile(np.float32([0, 0, 1]), (4, 4, 1))))],
+    )
+    samples = sampled(scene)
+    for v in (samples.surface.normal, samples.surface.tangent, samples.surface.diffuse):
+        assert np.isfinite(v).all()
+    np.testing.assert_allclose(np.linalg.norm(samples.surface.tangent, axis=1), 1, atol=1e-5)
+
+
+def test_back_faces_are_shaded_as_if_turned_round():
+    front = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    scene = scene_of(quad("back", front[::-1], 0), camera=looking("c", [0, 0, 3], [0, 0, 0], 0.5))
+    samples = sampled(scene)
+    solid = samples.material == 0
+    assert solid.sum() > 100
+    assert (samples.surface.normal[solid][:, 2] > 0.999).all()
+    assert (samples.surface.position[solid][:, 2] > 0).all()
+
+
+def test_empty_view_is_all_background():
+    scene = scene_of(sphere("ball", [0, 0, 0], 1, 0, rings=6), camera=looking("c", [0, 0, 4], [0, 0, 9], 0.6))
+    samples = sampled(scene)
+    assert len(samples.pixel) == SIZE[0] * SIZE[1]
+    assert (samples.material == BACKGROUND).all()
+    np.testing.assert_array_equal(samples.weight, 1)
