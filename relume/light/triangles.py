@@ -22,32 +22,38 @@ F64 = NDArray[np.float64]
 
 MIN_LIGHTS, MAX_LIGHTS = 8, 65_536
 
-# Agarwal 2003 use ΔΩ^(1/4) against shadow error; highlights also show the dim parts of the map, so a little of plain
-# solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md has the measurement).
-_SOLID_ANGLE_EXPONENT = 0.25
-_UNIFORM_SHARE = 1e-3
+# Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
+# here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
+_SOLID_ANGLE_EXPONENT = 0.4
+_UNIFORM_SHARE = 1e-2
+_TANGENT_COSINE = (
+    0.8  # triangles within 37° of their light are matched in its tangent plane; larger ones stay as they are
+)
 
 
 @dataclass(frozen=True)
 class TriangleLights:
-    """M spherical triangles that tile the sphere.
+    """M spherical triangles with the environment's light.
+
+    The sphere is tiled by a hierarchy of triangles. What is kept of a tile is the triangle with the same light, whose
+    mean direction and spread (first and second moments) are those of the light in the tile: the same tile where the
+    light is uniform, a smaller one around a lamp. Highlights then err in the third order of the tile's size instead
+    of the first (docs/adr/0011-moment-matched-lights.md).
 
     Attributes:
-        nodes: of each triangle its corners a, b, c and the midpoints of ab, bc, ca. (M, 6) int32
-        node_directions: unit. (3, num_nodes) float32
-        direction: mean direction of the light in the triangle; shadow rays go there. (M, 3) float32
-        power: radiance integrated over the triangle, W/m² per colour. (M, 3) float32
+        nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32
+        direction: mean direction of the light; shadow rays go there. (M, 3) float32
+        power: radiance integrated over the tile, per colour. (M, 3) float32
     """
 
-    nodes: NDArray[np.int32]
-    node_directions: F32
+    nodes: F32
     direction: F32
     power: F32
 
     @property
     def num_lights(self) -> int:
         """M."""
-        return len(self.nodes)
+        return int(self.nodes.shape[2])
 
 
 @nb.njit(nogil=True, cache=True)
@@ -75,6 +81,24 @@ def _split(texels, directions, corners, child_of):  # type: ignore[no-untyped-de
 
 def _unit(v: F64) -> F64:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
+
+
+def _tangent_frame(normal: F64) -> F64:
+    """Two unit vectors across a unit vector and across each other. (2, 3)"""
+    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = _unit(np.cross(normal, aside))
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _on_tangent_plane(directions: F64, normal: F64, frame: F64) -> F64:
+    """Gnomonic projection of directions (n, 3) onto the plane that touches the sphere at `normal`. (n, 2)"""
+    return np.asarray(directions @ frame.T / (directions @ normal)[:, None])
+
+
+def _power_of(moment: F64, exponent: float) -> F64:
+    """A symmetric positive 2 × 2 matrix to a power; a vanishing extent is held above rounding."""
+    values, vectors = np.linalg.eigh(moment)
+    return np.asarray((vectors * np.maximum(values, 1e-14) ** exponent) @ vectors.T)
 
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
@@ -119,10 +143,32 @@ class _Subdivision:
             self.vertices.append(_unit(self.vertices[a] + self.vertices[b]))
         return self.midpoints[key]
 
-    def nodes_of(self, face: tuple[int, int, int]) -> tuple[int, ...]:
-        """Corners and edge midpoints of a face."""
-        a, b, c = face
-        return a, b, c, self._midpoint(a, b), self._midpoint(b, c), self._midpoint(c, a)
+    def matched(self, face: tuple[int, int, int], texels: NDArray[np.int64]) -> tuple[F64, F64]:
+        """The triangle (3, 3) whose light, uniform, has the moments of a tile's, and the mean direction (3,)."""
+        corners = np.asarray([self.vertices[v] for v in face])
+        centroid = _unit(corners.mean(axis=0))
+        luminous = self.luminous[texels]
+        total = float(luminous.sum())
+        if total <= 0:
+            return corners, centroid
+        towards = luminous @ self.directions[texels]
+        if not towards.any():
+            return corners, centroid
+        mean = _unit(towards)
+        if float((corners @ mean).min()) < _TANGENT_COSINE:
+            return corners, mean
+        frame = _tangent_frame(mean)
+        position = _on_tangent_plane(self.directions[texels], mean, frame)
+        centre = luminous @ position / total
+        position -= centre
+        # a texel is no point: its own extent counts, as that of a square of its solid angle
+        extent = float(luminous @ self.solid_angles[texels]) / total / 12
+        spread = np.einsum("n,ni,nj->ij", luminous, position, position) / total + extent * np.eye(2)
+        corner = _on_tangent_plane(corners, mean, frame)
+        corner -= corner.mean(axis=0)
+        uniform = corner.T @ corner / 12  # second moment of a uniform triangle about its centroid
+        placed = corner @ _power_of(uniform, -0.5) @ _power_of(spread, 0.5) + centre
+        return _unit(mean + placed @ frame), mean
 
     def split_largest(self) -> bool:
         """Replace the leaf of largest metric by its four children; False where nothing is left to split."""
@@ -153,15 +199,11 @@ def subdivide(radiance: F32, num_lights: int) -> TriangleLights:
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
     leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together
-    nodes = np.array([tree.nodes_of(leaf[2]) for leaf in leaves], dtype=np.int32)
-    vertices = np.asarray(tree.vertices)
-    centroid = _unit(vertices[nodes[:, :3]].mean(axis=1))
-    power = np.array([tree.power[leaf[3]].sum(axis=0) for leaf in leaves])
-    direction = np.empty_like(centroid)
-    for m, leaf in enumerate(leaves):
-        towards = (tree.directions[leaf[3]] * tree.luminous[leaf[3], None]).sum(axis=0)
-        length = float(np.linalg.norm(towards))
-        direction[m] = towards / length if length > 0 else centroid[m]
+    matched = [tree.matched(leaf[2], leaf[3]) for leaf in leaves]
+    corners = np.array([corner for corner, _ in matched])
+    nodes = np.concatenate([corners, _unit(corners + np.roll(corners, -1, axis=1))], axis=1)
     return TriangleLights(
-        nodes, np.ascontiguousarray(vertices.T, np.float32), direction.astype(np.float32), power.astype(np.float32)
+        np.ascontiguousarray(nodes.transpose(2, 1, 0), np.float32),
+        np.array([direction for _, direction in matched], np.float32),
+        np.array([tree.power[leaf[3]].sum(axis=0) for leaf in leaves], np.float32),
     )

@@ -3,7 +3,7 @@
 The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
-    lights/nodes, node_directions, direction, power         relume.light.triangles.TriangleLights
+    lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular
     views/<k>/visibility                                     samples on surfaces only
@@ -99,7 +99,7 @@ class DirectMethod:
         """The visibility of each view; the arrays of the first stage are made by its tasks."""
         if stage == 0:
             return []
-        bits = (store.shape("lights/nodes")[0] + 7) // 8
+        bits = (store.shape("lights/power")[0] + 7) // 8
         return [
             ArraySpec(
                 f"views/{k}/visibility",
@@ -117,7 +117,7 @@ class DirectMethod:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
             lights = subdivide(scene.environment.radiance, recipe.num_lights)
-            names = ("nodes", "node_directions", "direction", "power")
+            names = ("nodes", "direction", "power")
             return Written({f"lights/{name}": getattr(lights, name) for name in names}, 0, 0.0)
         samples = sample_view(scene, self._geometry_of(scene), task.view, recipe.size)
         surface = samples.surface

@@ -65,5 +65,7 @@ def open_transfer(path: Path) -> Transfer:
             material_names=tuple(found["materials"]),
             views={view["name"]: open_view(store, k) for k, view in enumerate(found["views"])},
         )
-    except KeyError as error:
-        raise StoreError(f"the store says nothing about {error}; delete the bake and bake again") from error
+    except (KeyError, TypeError, IndexError) as error:
+        raise StoreError(
+            f"the store's description is not of this form ({error}); delete the bake, bake again"
+        ) from error

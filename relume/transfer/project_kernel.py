@@ -25,7 +25,6 @@ _QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that u
 _MAX_DEPTH = 3
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
-_OWN_NODES = np.arange(6).reshape(1, 6)
 _CULLED = np.float32(-1)
 
 
@@ -66,53 +65,48 @@ def _bend_of(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _node_angles(n, t, directions, kinds, scale, ox, oy, oz, local, gamma):  # type: ignore[no-untyped-def]
-    """Turn all nodes (3, N) into the frame of normal n and tangent t, and take their angles. Writes local, gamma."""
+def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
+    """Turn the nodes of the listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-    for v in range(directions.shape[1]):
-        x, y, z = directions[0, v], directions[1, v], directions[2, v]
-        local[0, v] = t[0] * x + t[1] * y + t[2] * z
-        local[1, v] = bx * x + by * y + bz * z
-        local[2, v] = n[0] * x + n[1] * y + n[2] * z
-    for k in range(kinds.shape[0]):
-        angles_into(kinds[k], scale[k], local[0], local[1], local[2], ox, oy, oz, gamma[k])
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _bends(gamma, nodes, light, support, begin, end, bend):  # type: ignore[no-untyped-def]
-    """The largest bend over all angles of each listed light, or `_CULLED` where a dormant curve is nothing all over it.
-
-    bend: (≥ end − begin,), written.
-    """
-    bend[: end - begin] = 0
-    for k in range(gamma.shape[0]):
-        g = gamma[k]
+    for node in range(6):
         for entry in range(begin, end):
             m = np.uint64(light[entry])
-            a, b, c, ab, bc, ca = (
-                g[nodes[m, 0]], g[nodes[m, 1]], g[nodes[m, 2]], g[nodes[m, 3]], g[nodes[m, 4]], g[nodes[m, 5]]
-            )  # fmt: skip
-            of_curve = _bend_of(a, b, c, ab, bc, ca)
-            # a pole may lie inside by as much as the corners are apart
-            low = min(a, min(b, min(c, min(ab, min(bc, ca)))))
-            high = max(a, max(b, max(c, max(ab, max(bc, ca)))))
-            if low - (high - low) > support[k]:
-                bend[entry - begin] = _CULLED
-            elif bend[entry - begin] >= 0:
-                bend[entry - begin] = max(bend[entry - begin], of_curve)
+            x, y, z = nodes[0, node, m], nodes[1, node, m], nodes[2, node, m]
+            local[0, node, entry - begin] = t[0] * x + t[1] * y + t[2] * z
+            local[1, node, entry - begin] = bx * x + by * y + bz * z
+            local[2, node, entry - begin] = n[0] * x + n[1] * y + n[2] * z
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _gather_linear(gamma, nodes, light, begin, end, bend, leaves, shares, of_entry, bent):  # type: ignore[no-untyped-def]
-    """Make a leaf of each listed light over which all angles are linear; list those that bend in `bent`.
+def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
+    """The largest bend over all angles of each light, or `_CULLED` where a dormant curve is nothing all over it.
+
+    gamma: angles at the nodes, in bands. (C, 6, ≥ num). bend: (≥ num,), written.
+    """
+    bend[:num] = 0
+    for k in range(gamma.shape[0]):
+        a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
+        limit = support[k]
+        for e in range(num):
+            of_curve = _bend_of(a[e], b[e], c[e], ab[e], bc[e], ca[e])
+            low = min(a[e], min(b[e], min(c[e], min(ab[e], min(bc[e], ca[e])))))
+            high = max(a[e], max(b[e], max(c[e], max(ab[e], max(bc[e], ca[e])))))
+            # a pole may lie inside by as much as the nodes are apart
+            is_nothing = low - (high - low) > limit or bend[e] < 0
+            bend[e] = _CULLED if is_nothing else max(bend[e], of_curve)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _gather_linear(gamma, num_entries, bend, leaves, shares, of_entry, bent):  # type: ignore[no-untyped-def]
+    """Make a leaf of each light over which all angles are linear; list those that bend in `bent`.
 
     Returns the number of both.
     """
     num = num_bent = 0
-    for entry in range(begin, end):
-        if bend[entry - begin] < 0:
+    for entry in range(num_entries):
+        if bend[entry] < 0:
             continue
-        if bend[entry - begin] <= 1:
+        if bend[entry] <= 1:
             of_entry[num] = entry
             num += 1
         else:
@@ -122,17 +116,17 @@ def _gather_linear(gamma, nodes, light, begin, end, bend, leaves, shares, of_ent
     for k in range(gamma.shape[0]):
         for corner in range(3):
             for n in range(num):
-                leaves[k, corner, n] = gamma[k, nodes[np.uint64(light[of_entry[n]]), corner]]
+                leaves[k, corner, n] = gamma[k, corner, of_entry[n]]
     return num, num_bent
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _quarter(gamma, nodes, m, share, leaves, shares, num):  # type: ignore[no-untyped-def]
-    """Append the four triangles that the midpoints of triangle m's edges make; returns the new number of leaves."""
+def _quarter(gamma, entry, share, leaves, shares, num):  # type: ignore[no-untyped-def]
+    """Append the four triangles that the midpoints of an entry's edges make; returns the new number of leaves."""
     for child in range(4):
         for k in range(gamma.shape[0]):
             for corner in range(3):
-                leaves[k, corner, num] = gamma[k, nodes[m, _CHILDREN[child, corner]]]
+                leaves[k, corner, num] = gamma[k, _CHILDREN[child, corner], entry]
         shares[num] = _QUARTER * share
         num += 1
     return num
@@ -140,18 +134,19 @@ def _quarter(gamma, nodes, m, share, leaves, shares, num):  # type: ignore[no-un
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, local, gamma, nodes, m, ox, oy, oz, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
+    kinds, scale, local, gamma, entry, ox, oy, oz, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
 ):
-    """Divide triangle m in four until its angles are linear, depth first (appendix A); chord areas share out the light.
+    """Divide an entry's triangle in four until its angles are linear, depth first (appendix A).
 
-    Appends to the corner angles of the leaves (C, 3, n) and their shares (n,); returns their new number.
+    Chord areas share out the light. Appends to the corner angles of the leaves (C, 3, n) and their shares (n,); returns
+    their new number.
     """
     num_curves = kinds.shape[0]
     for corner in range(3):
         for axis in range(3):
-            stack[0, corner, axis] = local[axis, nodes[m, corner]]
+            stack[0, corner, axis] = local[axis, corner, entry]
         for k in range(num_curves):
-            stack_gamma[0, k, corner] = gamma[k, nodes[m, corner]]
+            stack_gamma[0, k, corner] = gamma[k, corner, entry]
     depth[0] = 0
     top = 1
     while top > 0:
@@ -167,7 +162,7 @@ def _divide(  # type: ignore[no-untyped-def]
             dirs[3 + edge, 0], dirs[3 + edge, 1], dirs[3 + edge, 2] = x * inverse, y * inverse, z * inverse
         bend = np.float32(0)
         for k in range(num_curves):
-            g = own_gamma[k]
+            g = own_gamma[k, :, 0]
             for corner in range(3):
                 g[corner] = stack_gamma[top, k, corner]
             for node in range(3, 6):
@@ -175,11 +170,11 @@ def _divide(  # type: ignore[no-untyped-def]
             bend = max(bend, _bend_of(g[0], g[1], g[2], g[3], g[4], g[5]))
         share = _QUARTER**level
         if bend <= 1:
-            leaves[:, :, num] = own_gamma[:, :3]
+            leaves[:, :, num] = own_gamma[:, :3, 0]
             shares[num] = share
             num += 1
         elif bend <= _QUARTERED_BEND or level == _MAX_DEPTH - 1:
-            num = _quarter(own_gamma, _OWN_NODES, 0, share, leaves, shares, num)
+            num = _quarter(own_gamma, 0, share, leaves, shares, num)
         else:
             for child in range(4):
                 for corner in range(3):
@@ -187,7 +182,7 @@ def _divide(  # type: ignore[no-untyped-def]
                     for axis in range(3):
                         stack[top + child, corner, axis] = dirs[node, axis]
                     for k in range(num_curves):
-                        stack_gamma[top + child, k, corner] = own_gamma[k, node]
+                        stack_gamma[top + child, k, corner] = own_gamma[k, node, 0]
                 depth[top + child] = level + 1
             top += 4
     return num
@@ -242,7 +237,7 @@ def _deposit(corner, num_bands, num, weight, out):  # type: ignore[no-untyped-de
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spend(leaves, shares, num, num_bands, bands, is_gray, active, weight, out):  # type: ignore[no-untyped-def]
+def _spend(leaves, num, num_bands, bands, is_gray, active, weight, out):  # type: ignore[no-untyped-def]
     """Weigh the leaves by the dormant curves and share them out."""
     for k in range(leaves.shape[0]):
         if k != active:
@@ -258,10 +253,10 @@ def _spend(leaves, shares, num, num_bands, bands, is_gray, active, weight, out):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _weigh(power, light, shading, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
+def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
     """Light of each leaf: power · q cos θi · its share of the triangle. weight: (3, n), written."""
     for n in range(num):
-        entry = of_entry[n]
+        entry = begin + of_entry[n]
         m = np.uint64(light[entry])
         value = shading[entry] * shares[n]
         weight[0, n] = power[m, 0] * value
@@ -271,19 +266,19 @@ def _weigh(power, light, shading, of_entry, shares, num, weight):  # type: ignor
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
-    normal, tangent, first, light, shading, local_wo, node_directions, nodes, power,
+    normal, tangent, first, light, shading, local_wo, nodes, power,
     kinds, num_bands, bands, is_gray, support, active, start, stop, out,
 ):  # fmt: skip
     """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their visible lights.
 
     out: (points, J, 3) float32, added to.
     """
-    num_curves, num_nodes, num_lights = kinds.shape[0], node_directions.shape[1], nodes.shape[0]
+    num_curves, num_lights = kinds.shape[0], nodes.shape[2]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    local = np.empty((3, num_nodes), np.float32)
-    gamma = np.empty((num_curves, num_nodes), np.float32)
+    local = np.empty((3, 6, num_lights), np.float32)
+    gamma = np.empty((num_curves, 6, num_lights), np.float32)
     capacity = num_lights + 2 * 4**_MAX_DEPTH
     leaves = np.empty((num_curves, 3, capacity), np.float32)
     shares, of_entry = np.empty(capacity, np.float32), np.empty(capacity, np.int64)
@@ -291,7 +286,7 @@ def project_points(  # type: ignore[no-untyped-def]
     bent = np.empty(num_lights, np.int64)
     stack, depth = np.empty((3 * _MAX_DEPTH + 4, 3, 3), np.float32), np.empty(3 * _MAX_DEPTH + 4, np.int64)
     stack_gamma = np.empty((3 * _MAX_DEPTH + 4, num_curves, 3), np.float32)
-    dirs, own_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6), np.float32)
+    dirs, own_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6, 1), np.float32)
     one = np.float32(1)
     for p in range(start, stop):
         row = p - start
@@ -300,24 +295,29 @@ def project_points(  # type: ignore[no-untyped-def]
             continue
         ox, oy, oz = local_wo[0, begin], local_wo[1, begin], local_wo[2, begin]
         if num_curves > 0:
-            _node_angles(normal[p], tangent[p], node_directions, kinds, scale, ox, oy, oz, local, gamma)
-        _bends(gamma, nodes, light, support, begin, end, bend)
-        num, num_bent = _gather_linear(gamma, nodes, light, begin, end, bend, leaves, shares, of_entry, bent)
+            _turn_nodes(normal[p], tangent[p], nodes, light, begin, end, local)
+        for k in range(num_curves):
+            for node in range(6):
+                angles_into(
+                    kinds[k], scale[k], local[0, node, : end - begin], local[1, node, : end - begin],
+                    local[2, node, : end - begin], ox, oy, oz, gamma[k, node],
+                )  # fmt: skip
+        _bends(gamma, support, end - begin, bend)
+        num, num_bent = _gather_linear(gamma, end - begin, bend, leaves, shares, of_entry, bent)
         for b in range(num_bent):
             entry = bent[b]
-            m = np.uint64(light[entry])
             if num + 4**_MAX_DEPTH > capacity:
-                _weigh(power, light, shading, of_entry, shares, num, weight)
-                _spend(leaves, shares, num, num_bands, bands, is_gray, active, weight, out[row])
+                _weigh(power, light, shading, begin, of_entry, shares, num, weight)
+                _spend(leaves, num, num_bands, bands, is_gray, active, weight, out[row])
                 num = 0
             before = num
-            if bend[entry - begin] <= _QUARTERED_BEND:
-                num = _quarter(gamma, nodes, m, one, leaves, shares, num)
+            if bend[entry] <= _QUARTERED_BEND:
+                num = _quarter(gamma, entry, one, leaves, shares, num)
             else:
                 num = _divide(
-                    kinds, scale, local, gamma, nodes, m, ox, oy, oz,
+                    kinds, scale, local, gamma, entry, ox, oy, oz,
                     stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num,
                 )  # fmt: skip
             of_entry[before:num] = entry
-        _weigh(power, light, shading, of_entry, shares, num, weight)
-        _spend(leaves, shares, num, num_bands, bands, is_gray, active, weight, out[row])
+        _weigh(power, light, shading, begin, of_entry, shares, num, weight)
+        _spend(leaves, num, num_bands, bands, is_gray, active, weight, out[row])

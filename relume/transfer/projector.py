@@ -156,7 +156,6 @@ class Projector:
             self._light,
             shading,
             wo,
-            lights.node_directions,
             lights.nodes,
             self._power,
             c.kinds,

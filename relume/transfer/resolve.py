@@ -23,21 +23,22 @@ _TILES_A_RANGE = 4
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     """One pixel as 32 bits: three 9-bit mantissas, red lowest, and a 5-bit exponent they share."""
-    red = min(max(red, np.float32(0)), _LARGEST)
-    green = min(max(green, np.float32(0)), _LARGEST)
-    blue = min(max(blue, np.float32(0)), _LARGEST)
+    red = min(red, _LARGEST) if red > 0 else np.float32(0)  # not a number is no light
+    green = min(green, _LARGEST) if green > 0 else np.float32(0)
+    blue = min(blue, _LARGEST) if blue > 0 else np.float32(0)
     largest = max(red, max(green, blue))
     if not largest > 0:
         return np.uint32(0)
     _, exponent = math.frexp(largest)
     shared: Any = max(0, exponent + _BIAS)
     scale = np.float32(math.ldexp(1.0, _MANTISSA_BITS + _BIAS - shared))
-    if np.int64(largest * scale + np.float32(0.5)) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
+    if np.int64(np.float64(largest * scale) + 0.5) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
         shared += 1
         scale *= np.float32(0.5)
-    r = np.uint32(red * scale + np.float32(0.5))
-    g = np.uint32(green * scale + np.float32(0.5))
-    b = np.uint32(blue * scale + np.float32(0.5))
+    # in double: the largest float below a half, and a half, would be rounded to one
+    r = np.uint32(np.float64(red * scale) + 0.5)
+    g = np.uint32(np.float64(green * scale) + 0.5)
+    b = np.uint32(np.float64(blue * scale) + 0.5)
     return r | (g << np.uint32(9)) | (b << np.uint32(18)) | (np.uint32(shared) << np.uint32(27))
 
 

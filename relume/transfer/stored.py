@@ -12,10 +12,7 @@ from relume.transfer.projector import Receivers
 
 def read_lights(store: StoreReader) -> TriangleLights:
     """The light triangles of a store."""
-    nodes, directions, direction, power = (
-        store.read(f"lights/{name}") for name in ("nodes", "node_directions", "direction", "power")
-    )
-    return TriangleLights(nodes, directions, direction, power)
+    return TriangleLights(*(store.read(f"lights/{name}") for name in ("nodes", "direction", "power")))
 
 
 def read_receivers(store: StoreReader, k: int, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
