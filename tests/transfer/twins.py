@@ -1,0 +1,184 @@
+"""What the transfer kernels compute, in plain NumPy and float64: slow, exact where the kernels are not, and obvious."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.evaluate import angles_numpy
+from relume.brdf.registry import TERMS
+from relume.light.environment import texel_directions, texel_solid_angles
+from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.view import View
+
+
+def unit(v):
+    """Vectors of length one, along the last axis."""
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def make_receivers(count, num_lights, seed=0, horizon=0.15):
+    """Points with random frames and views that see every light above them."""
+    rng = np.random.default_rng(seed)
+    normal = unit(rng.normal(size=(count, 3)))
+    tangent = unit(np.cross(normal, rng.normal(size=(count, 3))))
+    wo = unit(rng.normal(size=(count, 3)))
+    facing = np.einsum("nc,nc->n", wo, normal)
+    wo = unit(wo + np.where(facing < horizon, horizon - facing + np.abs(facing), 0)[:, None] * normal)
+    visible = np.full((count, (num_lights + 7) // 8), 255, np.uint8)
+    return Receivers(*(np.ascontiguousarray(a, np.float32) for a in (normal, tangent, wo)), visible)
+
+
+def only_above(receivers, lights):
+    """The same receivers, lights below their horizon hidden."""
+    above = receivers.normal @ lights.direction.T > 0
+    visible = np.packbits(above, axis=1, bitorder="little")
+    return Receivers(receivers.normal, receivers.tangent, receivers.wo, visible)
+
+
+def frames(receivers):
+    """World to local: rows are tangent, bitangent, normal. (n, 3, 3)"""
+    normal, tangent = receivers.normal.astype(float), receivers.tangent.astype(float)
+    return np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+
+
+def visible_lights(receivers, num_lights):
+    """(n, M) bool"""
+    return np.unpackbits(receivers.visible, axis=1, bitorder="little")[:, :num_lights].astype(bool)
+
+
+def spherical_area(a, b, c):
+    """Solid angle of triangles of unit corners (..., 3) (van Oosterom and Strackee 1983)."""
+    volume = np.abs(np.einsum("...c,...c->...", a, np.cross(b, c)))
+    dots = 1 + sum(np.einsum("...c,...c->...", u, v) for u, v in ((a, b), (b, c), (c, a)))
+    return 2 * np.arctan2(volume, dots)
+
+
+def pieces(lights, depth):
+    """Each light triangle in 4^depth pieces: their middles (M, 4^depth, 3) and shares of its solid angle."""
+    corners = unit(lights.node_directions.T.astype(float))[lights.nodes[:, None, :3]]
+    for _ in range(depth):
+        a, b, c = np.moveaxis(corners, 2, 0)
+        ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
+        children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.concatenate([np.stack(child, axis=2) for child in children], axis=1)
+    area = spherical_area(*np.moveaxis(corners, 2, 0))
+    return unit(corners.mean(axis=2)), area / area.sum(axis=1, keepdims=True)
+
+
+def samples_of(term, lights, receivers, row, depth):
+    """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo."""
+    seen = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
+    frame = frames(receivers)[row]
+    wo = frame @ receivers.wo[row].astype(float)
+    wi = lights.direction[seen].astype(float) @ frame.T
+    shading = term.quotient(*wi.T, *(np.full(len(seen), o) for o in wo)) * wi[:, 2]
+    middles, shares = pieces(lights, depth)
+    return lights.power[seen].astype(float) * shading[:, None], shares[seen], middles[seen] @ frame.T, wo
+
+
+def project(term, bands, active, lights, receivers, depth=5):
+    """`Projector.project` of all receivers with the exact angle of every piece and the mean of curves' products.
+
+    Returns:
+        (n, J, 3) float64
+    """
+    num_bands = term.curve(active).num_bands if active else 1
+    out = np.zeros((len(receivers.normal), num_bands, 3))
+    for row in range(len(out)):
+        power, shares, wi, wo = samples_of(term, lights, receivers, row, depth)
+        weight = power[:, None, :] * shares[..., None]
+        band = np.zeros(shares.shape, int)
+        for curve in term.curves:
+            if curve.outgoing:
+                continue
+            of_curve = band_of(curve, wi, wo)
+            if curve.name == active:
+                band = of_curve
+            else:
+                weight = weight * np.moveaxis(bands[curve.name][:, of_curve], 0, -1)
+        np.add.at(out[row], band.ravel(), weight.reshape(-1, 3))
+    return out
+
+
+def band_of(curve, wi, wo):
+    """The band that the exact angle of each pair of directions falls in."""
+    gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape))
+    return np.minimum((gamma * curve.num_bands / (np.pi / 2)).astype(int), curve.num_bands - 1)
+
+
+def project_points(term, bands, lights, receivers):
+    """The environment as points: all power of a light at its direction, in the band its angle falls in. (n, 3)"""
+    out = np.zeros((len(receivers.normal), 3))
+    for row in range(len(out)):
+        power, _, _, wo = samples_of(term, lights, receivers, row, 0)
+        seen = visible_lights(receivers, lights.num_lights)[row]
+        wi = lights.direction[seen].astype(float) @ frames(receivers)[row].T
+        for curve in term.curves:
+            if not curve.outgoing:
+                power = power * bands[curve.name][:, band_of(curve, wi, wo)].T
+        out[row] = power.sum(axis=0)
+    return out
+
+
+def integrate_texels(document, radiance, receivers):
+    """The reflection integral of one term over all texels, nothing in the way, exact angles. (n, 3)"""
+    term = TERMS[document["model"]]
+    height, width, _ = radiance.shape
+    directions = texel_directions(height, width).reshape(-1, 3).astype(float)
+    power = (radiance * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
+    out = np.zeros((len(receivers.normal), 3))
+    for row, frame in enumerate(frames(receivers)):
+        wi, wo = directions @ frame.T, frame @ receivers.wo[row].astype(float)
+        above = wi[:, 2] > 0
+        wi = wi[above]
+        weight = power[above] * (term.quotient(*wi.T, *(np.full(len(wi), o) for o in wo)) * wi[:, 2])[:, None]
+        for curve in term.curves:
+            if not curve.outgoing:
+                gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape))
+                weight = weight * curve_values(document, curve, gamma).T
+        out[row] = weight.sum(axis=0)
+    return out
+
+
+def stream(transport, change, image):
+    """Image + T · Δc. transport (tiles, 3, J, samples), change (3, J), image (tiles, 3, samples)"""
+    return image + np.einsum("tcjs,cj->tcs", transport.astype(float), change)
+
+
+def radiance_of(transfer, view: View, look):
+    """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
+    out = np.zeros((view.num_view_samples, 3))
+    for index, name in enumerate(transfer.material_names):
+        rows = view.rows(index)
+        if rows.start == rows.stop:
+            continue
+        receivers = view.receivers(index)
+        for document in look.materials[name].terms:
+            term = TERMS[document["model"]]
+            bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
+            projector = Projector(term, contract(term, bands, None), transfer.lights, receivers)
+            image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
+            if document["texture"] is not None:
+                image *= view.textures[document["texture"]][rows]
+            for curve in term.curves:
+                if curve.outgoing:
+                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
+            out[rows] += image
+    out[view.num_surface_samples :] = view.background()
+    return look.environment.scale * out
+
+
+def resolve(view: View, radiance):
+    """Samples to pixels: the weighted sum of each pixel's. radiance (n, 3) -> (height, width, 3) float64"""
+    weight = np.empty(view.num_view_samples)
+    weight[view.order] = view.weight
+    out = np.zeros((view.width * view.height, 3))
+    np.add.at(out, view.pixel.astype(int), weight[:, None] * radiance)
+    return out.reshape(view.height, view.width, 3)
+
+
+def full_evaluation(transfer, view_name, look):
+    """The picture of a look, nothing incremental, frozen or cached. (height, width, 3) float64"""
+    view = transfer.views[view_name]
+    return resolve(view, radiance_of(transfer, view, look))
