@@ -30,6 +30,7 @@ from worker.progress import Progress
 from worker.status import TaskCost
 from worker.tasks import Job, run_task, scene_of
 
+SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
@@ -123,7 +124,7 @@ class BakeRunner:
         try:
             cost = future.result()
         except FutureCancelledError as error:  # nobody here cancels a task
-            raise RelumeError("the scheduler went away; start it, then bake again; finished parts are kept") from error
+            raise RelumeError(SCHEDULER_LOST) from error
         except Exception as error:
             if not _is_lost_process(error):
                 raise
@@ -165,6 +166,8 @@ class BakeRunner:
             return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):
             return " ".join(str(error).split())
+        if type(error).__name__ == "CommClosedError":  # submitting met a closed connection
+            return SCHEDULER_LOST
         if isinstance(error, MemoryError):
             return "out of memory; take fewer lights or a smaller size, then bake again; finished parts are kept"
         if isinstance(error, OSError):
