@@ -99,6 +99,7 @@ class TermImage:
         Where the image showed other dormant curves it is made anew from all coefficients.
         """
         others = [name for name in self.differing() if name != active]
+        known = self.active == active  # `shown` holds, also where only some coefficients have been moved
         self.active = active
         if self.effective is None or others:
             self.image[:] = 0
@@ -106,7 +107,7 @@ class TermImage:
             stream(frozen.transport, columns_of(self.shown), self.image)
             self.effective = dict(self.target)
             self.is_composed = False
-        else:
+        elif not known:
             self.shown = analysis(self.effective[active])
 
     def step(self, frozen: Frozen, max_coefficients: int | None) -> int:
@@ -122,7 +123,7 @@ class TermImage:
         if moved > budget:
             weight = np.abs(change) * frozen.importance
             change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
-            self.shown = self.shown + change
+            self.shown = np.where(change == 0, self.shown, perfect)  # a sum would leave a rest to move again
             self.effective = {**self.effective, self.active: np.full_like(perfect, np.nan)}  # shows no curve exactly
         else:
             self.shown = perfect
