@@ -65,6 +65,8 @@ class FrameLoop:
         self._curve_sent_for: dict[str, Any] | None = None
         self._cancel = threading.Event()
         self._freezing_for: frozenset[str] = frozenset()
+        self._is_refining = False
+        self._is_opening, self._num_frozen = True, 0
 
     @property
     def view(self) -> str:
@@ -72,8 +74,11 @@ class FrameLoop:
         return self._view
 
     def moved_on_to(self, curves: frozenset[str]) -> None:
-        """The user edits or opened these curves: a freeze for others is no longer wanted."""
-        if curves and self._freezing_for and curves.isdisjoint(self._freezing_for):
+        """The user edits or opened these curves: a freeze for others is no longer wanted.
+
+        Nor is one that only refines what the picture follows already: it begins again when the hand rests.
+        """
+        if self._is_refining or (curves and self._freezing_for and curves.isdisjoint(self._freezing_for)):
             self._cancel.set()
 
     def leave_view(self) -> None:
@@ -131,6 +136,7 @@ class FrameLoop:
         """Show another view from the beginning; the look stays."""
         self._picture = await self._work.long(self._library.make_picture, self._transfer, name)
         self._view = name
+        self._is_opening, self._num_frozen = True, 0
         self._all_tiles = self._lacking = frozenset(self._picture.all_tiles())
         if self._wishes.target is None:
             self._wishes.target = self._desk.target()
@@ -156,16 +162,15 @@ class FrameLoop:
         order = self._order(target)
         try:
             painted = await self._work.quick(paint, self._picture, order)
-            if painted.waiting is not None:
+            if painted.waiting is None or order.partial:
+                await self._deliver(order, painted)
+            else:
                 self._wishes.target = self._wishes.target or target
-                await self._send_curve(order.shown)
-                await self._freeze(painted.waiting)
-                return
+            await self._send_curve(order.shown)
+            if painted.waiting is not None:
+                await self._freeze(painted.waiting, is_refining=target is None and not self._is_opening)
         except RelumeError as error:
             await self._take_back(target, error)
-            return
-        await self._deliver(order, painted)
-        await self._send_curve(order.shown)
 
     def _order(self, target: Target | None) -> Order:
         wishes, view = self._wishes, self._transfer.views[self._view]
@@ -182,6 +187,7 @@ class FrameLoop:
             form=form,
             quality=wishes.quality,
             only_exact=target is None and is_early,
+            partial=self._is_opening and self._num_frozen > 0,
             frame=self._window.next_frame,
             view=self._view,
             size=(view.width, view.height),
@@ -198,6 +204,7 @@ class FrameLoop:
             self._lacking = self._lacking.union(painted.tiles)
             return
         self._lacking = self._all_tiles if order.form == "jpeg" else frozenset()
+        self._is_opening = self._is_opening and not painted.exact
         self._is_settled = painted.exact and (order.form == "rgb9e5" or self._wishes.form == "jpeg")
         await self._send_frame(painted.message, "picture", order.form)
         self._metrics.update.observe(painted.update_ms / 1e3)
@@ -227,22 +234,23 @@ class FrameLoop:
         self._desk.revert(self._shown)
         await self._work.quick(self._picture.set_look, self._shown.look)
 
-    async def _freeze(self, what: str) -> None:
+    async def _freeze(self, what: str, is_refining: bool) -> None:
         """Freeze in a thread and say how far it is; ends early when the user has moved on."""
         if self._wishes.view is not None or self._wishes.touch is not None:
             return  # moved on already
         self._cancel.clear()
-        self._freezing_for = self._wishes.focus
+        self._freezing_for, self._is_refining = self._wishes.focus, is_refining
         progress = [0.0]
         start_s = time.perf_counter()
         try:
             future = self._work.long(self._picture.freeze, lambda p: progress.__setitem__(0, p), self._cancel.is_set)
             await self._tell_until_done(future, what, progress)
         finally:
-            self._freezing_for = frozenset()
+            self._freezing_for, self._is_refining = frozenset(), False
         await self._wire.send(StatusMessage(state="ready", what=what, progress=progress[0]))
         error = future.exception()
         if error is None:
+            self._num_frozen += 1
             self._metrics.freeze.observe(time.perf_counter() - start_s)
         elif not isinstance(error, CancelledError):
             raise error

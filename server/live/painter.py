@@ -43,6 +43,7 @@ class Order:
         shown: the look that the frame will show.
         lacking: tiles that the client has not got in HDR, besides those that this step changes.
         only_exact: send nothing unless the step makes the picture exact.
+        partial: show what is there even where something must be frozen or shaded first: the picture is just opening.
     """
 
     target: Target | None
@@ -52,6 +53,7 @@ class Order:
     form: Format
     quality: int
     only_exact: bool
+    partial: bool
     frame: int
     view: str
     size: tuple[int, int]
@@ -62,7 +64,7 @@ class Painted:
     """What came of an order.
 
     Attributes:
-        waiting: what must be frozen first, or None; then nothing was updated.
+        waiting: what must be frozen before the picture can show its look, or None.
         tiles: what the step changed.
         message: the packed frame, or None where none is to be sent.
     """
@@ -81,13 +83,13 @@ def paint(picture: Picture, order: Order) -> Painted:
     if order.target is not None:
         picture.set_look(order.target.look)
     waiting = picture.waiting()
-    if waiting is not None:
+    if waiting is not None and not order.partial:
         return Painted(waiting)
     advance = picture.advance(order.max_coefficients)
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
     if order.only_exact and not advance.exact:
-        return Painted(None, advance.tiles, False, None, update_ms)
+        return Painted(waiting, advance.tiles, False, None, update_ms)
     width, height = order.size
     if order.form == "jpeg":
         tiles: list[Tile] = [(0, 0, width, height)]
@@ -110,7 +112,7 @@ def paint(picture: Picture, order: Order) -> Painted:
         kind="picture",
         ms=times(wait_ms, update_ms, encode_ms),
     )
-    return Painted(None, advance.tiles, advance.exact, pack(header, payload), update_ms, encode_ms)
+    return Painted(waiting, advance.tiles, advance.exact, pack(header, payload), update_ms, encode_ms)
 
 
 def _jpeg(picture: Picture, quality: int, display: Any) -> bytes:

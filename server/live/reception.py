@@ -111,7 +111,7 @@ class Reception:
     def _focus(self, curves: frozenset[str]) -> None:
         if curves:
             self._wishes.focus = curves
-            self._frame_loop.moved_on_to(curves)
+        self._frame_loop.moved_on_to(curves)
 
     def _check_view(self, name: str) -> None:
         if name not in self._transfer.views:
