@@ -1,0 +1,106 @@
+"""Sums over lights at one point, float64: the loops of the reference.
+
+They share nothing with the projector: directions, angles and curves are those of single texels, at full precision.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+
+from relume.brdf.term import Angle
+
+_THETA_I, _THETA_H, _THETA_D = int(Angle.THETA_I), int(Angle.THETA_H), int(Angle.THETA_D)
+_THETA_R, _ALPHA = int(Angle.THETA_R), int(Angle.ALPHA)
+
+
+@nb.njit(nogil=True, cache=True)
+def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: ignore[no-untyped-def]
+    """Directions of the lights that a point sees, in its frame x = tangent, y = n × t, z = n.
+
+    Args:
+        normal, tangent, wo: world space. (3,) float64. visible: bits. (bytes,) uint8. directions: (m, 3) float64
+        wi: (3, ≥ m), written. light: (≥ m,) int64, written.
+    Returns:
+        Number of lights, and wo in the frame, three floats.
+    """
+    bx = normal[1] * tangent[2] - normal[2] * tangent[1]
+    by = normal[2] * tangent[0] - normal[0] * tangent[2]
+    bz = normal[0] * tangent[1] - normal[1] * tangent[0]
+    num = 0
+    for m in range(directions.shape[0]):
+        if (visible[m >> 3] >> (m & 7)) & 1 == 0:
+            continue
+        x, y, z = directions[m, 0], directions[m, 1], directions[m, 2]
+        cosine = normal[0] * x + normal[1] * y + normal[2] * z
+        if cosine <= 0:  # float32 saw it a hair above the horizon
+            continue
+        wi[0, num] = tangent[0] * x + tangent[1] * y + tangent[2] * z
+        wi[1, num] = bx * x + by * y + bz * z
+        wi[2, num] = cosine
+        light[num] = m
+        num += 1
+    ox = tangent[0] * wo[0] + tangent[1] * wo[1] + tangent[2] * wo[2]
+    oy = bx * wo[0] + by * wo[1] + bz * wo[2]
+    oz = normal[0] * wo[0] + normal[1] * wo[1] + normal[2] * wo[2]
+    return num, ox, oy, oz
+
+
+@nb.njit(nogil=True, cache=True)
+def _angle(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """γ in radians, as `relume.brdf.evaluate.angles_numpy` defines it."""
+    if kind == _THETA_I:
+        return math.acos(min(max(iz, 0.0), 1.0))
+    if kind == _THETA_R:
+        return math.acos(min(max(iz * oz - ix * ox - iy * oy, 0.0), 1.0))
+    hx, hy, hz = ix + ox, iy + oy, iz + oz
+    length = max(math.sqrt(hx * hx + hy * hy + hz * hz), 1e-300)
+    if kind == _THETA_D:
+        return math.acos(min(max((hx * ix + hy * iy + hz * iz) / length, 0.0), 1.0))
+    cos_theta_h = min(max(hz / length, 0.0), 1.0)
+    if kind == _THETA_H:
+        return math.acos(cos_theta_h)
+    cos_phi_h = math.cos(math.atan2(hy, hx))
+    power = cos_phi_h * cos_phi_h if kind == _ALPHA else 1.0 - cos_phi_h * cos_phi_h
+    return math.acos(cos_theta_h**power)
+
+
+@nb.njit(nogil=True, cache=True)
+def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
+    """A table at a position in steps: linear between its entries, or constant up to the next one."""
+    step = min(int(position), table.shape[0] - 2)
+    if is_stepped:
+        return table[step]
+    upper = position - step
+    return (1.0 - upper) * table[step] + upper * table[step + 1]
+
+
+@nb.njit(nogil=True, cache=True)
+def add_lights(kinds, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
+    """Σ power · shading · Π curves over the listed lights, per channel, added to out (3,).
+
+    Args:
+        tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
+        is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
+        is_gray: the curve is the same in all channels. (C,) bool
+        shading: quotient · cos θi. (≥ num,) float64. power: (m, 3) float64
+    """
+    scale = (tables.shape[2] - 1) / (math.pi / 2)
+    red = green = blue = 0.0
+    for n in range(num):
+        r = g = b = shading[n]
+        if r == 0.0:
+            continue
+        for k in range(kinds.shape[0]):
+            position = _angle(kinds[k], wi[0, n], wi[1, n], wi[2, n], ox, oy, oz) * scale
+            value = _read(tables[k, 0], position, is_stepped[k, 0])
+            r *= value
+            g *= value if is_gray[k] else _read(tables[k, 1], position, is_stepped[k, 1])
+            b *= value if is_gray[k] else _read(tables[k, 2], position, is_stepped[k, 2])
+        red += r * power[light[n], 0]
+        green += g * power[light[n], 1]
+        blue += b * power[light[n], 2]
+    out[0] += red
+    out[1] += green
+    out[2] += blue

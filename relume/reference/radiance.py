@@ -1,0 +1,170 @@
+"""Outgoing radiance of points by brute force: R = Σ_texels V · L ΔΩ · f(ωi, ωo) cos θi, f the sum of a look's terms."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.bands import MAX_ANGLE
+from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Curve, Term
+from relume.errors import CancelledError
+from relume.parallel import for_ranges
+from relume.reference.kernel import add_lights, list_visible
+from relume.reference.texels import Texels
+from relume.trace.geometry import Geometry
+from relume.trace.visibility import trace_visibility
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Document = Mapping[str, Any]
+
+_STEPS = 1 << 16  # linear between them, the narrowest highlight (σ = 0.01) is off by less than 1e-6 of its peak
+_POINTS_A_PACKET = 16  # neighbours that Embree traces together; where texels are drawn, they share the draw
+_TEXELS_AT_ONCE = 8192
+_SEED = 2006
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points on surfaces, each seen from one direction; neighbours should be near each other.
+
+    Attributes:
+        position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
+        textures: what multiplies a term that names it, "diffuse" and "specular". (n, 3) float32 each
+    """
+
+    position: F32
+    normal: F32
+    tangent: F32
+    wo: F32
+    textures: Mapping[str, F32]
+
+    @property
+    def num_points(self) -> int:
+        """n."""
+        return len(self.position)
+
+    def rows(self, index: slice | NDArray[np.intp]) -> Points:
+        """Some of the points."""
+        textures = {name: values[index] for name, values in self.textures.items()}
+        return Points(self.position[index], self.normal[index], self.tangent[index], self.wo[index], textures)
+
+
+@dataclass(frozen=True)
+class _Tables:
+    """A term with the curves that depend on wi tabulated; see `relume.reference.kernel.add_lights`."""
+
+    document: Document
+    term: Term
+    kinds: NDArray[np.int64]
+    values: F64
+    is_stepped: NDArray[np.bool_]
+    is_gray: NDArray[np.bool_]
+
+
+def _tabulate(document: Document) -> _Tables:
+    term = TERMS[document["model"]]
+    curves = [curve for curve in term.curves if not curve.outgoing]
+    gamma = np.linspace(0.0, MAX_ANGLE, _STEPS + 1)
+    values = np.array([curve_values(document, curve, gamma) for curve in curves]).reshape(len(curves), 3, _STEPS + 1)
+    is_stepped = np.array([_stepped(document, curve) for curve in curves], np.bool_).reshape(-1, 3)
+    is_gray = np.array([bool(np.all(value == value[0])) for value in values], np.bool_)
+    return _Tables(
+        document, term, np.array([int(curve.angle) for curve in curves], np.int64), values, is_stepped, is_gray
+    )
+
+
+def _stepped(document: Document, curve: Curve) -> list[bool]:
+    """Per channel, whether the curve was given as bands: it jumps from one to the next, at entries of the table."""
+    stepped = [False] * 3
+    for drawn in drawn_curves(document, curve):
+        for channel in drawn.get("channels", CHANNELS):
+            stepped[CHANNELS.index(channel)] = "bands" in drawn
+    return stepped
+
+
+def reference_radiance(
+    geometry: Geometry,
+    texels: Texels,
+    points: Points,
+    materials: Sequence[Sequence[Document]],
+    spp: int = 0,
+    progress: Callable[[float], object] = lambda share: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> F64:
+    """Radiance of all points under several materials, which share their shadow rays.
+
+    Args:
+        materials: of each its terms, as they stand in a complete look.
+        spp: texels drawn by power for each point; 0, or as many as there are, for all of them.
+    Returns:
+        (materials, n, 3) float64
+    Raises:
+        CancelledError: `cancelled` said so.
+    Cost: O(n · min(spp, texels) · (log triangles + terms)) time; some MB of memory a thread.
+    """
+    tables = [[_tabulate(document) for document in terms] for terms in materials]
+    radiance = np.zeros((len(materials), points.num_points, 3))
+    lock, done = threading.Lock(), [0]
+
+    def packet(start: int, stop: int) -> None:
+        if cancelled():
+            raise CancelledError("the reference was cancelled")
+        lights = texels
+        if 0 < spp < texels.num_texels:
+            lights = texels.chosen(spp, np.random.default_rng((_SEED, start)))
+        some = points.rows(slice(start, stop))
+        for first in range(0, lights.num_texels, _TEXELS_AT_ONCE):
+            rows = slice(first, first + _TEXELS_AT_ONCE)
+            _add_texels(geometry, lights.direction[rows], lights.power[rows], some, tables, radiance[:, start:stop])
+        with lock:
+            done[0] += stop - start
+            progress(done[0] / points.num_points)
+
+    for_ranges(packet, points.num_points, _POINTS_A_PACKET)
+    return radiance
+
+
+def _add_texels(
+    geometry: Geometry, direction: F64, power: F64, points: Points, tables: Sequence[Sequence[_Tables]], out: F64
+) -> None:
+    """Add the light of some texels to a packet of points. out: (materials, points, 3)"""
+    towards = np.ascontiguousarray(direction, np.float32)
+    visible = trace_visibility(geometry.embree, points.position, points.normal, towards).visible
+    wi, light = np.empty((3, len(direction))), np.empty(len(direction), np.int64)
+    frames = np.stack([points.normal, points.tangent, points.wo], axis=1).astype(np.float64)
+    frames /= np.linalg.norm(frames, axis=2, keepdims=True)
+    for p, (normal, tangent, wo) in enumerate(frames):
+        num, ox, oy, oz = list_visible(normal, tangent, wo, visible[p], direction, wi, light)
+        if num == 0:
+            continue
+        x, y, z = wi[:, :num]
+        for m, terms in enumerate(tables):
+            for table in terms:
+                shading = table.term.quotient(x, y, z, ox, oy, oz) * z
+                total = np.zeros(3)
+                add_lights(
+                    table.kinds, table.values, table.is_stepped, table.is_gray,
+                    light, num, wi, ox, oy, oz, shading, power, total,
+                )  # fmt: skip
+                out[m, p] += total * _factor(table, points, p, oz)
+
+
+def _factor(table: _Tables, points: Points, p: int, cos_theta_o: float) -> F64:
+    """Colour, texture and curves of the outgoing angle. (3,)"""
+    factor = np.asarray(table.document["color"], np.float64)
+    channel = table.document.get("texture")
+    if channel is not None:
+        factor = factor * points.textures[channel][p]
+    theta_o = np.arccos(np.clip(np.array([cos_theta_o]), 0.0, 1.0))
+    for curve in table.term.curves:
+        if curve.outgoing:
+            factor = factor * curve_values(table.document, curve, theta_o)[:, 0]
+    return factor

@@ -1,0 +1,167 @@
+"""Brute force against closed forms, plain NumPy, its own statistics, and the frames that it is to judge."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
+
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.registry import TERMS
+from relume.errors import CancelledError, PlanError
+from relume.light.environment import texel_directions, texel_solid_angles, uv_to_direction
+from relume.look import default_look, validate
+from relume.reference import Points, reference_image, reference_radiance, texels_of
+from relume.scene.model import Environment
+from relume.store import bake_here
+from relume.trace.geometry import merge
+from relume.transfer.base import Recipe
+from relume.transfer.direct import DirectMethod
+from relume.transfer.opened import open_transfer
+from relume.transfer.render import render_image
+
+WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
+
+
+def relative_rmse(a, b):
+    return np.sqrt(np.mean(np.square(np.subtract(a, b, dtype=float)))) / np.sqrt(np.mean(np.square(b, dtype=float)))
+
+
+def image_of(scene, size, spp, **changes):
+    default = default_look(scene.materials)
+    return reference_image(scene, scene.cameras[0].name, validate(changes, default), size, spp)
+
+
+def test_white_ball_in_a_white_furnace_vanishes() -> None:
+    ball = sphere("ball", [0, 0, 0], 1.0, 0, rings=24)
+    scene = scene_of(ball, camera=looking("front", [0, 0, 4], [0, 0, 0], 0.6), environment=np.ones((64, 128, 3), "f"))
+    # a facet hides what lies between its own plane and the smooth normal's horizon
+    np.testing.assert_allclose(image_of(scene, (32, 32), 0), 1.0, rtol=0.01)
+
+
+def test_floor_under_one_texel_has_the_closed_form() -> None:
+    """R = L ΔΩ · albedo/π · cos θi, with a wall's shadow where the wall stands before the texel."""
+    radiance = np.zeros((16, 32, 3), np.float32)
+    radiance[4, 16] = [300.0, 200.0, 100.0]
+    wi = texel_directions(16, 32)[4, 16].astype(float)
+    wall = quad("wall", [[0.5, 0, 1], [0.5, 0, -1], [0.5, 1, -1], [0.5, 1, 1]], 0)
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
+    scene = scene_of(floor, wall, camera=looking("front", [0, 4, 0.01], [0, 0, 0], 0.1), environment=radiance)
+    points = Points(
+        position=np.array([[0.4, 1e-4, 0], [1.0, 1e-4, 0]], np.float32),
+        normal=np.array([[0, 1, 0]] * 2, np.float32),
+        tangent=np.array([[1, 0, 0]] * 2, np.float32),
+        wo=np.array([[0, 1, 0]] * 2, np.float32),
+        textures={},
+    )
+    found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[WHITE]])[0]
+    expected = radiance[4, 16] * texel_solid_angles(16, 32)[4] / np.pi * wi[1]
+    assert wi[:2].min() > 0.5
+    np.testing.assert_allclose(found, [np.zeros(3), expected], rtol=1e-6)
+
+
+DRAWN = {"theta_h": [{"points": [[0, 9.0], [20, 2.0], [90, 0.1]], "channels": "rg"}, {"bands": [0.5, 2.0] * 128}]}
+
+
+HALF_ANGLE = [name for name, term in TERMS.items() if "theta_h" in {curve.name for curve in term.curves}]
+
+
+@pytest.mark.parametrize(
+    ("model", "curves"), [*((name, {}) for name in TERMS), *((name, DRAWN) for name in HALF_ANGLE)]
+)
+def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) -> None:
+    rng = np.random.default_rng(3)
+    scene = scene_of(
+        quad("far", [[90, 0, 1], [91, 0, 1], [91, 0, 0], [90, 0, 0]], 0),
+        camera=looking("front", [0, 1, 0], [0, 0, 0.1], 0.1),
+        environment=rng.random((24, 48, 3), np.float32),
+    )
+    document = {"model": model, "color": [0.9, 0.5, 0.2], "params": {}, "curves": curves, "texture": "diffuse"}
+    wo = np.array([0.4, 0.8, 0.2]) / np.linalg.norm([0.4, 0.8, 0.2])
+    points = Points(
+        np.array([[0, 0.1, 0]], np.float32), np.array([[0, 1, 0]], np.float32), np.array([[0, 0, 1]], np.float32),
+        wo[None].astype(np.float32), {"diffuse": np.array([[1.0, 0.5, 0.25]], np.float32)},
+    )  # fmt: skip
+    found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[document]])[0, 0]
+    frame = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)  # rows: tangent, n × t, normal
+    u, v = np.meshgrid((np.arange(48) + 0.5) / 48, (np.arange(24) + 0.5) / 24)
+    wi = uv_to_direction(u, v) @ frame.T
+    light = scene.environment.radiance * texel_solid_angles(24, 48)[:, None, None]
+    value = eval_brdf(document, wi, frame @ wo) * np.maximum(wi[..., 2:], 0)
+    np.testing.assert_allclose(found, (value * light).sum(axis=(0, 1)) * [1.0, 0.5, 0.25], rtol=1e-4)
+
+
+def test_drawn_texels_estimate_all_of_them() -> None:
+    """The mean over packets with draws of their own lies within four standard errors, and the error falls."""
+    scene = still_life()
+    geometry, texels = merge(scene), texels_of(scene.environment)
+    count = 16 * 64  # one point again and again: packets differ by their draw alone
+    repeat = lambda row: np.repeat(np.array([row], np.float32), count, axis=0)  # noqa: E731
+    points = Points(repeat([0.6, 1e-3, 0.4]), repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8]), {})
+    terms = [WHITE, {**WHITE, "model": "cook_torrance", "params": {"sigma": 0.3}}]
+    truth = reference_radiance(geometry, texels, points.rows(slice(0, 1)), [terms])[0, 0]
+    spread = []
+    for spp in (32, 256):
+        means = reference_radiance(geometry, texels, points, [terms], spp)[0, ::16]
+        error = means.std(axis=0, ddof=1) / np.sqrt(len(means))
+        assert np.all(error > 0)
+        np.testing.assert_array_less(np.abs(means.mean(axis=0) - truth), 4 * error)
+        spread.append(means.std(axis=0).mean())
+    assert spread[1] < spread[0] / 2
+
+
+def test_same_seed_same_picture() -> None:
+    scene = still_life()
+    np.testing.assert_array_equal(image_of(scene, (24, 18), 40), image_of(scene, (24, 18), 40))
+
+
+def test_as_many_samples_as_texels_are_all_of_them() -> None:
+    scene = still_life()
+    np.testing.assert_array_equal(image_of(scene, (24, 18), 0), image_of(scene, (24, 18), 1 << 20))
+
+
+def test_rendered_frame_agrees(tmp_path: Path) -> None:
+    scene, size = still_life(), (48, 36)
+    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
+    default = default_look(scene.materials)
+    partial = {"environment": {"scale": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
+    frame = render_image(open_transfer(store), "front", validate(partial, default))
+    truth = image_of(scene, size, 0, **partial)
+    assert relative_rmse(frame, truth) < 0.005
+    assert frame.mean() == pytest.approx(truth.mean(), rel=0.002)
+
+
+def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
+    """Turning by one column is shifting the map by one: u falls where the map turns counter-clockwise from above."""
+    radiance = studio(16)
+    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    ball = sphere("ball", [0, 0.5, 0], 0.5, 0, rings=10)
+    turned = image_of(scene_of(ball, camera=camera, environment=radiance), (32, 24), 0, environment={"rotation": 90.0})
+    shifted = scene_of(ball, camera=camera, environment=np.roll(radiance, -8, axis=1))
+    np.testing.assert_allclose(turned, image_of(shifted, (32, 24), 0), rtol=2e-3, atol=1e-4)
+
+
+def test_it_can_be_cancelled_and_tells_how_far_it_is() -> None:
+    scene = still_life()
+    look = validate({}, default_look(scene.materials))
+    told: list[float] = []
+    reference_image(scene, "front", look, (24, 18), 10, told.append)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+    with pytest.raises(CancelledError):
+        reference_image(scene, "front", look, (24, 18), 10, cancelled=lambda: True)
+
+
+def test_what_a_bake_refuses_is_refused() -> None:
+    scene = still_life()
+    look = validate({}, default_look(scene.materials))
+    with pytest.raises(PlanError, match="no view"):
+        reference_image(scene, "nowhere", look, (24, 18), 10)
+    with pytest.raises(PlanError, match="pixels"):
+        reference_image(scene, "front", look, (100_000, 100_000), 10)
+
+
+def test_black_texels_are_left_out() -> None:
+    radiance = np.zeros((8, 16, 3), np.float32)
+    radiance[2, 3] = [0, 0, 1]
+    assert texels_of(Environment("one", radiance)).num_texels == 1
