@@ -31,7 +31,7 @@ class MaterialImage:
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
         """New targets; terms that stay as they are keep their images."""
-        if documents == self.documents:
+        if list(documents) == self.documents:
             return
         kept = len(self.terms)
         for k, document in enumerate(documents):
