@@ -1,7 +1,7 @@
 # The short way to everything. `make demo` and `make test` are all that most people need.
 #
 # Stamp files make reruns instant: what is installed is installed again only when its lock file changes,
-# and the editor is built again only when its sources change.
+# the editor is built again only when its sources change, and kernels are compiled again only when theirs do.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -13,6 +13,8 @@ PYTHON_STAMP := $(VENV)/.stamp-packages
 PROJECT_STAMP := $(VENV)/.stamp-project
 CLIENT_STAMP := client_web/node_modules/.stamp-packages
 CLIENT_BUILD := client_web/dist/index.html
+KERNEL_STAMP := $(VENV)/.stamp-kernels
+KERNEL_SOURCES := $(shell grep -rlE '^(import|from) numba' relume --include='*.py' 2>/dev/null) relume/warm.py
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
 
@@ -25,7 +27,7 @@ MARKERS := not slow$(if $(CHROMIUM),, and not e2e)
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
 
-setup: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## virtual environment, packages, the editor's build
+setup: $(PROJECT_STAMP) $(CLIENT_BUILD) $(KERNEL_STAMP)  ## virtual environment, packages, the editor's build
 
 demo: setup  ## bake the built-in scene, serve it, open the editor
 	$(BIN)/relume demo $(ARGS)
@@ -74,6 +76,11 @@ $(PYTHON_STAMP): requirements.lock
 
 $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
 	@$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(KERNEL_STAMP): $(PROJECT_STAMP) $(KERNEL_SOURCES)
+	@echo "Compiling kernels (once, about 30 s) …"
+	@$(BIN)/python -m relume.warm
 	@touch $@
 
 $(CLIENT_STAMP): client_web/package-lock.json

@@ -10,8 +10,10 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import tempfile
 import threading
+from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import Any
 
@@ -115,14 +117,28 @@ class Executors:
     def _start_cluster(self) -> Any:
         from distributed import LocalCluster
 
-        self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=self.num_workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            local_directory=tempfile.gettempdir(),
-            silence_logs=logging.ERROR,
-            env=ONE_THREAD,
-        )
+        with _without_interrupts():
+            self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=self.num_workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # None would take Dask's usual port, and warn where it is taken
+                local_directory=tempfile.gettempdir(),
+                silence_logs=logging.ERROR,
+                env=ONE_THREAD,
+            )
         return self._cluster
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Threads and processes started here never see SIGINT: a terminal's Ctrl-C is for us, who then stop them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
