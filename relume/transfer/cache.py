@@ -6,6 +6,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Protocol, TypeVar
+from weakref import WeakValueDictionary
 
 from relume.errors import MemoryBudgetError
 
@@ -28,7 +29,8 @@ class FrozenCache:
     def __init__(self, budget_bytes: int) -> None:
         self.budget_bytes = budget_bytes
         self._entries: OrderedDict[Hashable, Sized] = OrderedDict()
-        self._making: dict[Hashable, threading.Lock] = {}
+        # a lock lives as long as somebody makes or waits: all who want a key share one
+        self._making: WeakValueDictionary[Hashable, threading.Lock] = WeakValueDictionary()
         self._lock = threading.Lock()
         self._used = 0
 
@@ -57,13 +59,9 @@ class FrozenCache:
             )
         with self._lock:
             making = self._making.setdefault(key, threading.Lock())
-        try:
-            with making:
-                found = self.find(key, kind)
-                return found if found is not None else self._insert(key, num_bytes, make)
-        finally:
-            with self._lock:
-                self._making.pop(key, None)
+        with making:
+            found = self.find(key, kind)
+            return found if found is not None else self._insert(key, num_bytes, make)
 
     def _insert(self, key: Hashable, num_bytes: int, make: Callable[[], Entry]) -> Entry:
         with self._lock:

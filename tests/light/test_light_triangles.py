@@ -9,24 +9,37 @@ from tiny_scenes import studio
 from relume.color import luminance
 from relume.errors import PlanError
 from relume.light.environment import texel_directions, texel_solid_angles
-from relume.light.triangles import MAX_LIGHTS, subdivide
+from relume.light.triangles import MAX_LIGHTS, _Subdivision, subdivide
 
 
-def solid_angles(lights):
-    """Of each triangle, signed: positive counter-clockwise seen from outside (van Oosterom and Strackee 1983)."""
-    a, b, c = lights.node_directions.T.astype(float)[lights.nodes[:, :3]].transpose(1, 0, 2)
-    a, b, c = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b, c))
+def solid_angles(corners):
+    """Of triangles (M, 3, 3), signed: positive counter-clockwise seen from outside (van Oosterom, Strackee 1983)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
     volume = np.einsum("mc,mc->m", a, np.cross(b, c))
     dots = 1 + np.einsum("mc,mc->m", a, b) + np.einsum("mc,mc->m", b, c) + np.einsum("mc,mc->m", c, a)
     return 2 * np.arctan2(volume, dots)
 
 
-def depth_inside(lights, directions):
+def depth_inside(corners, directions):
     """How deep each direction lies in each triangle: the sine of its distance to the nearest edge. (n, M)"""
-    corners = lights.node_directions.T.astype(float)[lights.nodes[:, :3]]
     edges = np.cross(corners, np.roll(corners, -1, axis=1))
     edges /= np.linalg.norm(edges, axis=2, keepdims=True)
     return np.einsum("mec,nc->nme", edges, directions).min(axis=2)
+
+
+def corners_of(lights):
+    """(M, 3, 3) float64, unit"""
+    corners = lights.nodes.astype(float).transpose(2, 1, 0)[:, :3]
+    return corners / np.linalg.norm(corners, axis=2, keepdims=True)
+
+
+def tiles_of(radiance, num_lights):
+    """The tiles behind `subdivide`, in its order: corners (M, 3, 3) and the texels in each."""
+    tree = _Subdivision(radiance)
+    while len(tree.heap) + 3 <= num_lights and tree.split_largest():
+        pass
+    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])
+    return np.asarray(tree.vertices)[[leaf[2] for leaf in leaves]], [leaf[3] for leaf in leaves]
 
 
 def texel_power(radiance):
@@ -39,24 +52,66 @@ def lights(request):
     return subdivide(studio(), request.param)
 
 
-def test_triangles_tile_the_sphere(lights):
-    angles = solid_angles(lights)
+@pytest.mark.parametrize("num_lights", [8, 100, 1003])
+def test_tiles_tile_the_sphere(num_lights):
+    corners, _ = tiles_of(studio(), num_lights)
+    angles = solid_angles(corners)
     assert angles.min() > 0
-    assert angles.sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    assert angles.sum() == pytest.approx(4 * np.pi, rel=1e-9)
     directions = np.random.default_rng(1).normal(size=(3000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    depth = depth_inside(lights, directions)
-    assert (depth.max(axis=1) > -1e-6).all()
-    assert ((depth > 1e-6).sum(axis=1) <= 1).all()
+    depth = depth_inside(corners, directions)
+    assert (depth.max(axis=1) > -1e-9).all()
+    assert ((depth > 1e-9).sum(axis=1) <= 1).all()
 
 
 def test_nodes_are_unit_and_midpoints_of_their_edges(lights):
-    nodes = lights.node_directions.T.astype(float)
-    np.testing.assert_allclose(np.linalg.norm(nodes, axis=1), 1, atol=1e-6)
-    for edge, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
-        middle = nodes[lights.nodes[:, a]] + nodes[lights.nodes[:, b]]
-        middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-        np.testing.assert_allclose(nodes[lights.nodes[:, 3 + edge]], middle, atol=1e-6)
+    nodes = lights.nodes.astype(float).transpose(2, 1, 0)
+    np.testing.assert_allclose(np.linalg.norm(nodes, axis=2), 1, atol=1e-6)
+    middle = nodes[:, :3] + np.roll(nodes[:, :3], -1, axis=1)
+    middle /= np.linalg.norm(middle, axis=2, keepdims=True)
+    np.testing.assert_allclose(nodes[:, 3:], middle, atol=1e-6)
+    assert solid_angles(corners_of(lights)).min() > 0  # counter-clockwise
+
+
+@pytest.mark.parametrize("num_lights", [300, 1003])
+def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
+    """Mean direction, and spread in the plane that touches the sphere there, of each triangle, its light uniform."""
+    radiance = studio(64)
+    lights, (tiles, texels) = subdivide(radiance, num_lights), tiles_of(radiance, num_lights)
+    directions = texel_directions(64, 128).reshape(-1, 3).astype(float)
+    weight, extent = luminance(texel_power(radiance)), np.repeat(texel_solid_angles(64, 128), 128)
+    compared = 0
+    for m, (corners, inside) in enumerate(zip(corners_of(lights), texels, strict=True)):
+        if len(inside) == 0:
+            assert not lights.power[m].any()
+            continue
+        mean = weight[inside] @ directions[inside]
+        mean /= np.linalg.norm(mean)
+        np.testing.assert_allclose(lights.direction[m], mean, atol=1e-6)
+        if (tiles[m] @ mean).min() < 0.85:
+            continue  # too large for a plane: the tile itself
+        across = np.linalg.svd(mean[None])[2][1:]
+        at, corner = (d @ across.T / (d @ mean)[:, None] for d in (directions[inside], corners))
+        centre = weight[inside] @ at / weight[inside].sum()
+        off = at - centre
+        spread = (weight[inside] * off.T) @ off / weight[inside].sum()
+        spread += weight[inside] @ extent[inside] / weight[inside].sum() / 12 * np.eye(2)
+        middle = corner.mean(axis=0)
+        size = np.sqrt(np.trace(spread))
+        np.testing.assert_allclose(middle, centre, atol=1e-4 * size)
+        np.testing.assert_allclose((corner - middle).T @ (corner - middle) / 12, spread, atol=1e-3 * size**2)
+        compared += 1
+    assert compared > 0.8 * num_lights
+
+
+def test_where_light_is_uniform_triangles_are_their_tiles():
+    radiance = np.ones((256, 512, 3), np.float32)
+    found, (tiles, _) = corners_of(subdivide(radiance, 300)), tiles_of(radiance, 300)
+    angles = solid_angles(tiles)
+    np.testing.assert_allclose(solid_angles(found), angles, rtol=0.1)
+    assert solid_angles(found).sum() == pytest.approx(4 * np.pi, rel=0.02)
+    assert np.linalg.norm(found - tiles, axis=2).max() < 0.1 * np.sqrt(angles.max())
 
 
 def test_power_is_the_environments(lights):
@@ -69,7 +124,7 @@ def test_power_is_the_environments(lights):
 def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
     radiance = np.random.default_rng(2).random((38, 76, 3), np.float32)  # few texels lie on an edge
     lights = subdivide(radiance, num_lights)
-    depth = depth_inside(lights, texel_directions(38, 76).reshape(-1, 3).astype(float))
+    depth = depth_inside(tiles_of(radiance, num_lights)[0], texel_directions(38, 76).reshape(-1, 3).astype(float))
     owner, power = depth.argmax(axis=1), texel_power(radiance)
     on_edge = depth.max(axis=1) < 1e-6
     assert on_edge.mean() < 0.05
@@ -84,7 +139,7 @@ def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
 
 def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
     np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
-    depth = np.diagonal(depth_inside(lights, lights.direction.astype(float)))
+    depth = np.diagonal(depth_inside(corners_of(lights), lights.direction.astype(float)))
     assert (depth > -1e-6).all()
     radiance = studio()
     towards = (luminance(texel_power(radiance))[:, None] * texel_directions(32, 64).reshape(-1, 3)).sum(axis=0)
@@ -95,7 +150,7 @@ def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
 
 def test_same_environment_gives_the_same_triangles_bit_for_bit():
     one, two = subdivide(studio(), 300), subdivide(studio(), 300)
-    for name in ("nodes", "node_directions", "direction", "power"):
+    for name in ("nodes", "direction", "power"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
@@ -112,7 +167,7 @@ def test_small_triangles_lie_on_bright_spots(spot):
     radiance = np.full((64, 128, 3), 0.1, np.float32)
     radiance[y - 2 : y + 3, x - 2 : x + 2] = 500.0
     lights = subdivide(radiance, 500)
-    angles, mean = solid_angles(lights), 4 * np.pi / 500
+    angles, mean = solid_angles(tiles_of(radiance, 500)[0]), 4 * np.pi / 500
     bright = lights.power.sum(axis=1) / angles > 100
     assert bright.sum() >= 15  # of its twenty texels
     assert angles[bright].mean() < mean / 10
@@ -120,13 +175,13 @@ def test_small_triangles_lie_on_bright_spots(spot):
 
 
 def test_uniform_light_is_divided_evenly():
-    angles = solid_angles(subdivide(np.ones((64, 128, 3), np.float32), 512))
+    angles = solid_angles(tiles_of(np.ones((64, 128, 3), np.float32), 512)[0])
     assert angles.max() / angles.min() < 12  # one level apart, and an octahedron's children are not alike
 
 
 def test_black_environment_has_black_lights_all_over_the_sphere():
     lights = subdivide(np.zeros((8, 16, 3), np.float32), 200)
-    assert solid_angles(lights).sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    assert solid_angles(corners_of(lights)).sum() == pytest.approx(4 * np.pi, rel=1e-6)
     assert not lights.power.any()
     np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
 
@@ -137,7 +192,8 @@ def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
     lights = subdivide(radiance, 4000)
     assert lights.num_lights <= 4000
     assert np.isfinite(lights.direction).all()
-    assert solid_angles(lights).sum() == pytest.approx(4 * np.pi, rel=1e-6)
+    assert np.isfinite(lights.nodes).all()
+    assert solid_angles(tiles_of(radiance, 4000)[0]).sum() == pytest.approx(4 * np.pi, rel=1e-9)
     np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), texel_power(radiance).sum(axis=0), rtol=1e-6)
 
 

@@ -53,7 +53,7 @@ def test_sorted_by_material_then_along_the_picture(still):
 
 
 def test_edges_have_more_samples_and_smooth_places_one(still):
-    scene, samples = still
+    samples = still[1]
     count = np.bincount(samples.pixel, minlength=SIZE[0] * SIZE[1]).reshape(SIZE[1], SIZE[0])
     assert count.min() == 1
     assert 2 <= count.max() <= 8

@@ -155,7 +155,7 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     at = np.float64([far_away, 0, 0])
     plane = quad("plane", np.add([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], at), 0)
     directions = subdivide(studio(), 300).direction
-    camera = looking("c", at + [0, 1.5, 2.5], at, 0.6)
+    camera = looking("c", np.add(at, [0, 1.5, 2.5]), at, 0.6)
     scene = scene_of(plane, camera=camera)
     geometry = merge(scene)
     samples = sample_view(scene, geometry, "c", (64, 48))

@@ -137,7 +137,9 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
     wave = 3 + 2 * np.sin(np.linspace(0, 25, 156))
 
     def drawn(rise):
-        bands = curve_bands({"model": "cook_torrance", "params": {"sigma": 0.05}}, TERMS["cook_torrance"].curve("theta_h"))[0]
+        bands = curve_bands(
+            {"model": "cook_torrance", "params": {"sigma": 0.05}}, TERMS["cook_torrance"].curve("theta_h")
+        )[0]
         bands = bands.copy()
         bands[100:] += wave
         bands[131:133] += rise  # 19 coefficients

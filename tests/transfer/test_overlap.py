@@ -66,7 +66,7 @@ def test_share_rises_from_none_to_all():
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 17.25, 255.9])
 def test_triangle_at_one_angle_is_all_below_what_is_above_it(value):
-    low, middle, high, *factors = overlap_of(*np.float32([value] * 3))
+    low, _, high, *factors = overlap_of(*np.float32([value] * 3))
     assert np.isfinite(factors).all()
     assert low == high == np.float32(value)
     for corners in ([value] * 3, [value, value, value + 5e-5], [value, value + 5e-5, value + 5e-5]):

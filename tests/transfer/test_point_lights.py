@@ -5,8 +5,8 @@ triangle spreads it over the bands it overlaps. A ball of narrow highlight (cook
 sun, root mean square of the error relative to each pixel's own radiance (`python -m pytest -s` prints it):
 
     lights   triangles   points
-       500     0.055      0.81
-     1 000     0.022      0.29
+       500     0.04       0.6
+     1 000     0.02       0.25
 
 Most triangles are spent on the sun; where the sky is reflected their distance is wider than the highlight, and points
 leave gaps there. Points will do where the highlight is wider than that (the paper, section 5.1).

@@ -95,7 +95,9 @@ def packed(rgb):
 def test_kernel_packs_bit_for_bit_as_the_twin():
     rng = np.random.default_rng(2)
     random = np.exp(rng.uniform(-25, 14, (20_000, 1)) + rng.normal(size=(20_000, 3)))
-    halfway = np.ldexp(rng.integers(0, 1024, (5000, 3)) + 0.5, rng.integers(-30, 8, (5000, 1)))  # rounding to even or up
+    halfway = np.ldexp(
+        rng.integers(0, 1024, (5000, 3)) + 0.5, rng.integers(-30, 8, (5000, 1))
+    )  # rounding to even or up
     powers = np.ldexp(1.0, np.arange(-40, 20))[:, None] * [1.0, 0.5, 0.25]
     below = np.nextafter(powers.astype(np.float32), np.float32(0))
     for rgb in (random, halfway, powers, below, np.eye(3) * 0.9999, rng.integers(0, 70_000, (2000, 3))):
@@ -103,7 +105,23 @@ def test_kernel_packs_bit_for_bit_as_the_twin():
         np.testing.assert_array_equal(packed(rgb), rgb9e5_pack(rgb))
 
 
-HOSTILE = [0.0, -0.0, -1.0, -np.inf, np.inf, np.nan, 1e38, -1e38, 1e-45, 65408.0, 65409.0, 65535.0, 2.0**-24, 2.0**-25, 1.0]
+HOSTILE = [
+    0.0,
+    -0.0,
+    -1.0,
+    -np.inf,
+    np.inf,
+    np.nan,
+    1e38,
+    -1e38,
+    1e-45,
+    65408.0,
+    65409.0,
+    65535.0,
+    2.0**-24,
+    2.0**-25,
+    1.0,
+]
 
 
 def test_hostile_values_pack_as_the_twin_says_and_never_as_garbage():

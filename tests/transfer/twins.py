@@ -56,7 +56,7 @@ def spherical_area(a, b, c):
 
 def pieces(lights, depth):
     """Each light triangle in 4^depth pieces: their middles (M, 4^depth, 3) and shares of its solid angle."""
-    corners = unit(lights.node_directions.T.astype(float))[lights.nodes[:, None, :3]]
+    corners = unit(lights.nodes.astype(float).transpose(2, 1, 0))[:, None, :3]
     for _ in range(depth):
         a, b, c = np.moveaxis(corners, 2, 0)
         ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
