@@ -121,8 +121,8 @@ def project_points(term, bands, lights, receivers):
     return out
 
 
-def integrate_texels(document, radiance, receivers):
-    """The reflection integral of one term over all texels, nothing in the way, exact angles. (n, 3)"""
+def integrate_texels(document, radiance, receivers, seen=None):
+    """The reflection integral of one term over all texels at exact angles. seen: (n, texels) bool. (n, 3)"""
     term = TERMS[document["model"]]
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3).astype(float)
@@ -131,6 +131,8 @@ def integrate_texels(document, radiance, receivers):
     for row, frame in enumerate(frames(receivers)):
         wi, wo = directions @ frame.T, frame @ receivers.wo[row].astype(float)
         above = wi[:, 2] > 0
+        if seen is not None:
+            above &= seen[row]
         wi = wi[above]
         weight = power[above] * (term.quotient(*wi.T, *(np.full(len(wi), o) for o in wo)) * wi[:, 2])[:, None]
         for curve in term.curves:
