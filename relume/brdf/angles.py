@@ -16,6 +16,7 @@ from relume.brdf.term import Angle
 _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)
 _ZERO = np.float32(0)
+_LN2, _PER_LN2 = np.float32(math.log(2)), np.float32(1 / math.log(2))
 
 THETA_I = int(Angle.THETA_I)
 THETA_H = int(Angle.THETA_H)
@@ -42,6 +43,35 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
+    """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
+
+    Written with arithmetic only: calls of exp and log would keep the compiler from vectorising the loops around them.
+    """
+    # x = m · 2^e with m in [0.75, 1.5); ln m = 2 artanh((m − 1)/(m + 1)), whose series is exact where x is near one
+    bits = np.float32(x).view(np.int32)
+    halves = (bits - np.int32(0x3F400000)) >> np.int32(23)
+    m = np.int32(bits - (halves << np.int32(23))).view(np.float32)
+    s = (m - _ONE) / (m + _ONE)
+    s2 = s * s
+    series = _ONE + s2 * (
+        np.float32(1 / 3) + s2 * (np.float32(1 / 5) + s2 * (np.float32(1 / 7) + s2 * np.float32(1 / 9)))
+    )
+    y = exponent * (np.float32(halves) * _LN2 + np.float32(2) * s * series)
+    # e^y = 2^k e^r with |r| ≤ ln 2 / 2
+    y = max(y, np.float32(-80))
+    k = np.int32(y * _PER_LN2 - np.float32(0.5))
+    r = y - np.float32(k) * _LN2
+    e = np.float32(1 / 5040) * r + np.float32(1 / 720)
+    e = e * r + np.float32(1 / 120)
+    e = e * r + np.float32(1 / 24)
+    e = e * r + np.float32(1 / 6)
+    e = e * r + np.float32(1 / 2)
+    e = (e * r + _ONE) * r + _ONE
+    return e * np.int32((k + np.int32(127)) << np.int32(23)).view(np.float32)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions; `kind` is an `Angle`."""
     if kind == THETA_I:
@@ -63,7 +93,7 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     across = hx * hx + hy * hy
     cos2_phi_h = hx * hx / across if across > np.float32(1e-12) else np.float32(0.5)
     power = cos2_phi_h if kind == ALPHA else _ONE - cos2_phi_h
-    return acos_clamped(math.exp(power * math.log(cos_theta_h)))
+    return acos_clamped(power_below_one(cos_theta_h, power))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -76,13 +106,25 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
         ox, oy, oz: local wo, scalars.
         out: (n,) float32, written.
     """
-    # one loop for each frequent angle: only then does the compiler vectorise it
-    if kind == THETA_H:
+    # one loop for each angle: only then does the compiler vectorise it
+    if kind == THETA_I:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(THETA_I, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == THETA_H:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(THETA_H, ix[k], iy[k], iz[k], ox, oy, oz)
     elif kind == THETA_D:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(THETA_D, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == THETA_R:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(THETA_R, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == ALPHA:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(ALPHA, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == BETA:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(BETA, ix[k], iy[k], iz[k], ox, oy, oz)
     else:
         for k in range(ix.shape[0]):
-            out[k] = scale * angle_at(kind, ix[k], iy[k], iz[k], ox, oy, oz)
+            out[k] = scale * angle_at(THETA_O, ix[k], iy[k], iz[k], ox, oy, oz)
