@@ -99,16 +99,31 @@ def one_pixel(transport):
     return Frozen(columns, np.sqrt((columns**2).sum(axis=(0, 3))).astype(float))
 
 
+def lambert_of(*bands):
+    """A lambert term drawn by hand, the rest of its curve zero."""
+    curve = {"bands": [float(v) for v in bands] + [0.0] * (64 - len(bands))}
+    return {"model": "lambert", "color": [1, 1, 1], "params": {}, "curves": {"theta_i": curve}}
+
+
+def test_what_moves_the_picture_most_goes_first(monkeypatch):
+    """A small change of a coefficient that much light falls on before a large one that lights nothing."""
+    monkeypatch.setattr("relume.transfer.term_image.analysis", identity.analysis)
+    frozen, term = one_pixel([0.01, 100, 2]), TermImage(lambert_of(0), np.ones(1))
+    term.adopt(frozen, "theta_i")
+    term.set_document(lambert_of(50, 1, 10))
+    seen = []
+    while not term.is_exact():
+        term.step(frozen, 1)
+        seen.append(float(term.image[0, 0, 0]))
+    assert seen == pytest.approx([100, 120, 120.5])
+
+
 def test_didactic_example_of_table_2(monkeypatch):
     """One pixel, T = (3, 5, 2), one multiplication a frame; bands themselves as the basis, as in the paper."""
     monkeypatch.setattr("relume.transfer.term_image.analysis", identity.analysis)
     frozen = one_pixel([3, 5, 2])
 
-    def document(*c):
-        bands = [float(v) for v in c] + [0.0] * (64 - len(c))
-        return {"model": "lambert", "color": [1, 1, 1], "params": {}, "curves": {"theta_i": {"bands": bands}}}
-
-    term = TermImage(document(0, 0, 0), np.ones(1))
+    term = TermImage(lambert_of(0), np.ones(1))
     term.adopt(frozen, "theta_i")
     assert not term.image.any()
     session = [  # c_perfect, R_perfect, c_diff, R_effective, c_effective
@@ -118,7 +133,7 @@ def test_didactic_example_of_table_2(monkeypatch):
     ]
     non_linear, incremental = [], []
     for perfect, r_perfect, difference, r_effective, effective in session:
-        term.set_document(document(*perfect))
+        term.set_document(lambert_of(*perfect))
         np.testing.assert_array_equal(np.dot([3, 5, 2], perfect), r_perfect)
         np.testing.assert_array_equal(term.target["theta_i"][0, :3] - term.shown[0, :3], difference)
         term.step(frozen, 1)
