@@ -50,7 +50,7 @@ class Contraction:
         bands: padded with the last band. (C, max J, 3) float32
         is_gray: the curve is the same in all channels. (C,) bool
         support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
-        constant: product of the curves that are flat. (3,) float32
+        constant: product of the curves, where all are flat and none is listed. (3,) float32
         active: index of the free curve, -1 for none.
     """
 
@@ -74,6 +74,11 @@ def _support(bands: NDArray[np.float64]) -> float:
     return float(seen[-1] + 1) if len(seen) else 0.0
 
 
+def _is_flat(bands: NDArray[np.float64]) -> bool:
+    """Whether a curve (3, J) is the same everywhere, but for rounding."""
+    return bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
+
+
 def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
     """Make a term ready: curves of the outgoing angle are left out (they multiply the finished sample).
 
@@ -81,24 +86,19 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
         bands: of each curve by name. (3, J) float64
         active: the curve that stays free, None to contract all.
     """
-    kinds: list[int] = []
-    rows: list[NDArray[np.float64]] = []
-    free, constant = -1, np.ones(3)
-    for curve in term.curves:
-        if curve.outgoing:
-            continue
-        values = bands[curve.name]
-        if curve.name == active:
-            free = len(rows)
-        elif np.all(np.ptp(values, axis=1) <= _FLAT * np.abs(values[:, 0])):
-            constant *= values.mean(axis=1)
-            continue
-        kinds.append(int(curve.angle))
-        rows.append(values)
+    curves = [curve for curve in term.curves if not curve.outgoing]
+    constant = np.ones(3)
+    if active is None and all(_is_flat(bands[curve.name]) for curve in curves):
+        # nothing depends on an angle; with any other curve flat ones stay, for every angle decides where triangles are
+        # divided, and a curve that becomes flat must not change that
+        constant = np.prod([bands[curve.name].mean(axis=1) for curve in curves], axis=0)
+        curves = []
+    rows = [bands[curve.name] for curve in curves]
+    free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
     widest = max((row.shape[1] for row in rows), default=1)
     padded = [np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge") for row in rows]
     return Contraction(
-        np.array(kinds, np.int64),
+        np.array([int(curve.angle) for curve in curves], np.int64),
         np.array([row.shape[1] for row in rows], np.int64),
         np.ascontiguousarray(np.array(padded, np.float32).reshape(len(rows), 3, widest).transpose(0, 2, 1)),
         np.array([bool(np.all(row == row[0])) for row in rows], np.bool_),
