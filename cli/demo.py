@@ -35,7 +35,7 @@ def demo(
 
 def _bake(settings: Settings, browser: bool) -> None:
     """Queue the demo's bake for the server that is starting, and show here what the browser shows too."""
-    from cli.main import sentence
+    from cli.sentence import sentence
 
     try:
         identity = _queue_and_follow(settings, browser)

@@ -11,6 +11,7 @@ import typer
 from typer.exceptions import TyperException
 
 from cli import bake, bench, demo, import_scene, reference, render, serve, worker
+from cli.sentence import sentence
 
 app = typer.Typer(
     name="relume",
@@ -52,23 +53,6 @@ def main(arguments: Sequence[str]) -> int:
         typer.echo(f"relume: {sentence(error)}", err=True)
         return error.exit_code if isinstance(error, TyperException) else 1
     return result if isinstance(result, int) else 0
-
-
-def sentence(error: Exception) -> str:
-    """What went wrong, in one line."""
-    from relume.errors import RelumeError
-
-    if isinstance(error, TyperException):
-        text = error.format_message() or "nothing to do; see relume --help"
-    elif isinstance(error, RelumeError):
-        text = str(error)
-    elif isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    elif isinstance(error, MemoryError):
-        text = "out of memory; take a smaller size or fewer lights"
-    else:
-        text = f"{type(error).__name__}: {str(error) or 'a defect'}; --verbose shows the trace"
-    return " ".join(text.split())
 
 
 def run() -> None:
