@@ -1,0 +1,81 @@
+"""canvas.edit_to_pixels_ms: from the pointer's event to the frame on the canvas, in headless Chromium on this machine.
+
+The editor on the built-in scene at 640×480; the first slider of the teapot's second term is dragged. Both ends are on
+the browser's clock, taken by the editor itself (`window.relumeStats`): the input event, and the draw of the frame.
+The browser, its software rasteriser and the server share the cores.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from typing import Any
+from urllib.parse import urlencode
+
+from bench.figure import Figure, skipped
+from bench.house import House, baked_house, serving
+from bench.timing import percentiles
+from relume.scene.demo import demo_scene
+from relume.transfer.base import Recipe
+from server.settings import Settings
+
+_NAMES = ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+_ARGUMENTS = [
+    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]  # fmt: skip
+_READY_MS = 60_000
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, open the editor, drag."""
+    browser = next((path for name in _BROWSERS if (path := shutil.which(name))), None)
+    if browser is None:
+        return skipped(_NAMES, "ms", "there is no Chromium on this machine")
+    if not (Settings().client / "index.html").is_file():
+        return skipped(_NAMES, "ms", "the editor is not built; run make setup")
+    size, num_lights, num_moves = ((64, 48), 60, 5) if tiny else ((640, 480), 2000, 120)
+    recipe = Recipe("direct", ("front",), size, num_lights)
+    with baked_house(demo_scene(), recipe) as house, serving(house) as server:
+        latencies = _drag(browser, f"http://127.0.0.1:{server.port}/?{_place(house)}", num_moves)
+    p50, p95 = percentiles(latencies)
+    context = {"edits": len(latencies), "size": list(size), "max_ms": max(latencies), "browser": "headless Chromium"}
+    return [Figure(_NAMES[0], p50, "ms", context), Figure(_NAMES[1], p95, "ms", context)]
+
+
+def _place(house: House) -> str:
+    return urlencode({"scene": house.scene, "bake": house.bake, "view": "front", "material": "Teapot", "term": 1})
+
+
+def _drag(browser: str, url: str, num_moves: int) -> list[float]:
+    """Milliseconds of each edit that was drawn."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=browser, args=_ARGUMENTS)
+        page = chromium.new_page(viewport={"width": 1280, "height": 800})
+        page.goto(url)
+        slider = page.locator('[role="slider"]:visible').first
+        slider.wait_for(timeout=_READY_MS)
+        box: Any = slider.bounding_box()
+        y, middle = box["y"] + box["height"] / 2, box["x"] + box["width"] / 2
+        page.mouse.move(middle, y)
+        page.mouse.down()
+        _wait_until_drawn(page, lambda: page.mouse.move(middle + 3, y))  # freezes what this slider moves
+        before = page.evaluate("window.relumeStats.latencies.length")
+        for k in range(num_moves):
+            page.mouse.move(middle + 0.3 * box["width"] * math.sin(2 * math.pi * k / 60), y)
+            page.wait_for_timeout(1000 / 60)
+        page.wait_for_timeout(1000)
+        page.mouse.up()
+        latencies = page.evaluate("window.relumeStats.latencies.map((one) => one.drawnTime - one.inputTime)")
+        chromium.close()
+    return [float(ms) for ms in latencies[before:]]
+
+
+def _wait_until_drawn(page: Any, act: Any) -> None:
+    before = page.evaluate("window.relumeStats.latencies.length")
+    act()
+    page.wait_for_function(f"window.relumeStats.latencies.length > {before}", timeout=_READY_MS)
+    page.wait_for_timeout(2000)  # let it become exact

@@ -1,0 +1,73 @@
+"""View samples of a scene as points, all or a random subset, and the frame's own sums over them, without a store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.daubechies import analysis
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.light.triangles import TriangleLights, subdivide
+from relume.reference import Points
+from relume.reference.image import points_of
+from relume.scene.model import Scene
+from relume.trace.geometry import Geometry, merge
+from relume.trace.view_samples import BACKGROUND, sample_view
+from relume.trace.visibility import trace_visibility
+from relume.transfer.frozen import Frozen, freeze
+from relume.transfer.projector import Receivers
+from relume.transfer.stream import columns_of, stream
+
+
+@dataclass(frozen=True)
+class Lit:
+    """Points with the light triangles that they see."""
+
+    geometry: Geometry
+    points: Points
+    lights: TriangleLights
+    receivers: Receivers
+
+
+def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights: int, material: int | None) -> Lit:
+    """A random subset (fixed seed, order kept) of a view's samples on one material, or on all."""
+    geometry = merge(scene)
+    camera = scene.cameras[0]
+    samples = sample_view(scene, geometry, camera.name, size)
+    wanted = samples.material != BACKGROUND if material is None else samples.material == material
+    rows = np.nonzero(wanted)[0]
+    rng = np.random.default_rng(5)
+    chosen = np.sort(rng.permutation(rows)[:num_points])
+    points = points_of(samples, camera.to_world[:3, 3]).rows(chosen)
+    lights = subdivide(scene.environment.radiance, num_lights)
+    visible = trace_visibility(geometry.embree, points.position, points.normal, lights.direction).visible
+    return Lit(geometry, points, lights, Receivers(points.normal, points.tangent, points.wo, visible))
+
+
+def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
+    """The operator of one term along one curve."""
+    term = TERMS[document["model"]]
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+    return freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
+
+
+def frame_radiance(lit: Lit, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
+    """R = T · c of one term, as a frame computes it, times the term's colour. (n, 3)"""
+    frozen = freeze_along(lit, document, active)
+    tiles, _, _, samples = frozen.transport.shape
+    image = np.zeros((tiles, 3, samples), np.float32)
+    bands = curve_bands(document, TERMS[document["model"]].curve(active))
+    stream(frozen.transport, columns_of(analysis(bands)), image)
+    radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: lit.points.num_points]
+    return np.asarray(radiance.astype(np.float64) * np.asarray(document["color"]))
+
+
+def relative_rmse(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """√mean (a − b)² / √mean b²."""
+    difference = np.asarray(a, np.float64) - np.asarray(b, np.float64)
+    return float(np.sqrt(np.mean(difference**2)) / np.sqrt(np.mean(np.asarray(b, np.float64) ** 2)))

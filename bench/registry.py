@@ -1,0 +1,97 @@
+"""The list of benchmarks, and the loop that runs them. To add one: write its module and add a line here."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from bench.figure import Figure
+
+
+@dataclass(frozen=True)
+class Group:
+    """Figures that are measured together, by `measure(tiny)` of a module.
+
+    Attributes:
+        tiny: of `measure`: sizes that end in seconds and mean nothing, for the tests.
+    """
+
+    module: str
+    names: tuple[str, ...]
+
+    def measure(self, tiny: bool) -> list[Figure]:
+        """Run it; a failure is a figure without a value."""
+        began = time.perf_counter()
+        try:
+            figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
+        except Exception as error:  # the other groups shall be measured
+            traceback.print_exc()
+            return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
+        seconds = round(time.perf_counter() - began, 1)
+        return [Figure(f.name, f.value, f.unit, {**f.context, "measured_in_s": seconds}) for f in figures]
+
+
+GROUPS = (
+    Group("bench.bandwidth", ("frame.bandwidth_ratio",)),
+    Group("bench.incremental", ("frame.incremental_rmse",)),
+    Group("bench.curve_switch", ("freeze.curve_switch_s",)),
+    Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
+    Group("bench.rays", ("bake.rays_vs_embreex",)),
+    Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
+    Group("bench.store_size", ("store.bytes_per_view_sample",)),
+    Group("bench.workers", ("bake.two_workers_speedup",)),
+    Group("bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
+    Group("bench.demo", ("demo.bake_s", "demo.first_picture_s")),
+    Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
+    Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
+)
+
+
+def names() -> list[str]:
+    """All figures, in the order they are measured."""
+    return [name for group in GROUPS for name in group.names]
+
+
+def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
+    """Measure the groups that have a figure whose name starts with `prefix`; yields those figures."""
+    for group in GROUPS:
+        wanted = [name for name in group.names if name.startswith(prefix)]
+        if wanted:
+            yield from (figure for figure in group.measure(tiny) if figure.name in wanted)
+
+
+def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
+    """Measure and print; 1 where something failed or nothing has such a name."""
+    if not any(name.startswith(prefix) for name in names()):
+        print(f"relume: no benchmark starts with {prefix!r}; there are {', '.join(names())}", file=sys.stderr)
+        return 1
+    figures = []
+    for figure in measure(prefix, tiny):
+        figures.append(figure)
+        print(_line(figure), file=sys.stderr if as_json else sys.stdout, flush=True)
+    if as_json:
+        print(json.dumps([_plain(asdict(figure)) for figure in figures], indent=1, allow_nan=False))
+    return 1 if any("failed" in figure.context for figure in figures) else 0
+
+
+def _line(figure: Figure) -> str:
+    if figure.value is None:
+        return f"{figure.name:<32} -  {figure.context.get('skipped') or figure.context.get('failed')}"
+    return f"{figure.name:<32} {figure.value:.4g} {figure.unit}"
+
+
+def _plain(value: Any) -> Any:
+    """Numbers short enough to read, NumPy's as Python's."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -1,0 +1,75 @@
+"""Scenes for measuring: a teapot on a table, and environments, real ones where they are at hand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.light.environment import read_environment
+from relume.scene.archive import make_scene
+from relume.scene.demo.still_life import look_at
+from relume.scene.demo.studio import studio
+from relume.scene.demo.surfaces import Surface
+from relume.scene.demo.teapot import teapot
+from relume.scene.model import Environment, Material, Scene
+
+REAL = ("debevec_grace_latlong", "debevec_stpeters_latlong", "polyhaven_venice_sunset_1k")
+Terms = tuple[Mapping[str, Any], ...]
+
+LAMBERT: dict[str, Any] = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
+
+
+def cook_torrance(sigma: float) -> dict[str, Any]:
+    """A bright rough conductor-like highlight; the same in all channels."""
+    return {"model": "cook_torrance", "color": [1.0, 1.0, 1.0], "params": {"sigma": sigma, "ior": 1.5}}
+
+
+def shared_data() -> Path:
+    """Folder of real data beside the checkout, or where RELUME_SHARED_DATA says; it may not exist."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    return Path(os.environ.get("RELUME_SHARED_DATA", beside))
+
+
+def environments() -> list[Environment]:
+    """Three real maps, or the studio and two skies made by code where they are not there."""
+    paths = [shared_data() / "envmaps" / f"{name}.hdr" for name in REAL]
+    if all(path.is_file() for path in paths):
+        return [read_environment(path, path.stem) for path in paths]
+    return [studio(), _sky("high sun (made by code)", 0.8), _sky("low sun (made by code)", 0.15)]
+
+
+def _sky(name: str, height: float) -> Environment:
+    from relume.light.environment import texel_directions
+
+    d = texel_directions(256, 512)
+    sun = np.array([0.6, height, 0.5]) / np.linalg.norm([0.6, height, 0.5])
+    glow = np.exp((d @ sun - 1) / 0.0004)[..., None] * [4000.0, 3500.0, 2600.0]
+    sky = np.where(d[..., 1:2] > 0, 0.4 + 0.6 * d[..., 1:2], 0.1) * [0.5, 0.7, 1.0]
+    return Environment(name, (sky + glow).astype(np.float32))
+
+
+def teapot_on_table(environment: Environment, pot: Terms, table: Terms, eye_distance: float = 1.0) -> Scene:
+    """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square pictures frame the pot.
+
+    Args:
+        pot, table: terms of the two materials, "Teapot" and "Table".
+        eye_distance: 1 for a pot that covers about a third of the picture.
+    """
+    pot_surface = teapot(12, 0.16)
+    corners = np.array([[-1.5, 0, 1.5], [1.5, 0, 1.5], [1.5, 0, -1.5], [-1.5, 0, -1.5]], float)
+    flat = Surface(
+        corners - [0, 2e-4, 0],
+        np.tile([0.0, 1.0, 0.0], (4, 1)),
+        np.tile([1.0, 0.0, 0.0], (4, 1)),
+        corners[:, [0, 2]],
+        np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    x, y, z = np.array([0.10, 0.26, 0.62]) * eye_distance
+    camera = look_at("front", (x, y, z), (0.0, 0.07, 0.0), float(np.radians(28.0)))
+    materials = (Material("Teapot", tuple(map(dict, pot))), Material("Table", tuple(map(dict, table))))
+    meshes = (pot_surface.mesh("Teapot", 0), flat.mesh("Table", 1))
+    return make_scene("Teapot on a table", meshes, materials, (camera,), environment)
