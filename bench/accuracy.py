@@ -2,17 +2,23 @@
 
 Frame: 4,000 light triangles, one shadow ray each, T · c along the curve that a user drags. Truth:
 `relume.reference.reference_radiance`, every texel of the map with a shadow ray of its own, at the same view samples.
+The context also has the error where nothing casts a shadow: what is left of it there is not the shadow rays' fault.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from bench.figure import Figure
-from bench.points import frame_radiance, lit_points, relative_rmse
+from bench.points import Lit, frame_radiance, lit_points, relative_rmse
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
 from relume.look.terms import complete_term
 from relume.reference import reference_radiance, texels_of
+from relume.trace.embree import EmbreeScene
+from relume.trace.visibility import trace_visibility
 
 _CASES: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("accuracy.lambert", LAMBERT, "theta_i"),
@@ -29,11 +35,23 @@ def measure(tiny: bool) -> list[Figure]:
     for environment in environments()[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
         lit = lit_points(scene, (320, 320), num_points, num_lights, None)
-        terms = [[documents[name]] for name, _, _ in _CASES]
-        truth = reference_radiance(lit.geometry, texels_of(environment), lit.points, terms, 500 if tiny else 0)
-        for (name, _, curve), right in zip(_CASES, truth, strict=True):
-            errors[name][environment.name] = relative_rmse(frame_radiance(lit, documents[name], curve), right)
+        texels, spp = texels_of(environment), 500 if tiny else 0
+        for label, of in ((environment.name, lit), (f"{environment.name} without shadows", _without_shadows(lit))):
+            terms = [[documents[name]] for name, _, _ in _CASES]
+            truth = reference_radiance(of.geometry, texels, of.points, terms, spp)
+            for (name, _, curve), right in zip(_CASES, truth, strict=True):
+                errors[name][label] = relative_rmse(frame_radiance(of, documents[name], curve), right)
     context = {"view_samples": num_points, "lights": num_lights}
     return [
-        Figure(name, max(of_maps.values()), "relative RMSE", {**context, **of_maps}) for name, of_maps in errors.items()
+        Figure(name, max(found[map_] for map_ in found if "without" not in map_), "relative RMSE", {**context, **found})
+        for name, found in errors.items()
     ]
+
+
+def _without_shadows(lit: Lit) -> Lit:
+    """The same points with nothing near them."""
+    corners = np.array([[1e6, 1e6, 1e6], [1e6 + 1, 1e6, 1e6], [1e6, 1e6 + 1, 1e6]], np.float32)
+    geometry = replace(lit.geometry, embree=EmbreeScene.build(corners, np.array([[0, 1, 2]], np.uint32)))
+    points = lit.points
+    visible = trace_visibility(geometry.embree, points.position, points.normal, lit.lights.direction).visible
+    return replace(lit, geometry=geometry, receivers=replace(lit.receivers, visible=visible))

@@ -1,0 +1,84 @@
+"""Writes figures into docs/performance.md and docs/accuracy.md: `relume bench --json | python -m bench.table`.
+
+A table stands between two marks; its rows are kept by name, so that a run of a few figures leaves the others.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+BEGIN, END = "<!-- figures: relume bench --json | python -m bench.table -->", "<!-- end of figures -->"
+HEAD = ["| figure | value | target | how it came about |", "|---|---|---|---|"]
+
+TARGETS = {
+    "frame.bandwidth_ratio": "≥ 0.8",
+    "frame.incremental_rmse": "≤ 1e-4",
+    "freeze.curve_switch_s": "≤ 1 s",
+    "session.edit_to_socket_ms.p50": "≤ 10 ms",
+    "session.edit_to_socket_ms.p95": "≤ 20 ms",
+    "canvas.edit_to_pixels_ms.p50": "≤ 33 ms",
+    "canvas.edit_to_pixels_ms.p95": "≤ 60 ms",
+    "accuracy.lambert": "≤ 0.5 %",
+    "accuracy.cook_torrance_0.2": "≤ 0.8 %",
+    "accuracy.cook_torrance_0.05": "≤ 4 %",
+    "peer.mitsuba_time_ratio": "≥ 1000",
+    "bake.rays_vs_embreex": "≥ 3",
+    "bake.wall_vs_rays": "≤ 1.3",
+    "bake.two_workers_speedup": "≥ 1.8",
+    "store.bytes_per_view_sample": "≤ 600",
+    "demo.bake_s": "≤ 30 s",
+    "demo.first_picture_s": "≤ 10 s",
+}
+
+
+def document_of(name: str) -> str:
+    """Which document a figure belongs to."""
+    return "accuracy.md" if name.startswith("accuracy.") or name == "frame.incremental_rmse" else "performance.md"
+
+
+def row(figure: dict[str, Any]) -> str:
+    """One line of a table."""
+    context = figure["context"]
+    if figure["value"] is None:
+        value = "not measured"
+    elif figure["unit"] == "relative RMSE" and figure["value"] > 1e-3:
+        value = f"{100 * figure['value']:.2f} %"
+    else:
+        value = f"{figure['value']:.3g} {figure['unit'].replace('ratio', '×')}"
+    said = "; ".join(f"{key} {_short(item)}" for key, item in context.items() if key not in ("their_steps",))
+    return f"| `{figure['name']}` | {value} | {TARGETS.get(figure['name'], '')} | {said.replace('|', '/')} |"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
+    return "×".join(map(_short, value)) if isinstance(value, list) else str(value)
+
+
+def filled(text: str, figures: list[dict[str, Any]]) -> str:
+    """A document with new rows in its table. Raises ValueError where it has no marks."""
+    before, _, rest = text.partition(BEGIN)
+    table, mark, after = rest.partition(END)
+    if not mark:
+        raise ValueError("the document has no table of figures; put the two marks of bench/table.py into it")
+    rows = {line.split("`")[1]: line for line in table.splitlines() if line.startswith("| `")}
+    rows |= {figure["name"]: row(figure) for figure in figures}
+    return "\n".join([before + BEGIN, *HEAD, *(rows[name] for name in sorted(rows)), END]) + after
+
+
+def main() -> int:
+    """Read the JSON list from standard input and write both documents."""
+    figures = json.load(sys.stdin)
+    for name in ("performance.md", "accuracy.md"):
+        path = DOCS / name
+        mine = [figure for figure in figures if document_of(figure["name"]) == name]
+        path.write_text(filled(path.read_text(), mine))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""The benchmarks run in a size that means nothing, and say what they must in its form. No time is asserted."""
+
+import json
+import math
+import re
+
+import pytest
+
+from bench import registry, table
+from bench.figure import Figure
+
+FIXED_NAMES = {
+    "frame.bandwidth_ratio", "frame.incremental_rmse", "session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95",
+    "canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95", "freeze.curve_switch_s", "accuracy.lambert",
+    "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05", "peer.mitsuba_time_ratio", "bake.rays_vs_embreex",
+    "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "store.bytes_per_view_sample",
+}  # fmt: skip
+IN_PROCESS = [
+    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rays", "bench.bake",
+    "bench.store_size",
+]  # fmt: skip
+WITH_PROCESSES = ["bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba"]
+
+
+def group_of(module: str) -> registry.Group:
+    return next(group for group in registry.GROUPS if group.module == module)
+
+
+def check(group: registry.Group) -> None:
+    figures = group.measure(tiny=True)
+    assert [figure.name for figure in figures] == list(group.names)
+    for figure in figures:
+        assert "failed" not in figure.context, figure.context
+        if figure.value is None:
+            assert figure.context["skipped"]
+        else:
+            assert math.isfinite(figure.value)
+            assert figure.value >= 0
+            assert figure.unit
+        assert figure.context
+
+
+def test_names_are_those_that_scripts_know() -> None:
+    assert set(registry.names()) >= FIXED_NAMES
+    assert len(registry.names()) == len(set(registry.names()))
+    assert {group.module for group in registry.GROUPS} == {*IN_PROCESS, *WITH_PROCESSES}
+
+
+@pytest.mark.parametrize("module", IN_PROCESS)
+def test_benchmark_runs_small(module: str) -> None:
+    check(group_of(module))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", WITH_PROCESSES)
+def test_benchmark_with_processes_runs_small(module: str) -> None:
+    check(group_of(module))
+
+
+def test_json_is_a_list_of_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    assert registry.run("frame.bandwidth", as_json=True, tiny=True) == 0
+    (figure,) = json.loads(capsys.readouterr().out)
+    assert set(figure) == {"name", "value", "unit", "context"}
+    assert figure["name"] == "frame.bandwidth_ratio"
+    assert figure["context"]["threads"] >= 1
+
+
+def test_unknown_name_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert registry.run("nothing", as_json=True) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert re.fullmatch(r"relume: no benchmark starts with 'nothing'.*frame\.bandwidth_ratio.*\n", said.err)
+
+
+def test_failure_is_a_figure_and_the_others_go_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = registry.Group("bench.nowhere", ("frame.broken",))
+    monkeypatch.setattr(registry, "GROUPS", (broken, group_of("bench.bandwidth")))
+    assert registry.run("frame", as_json=True, tiny=True) == 1
+    first, second = json.loads(capsys.readouterr().out)
+    assert first["value"] is None
+    assert "nowhere" in first["context"]["failed"]
+    assert second["value"] > 0
+
+
+def test_table_keeps_rows_that_were_not_measured() -> None:
+    text = f"before\n{table.BEGIN}\n{table.END}\nafter\n"
+    one = {"name": "bake.teatray_s", "value": 12.345, "unit": "s", "context": {"size": [640, 480]}}
+    two = {"name": "accuracy.lambert", "value": 0.00412, "unit": "relative RMSE", "context": {}}
+    once = table.filled(text, [one])
+    assert "| `bake.teatray_s` | 12.3 s |  | size 640×480 |" in once.splitlines()
+    both = table.filled(once, [two])
+    assert "| `accuracy.lambert` | 0.41 % | ≤ 0.5 % |  |" in both.splitlines()
+    assert "12.3 s" in both
+    assert table.filled(both, [two]) == both
+    assert both.startswith("before\n")
+    assert both.endswith("\nafter\n")
+
+
+@pytest.mark.parametrize("name", ["performance.md", "accuracy.md"])
+def test_documents_have_their_table(name: str) -> None:
+    text = (table.DOCS / name).read_text()
+    assert table.filled(text, []).count("| figure | value | target |") == 1
+    mine = [figure for figure in registry.names() if table.document_of(figure) == name]
+    for figure in mine:
+        assert figure.removesuffix(".p50").removesuffix(".p95") in text
+
+
+def test_figure_without_a_value_says_why() -> None:
+    assert "not measured" in table.row({"name": "x", "value": None, "unit": "s", "context": {"skipped": "no browser"}})
+    assert Figure("x", None, "s").context == {}
