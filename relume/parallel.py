@@ -11,6 +11,9 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+# two shares even out a core that is busy with something else; more cost more to hand out than they win
+_SHARES_A_THREAD = 2
+
 _lock = threading.Lock()
 _pool: ThreadPoolExecutor | None = None
 
@@ -44,3 +47,11 @@ def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> 
     errors = [error for future in futures if (error := future.exception()) is not None]
     if errors:
         raise errors[0]
+
+
+def for_shares(kernel: Callable[[int, int], object], count: int) -> None:
+    """Call `kernel(start, stop)` over [0, count) in a few even shares for each thread.
+
+    For work of a few milliseconds, where handing out a range costs as much as doing it.
+    """
+    for_ranges(kernel, count, max(1, -(-count // (_SHARES_A_THREAD * num_threads()))))

@@ -43,7 +43,7 @@ def reflectance(theta_d: F64, params: Params) -> F64:
 
 ASHIKHMIN_SHIRLEY = Term(
     model="ashikhmin_shirley",
-    label="Ashikhmin–Shirley (anisotropic)",
+    label="Ashikhmin–Shirley",
     parameters=(
         Parameter("nu", "Exponent along", 1.0, 10000.0, 100.0, "", "log", "Sharpness along the tangent."),
         Parameter("nv", "Exponent across", 1.0, 10000.0, 100.0, "", "log", "Sharpness across the tangent."),

@@ -6,32 +6,34 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges
+from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
-    """Tiles [start, stop) of one term into radiance (3, samples of the view), beginning at sample `first`."""
+    """Planes [start, stop) of one term, a plane being a channel of a tile, into radiance (3, samples of the view).
+
+    first: the material's first sample in the view.
+    """
     samples = image.shape[2]
     num = texture.shape[0]
-    for tile in range(start, stop):
+    for plane in range(start, stop):
+        tile, channel = plane // 3, plane % 3
         begin = tile * samples
-        count = min(samples, num - begin)
-        for channel in range(3):
-            c = color[channel]
-            for s in range(count):
-                row = begin + s
-                value = c * image[tile, channel, s]
-                if has_texture:
-                    value *= texture[row, channel]
-                if has_outgoing:
-                    value *= outgoing[channel, row]
-                if replace:
-                    radiance[channel, first + row] = value
-                else:
-                    radiance[channel, first + row] += value
+        c = color[channel]
+        for s in range(min(samples, num - begin)):
+            row = begin + s
+            value = c * image[tile, channel, s]
+            if has_texture:
+                value *= texture[row, channel]
+            if has_outgoing:
+                value *= outgoing[channel, row]
+            if replace:
+                radiance[channel, first + row] = value
+            else:
+                radiance[channel, first + row] += value
 
 
 def add_term(
@@ -54,10 +56,5 @@ def add_term(
         radiance: (3, samples of the view) float32, written.
     """
     factor = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
-    for_ranges(
-        lambda start, stop: _add(
-            image, color, texture, factor, has_texture, outgoing is not None, first, replace, start, stop, radiance
-        ),
-        len(image),
-        2,
-    )  # fmt: skip
+    args = (image, color, texture, factor, has_texture, outgoing is not None, first, replace)
+    for_shares(lambda start, stop: _add(*args, start, stop, radiance), 3 * len(image))

@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
-from relume.parallel import for_ranges
+from relume.parallel import for_shares
 from relume.transfer.view import Tile, View
 
 F32 = NDArray[np.float32]
 
 _BIAS, _MANTISSA_BITS, _LARGEST = 15, 9, np.float32(65408.0)  # RGB9_E5 of OpenGL, EXT_texture_shared_exponent
-_TILES_A_RANGE = 4
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
@@ -81,7 +80,7 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], scale: float) -> F
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
     args = (radiance, np.float32(scale), view.first, view.order, view.weight, view.width, table, offsets)
-    for_ranges(lambda start, stop: _resolve(*args, start, stop, out), len(table), _TILES_A_RANGE)
+    for_shares(lambda start, stop: _resolve(*args, start, stop, out), len(table))
     return out
 
 
@@ -97,5 +96,5 @@ def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, scale: f
     if form != "rgb9e5":
         raise ParameterError("format", form, "'rgb9e5' or 'f32'")
     out = np.empty(len(pixels), np.uint32)
-    for_ranges(lambda start, stop: _pack(pixels, start, stop, out), len(pixels), 16_384)
+    for_shares(lambda start, stop: _pack(pixels, start, stop, out), len(pixels))
     return out.tobytes()

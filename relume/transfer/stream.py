@@ -11,7 +11,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges
+from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
 
@@ -80,10 +80,5 @@ def stream(transport: F32, columns: Columns, image: F32) -> None:
     Cost: reads 4 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
     """
     if columns.count.any():
-        for_ranges(
-            lambda start, stop: _stream(
-                transport, columns.index, columns.change, columns.count, image, start, stop
-            ),
-            3 * len(image),
-            1,
-        )  # fmt: skip
+        args = (transport, columns.index, columns.change, columns.count, image)
+        for_shares(lambda start, stop: _stream(*args, start, stop), 3 * len(image))
