@@ -22,9 +22,10 @@ _FLOATS_A_RANGE = 1 << 22
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _sum(values, start, stop):  # type: ignore[no-untyped-def]
+    part = values[start:stop]
     total = np.float32(0)
-    for k in range(start, stop):
-        total += values[k]
+    for k in range(part.shape[0]):
+        total += part[k]
     return total
 
 
