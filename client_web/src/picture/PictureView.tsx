@@ -34,7 +34,7 @@ function useCanvas() {
       const ratio = window.devicePixelRatio || 1;
       element.width = Math.max(1, Math.round(element.clientWidth * ratio));
       element.height = Math.max(1, Math.round(element.clientHeight * ratio));
-      stage.redraw();
+      stage.resize(element.clientWidth, element.clientHeight);
     };
     const observer = new ResizeObserver(fit);
     try {

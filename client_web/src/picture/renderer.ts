@@ -29,7 +29,7 @@ export class Renderer {
   private size: [number, number] = [1, 1];
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, desynchronized: true });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
     if (gl === null)
       throw new Error(
         "This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.",

@@ -21,6 +21,7 @@ class Stage {
   private ids: Ids | null = null;
   private brush: Uint8Array | null = null;
   private display: ImageBitmap | null = null;
+  private box: [width: number, height: number] = [1, 1];
   private revision = 0;
   private drawnThisFrame = false;
   private queued = false;
@@ -125,9 +126,15 @@ class Stage {
     });
   }
 
+  /** The canvas has another size, in CSS pixels: remembered, because asking makes the browser lay out the page. */
+  resize(width: number, height: number): void {
+    this.box = [Math.max(1, width), Math.max(1, height)];
+    this.redraw();
+  }
+
   canvasSize(): Canvas {
-    const canvas = this.renderer?.canvas;
-    return { width: canvas?.clientWidth || 1, height: canvas?.clientHeight || 1, aspect: this.aspect };
+    const [width, height] = this.box;
+    return { width, height, aspect: this.aspect };
   }
 
   get aspect(): number {

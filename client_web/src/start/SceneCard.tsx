@@ -12,7 +12,7 @@ interface Props {
   onReady(): void;
 }
 
-/** One scene: its picture opens it. */
+/** One scene: a click anywhere on the card opens it, but for the card's own buttons. */
 export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
   return (
     <li class="scene-card">
@@ -26,7 +26,8 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>
         <small>
-          {formatCount(scene.triangles)} triangles · {scene.materials.length} materials · {scene.views.length}{" "}
+          {formatCount(scene.triangles)}&nbsp;triangles · {scene.materials.length}&nbsp;
+          {scene.materials.length === 1 ? "material" : "materials"} · {scene.views.length}&nbsp;
           {scene.views.length === 1 ? "view" : "views"}
         </small>
         {scene.warnings.length > 0 && (

@@ -8,6 +8,7 @@ import { stage } from "../picture/stage";
 import type { ClientMessage, HelloMessage, Look } from "../protocol";
 import { attempt, note, showError } from "../ui/toasts";
 import { onLook } from "./edit";
+import { forgetShape, showShape } from "./shape";
 import * as store from "./store";
 import { editSent, forgetWaiting } from "./stats";
 
@@ -136,7 +137,7 @@ function handlersOf(self: () => Session): SessionHandlers {
       if (current() && at !== null) store.probe.value = { ...at, answer: message };
     },
     curve(message) {
-      if (current() && message.curve === store.curvePath.peek()) store.curveShape.value = message;
+      if (current() && message.curve === store.curvePath.peek()) showShape(message);
     },
     bake(message) {
       const { bake: id, state, progress, seconds_left } = message;
@@ -194,7 +195,7 @@ export function chooseView(name: string): void {
 
 effect(() => {
   const curve = store.curvePath.value;
-  store.curveShape.value = null;
+  forgetShape();
   stage.clearBrush();
   if (curve !== null) send({ type: "touch", curve });
 });
