@@ -1,0 +1,67 @@
+"""What a person does in the editor, in the words of these tests."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Locator, Page
+
+WAIT_MS = 30_000
+# A patch is sent within one animation frame, the status bar follows within another.
+SETTLE = """() => new Promise((done) => {
+  let left = 4;
+  const tick = () => (left-- > 0 ? requestAnimationFrame(tick) : done());
+  tick();
+})"""
+
+
+class Editor:
+    """The open editor."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.canvas = page.locator(".picture canvas")
+
+    def wait_until_exact(self) -> None:
+        """Until the status bar says that the picture equals the look."""
+        self.page.locator(".exactness").wait_for(timeout=WAIT_MS)
+        self.page.evaluate(SETTLE)
+        self.page.locator(".exactness.is-exact", has_text="exact").wait_for(timeout=WAIT_MS)
+
+    def pixels(self) -> NDArray[np.int16]:
+        """The canvas as it is on the screen, once it is exact. (height, width, 3)"""
+        self.wait_until_exact()
+        self.page.mouse.move(2, 2)  # a pointer over the picture outlines what it is over
+        self.page.evaluate(SETTLE)
+        with Image.open(io.BytesIO(self.canvas.screenshot())) as image:
+            return np.asarray(image.convert("RGB")).astype(np.int16)
+
+    def choose(self, material: str, term: int) -> None:
+        """Select a material in the list and unfold one of its terms."""
+        self.page.get_by_role("option", name=material).click()
+        fold = self.page.locator(".card .fold").nth(term)
+        if fold.get_attribute("aria-expanded") != "true":
+            fold.click()
+        self.wait_until_exact()
+
+    def slider(self, name: str) -> Locator:
+        """A parameter's slider in the inspector."""
+        return self.page.locator(".inspector").get_by_role("slider", name=name, exact=True)
+
+    def drag(self, slider: Locator, start: float, stop: float) -> None:
+        """Drag along a slider's track, between fractions of its length."""
+        box = slider.bounding_box()
+        assert box is not None
+        x, y = (lambda at: box["x"] + at * box["width"]), box["y"] + box["height"] / 2
+        self.page.mouse.move(x(start), y)
+        self.page.mouse.down()
+        self.page.mouse.move(x(stop), y, steps=12)
+        self.page.mouse.up()
+
+
+def changed(before: NDArray[np.int16], after: NDArray[np.int16]) -> float:
+    """Share of the pixels that differ visibly."""
+    return float((np.abs(before - after).max(axis=2) > 2).mean())

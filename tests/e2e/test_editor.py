@@ -1,0 +1,160 @@
+"""The editor in a browser: seeing, picking, dragging, keys, curves, undo, looks, reload, a lost server, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from conftest import SIZE, Server
+from editor_page import WAIT_MS, Editor, changed
+from PIL import Image
+from playwright.sync_api import Browser, expect
+
+SIGMA = "Roughness σ"
+
+
+def test_opens_and_shows_the_picture(editor: Editor) -> None:
+    pixels = editor.pixels()
+    assert pixels.mean() > 20
+    assert pixels.std(axis=(0, 1)).min() > 10
+    expect(editor.page.get_by_role("heading", level=1)).to_have_text("still life")
+
+
+def test_a_click_on_a_scene_card_opens_it(server: Server, browser: Browser) -> None:
+    page = browser.new_page()
+    page.goto(server.url)
+    title = page.locator(".scene-card").get_by_text("still life")
+    title.wait_for(timeout=WAIT_MS)
+    title.click(force=True)  # the card's button lies over it
+    Editor(page).wait_until_exact()
+    assert "scene=" in page.url
+    page.close()
+
+
+def test_a_click_on_an_object_selects_its_material(editor: Editor) -> None:
+    box = editor.canvas.bounding_box()
+    assert box is not None
+    selected = editor.page.locator("[role=option][aria-selected=true]")
+    expect(selected).to_have_count(0)
+    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    expect(selected).to_have_text("Ball")
+    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.85 * box["height"])
+    expect(selected).to_have_text("Floor")
+
+
+def test_dragging_a_slider_changes_the_picture_and_ends_exact(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    before = editor.pixels()
+    drawn = editor.page.evaluate("window.relumeStats.latencies.length")
+    editor.drag(editor.slider(SIGMA), 0.3, 0.8)
+    after = editor.pixels()
+    assert changed(before, after) > 0.01
+    assert editor.page.evaluate("window.relumeStats.latencies.length") > drawn
+
+
+def test_keys_do_what_dragging_does(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    slider = editor.slider(SIGMA)
+    first = editor.pixels()
+    editor.drag(slider, 0.5, 1.2)
+    dragged, value = editor.pixels(), slider.get_attribute("aria-valuenow")
+    slider.press("Home")
+    assert changed(dragged, editor.pixels()) > 0.01
+    slider.press("End")
+    assert changed(dragged, editor.pixels()) == 0
+    assert slider.get_attribute("aria-valuenow") == value
+    slider.press("Delete")
+    assert changed(first, editor.pixels()) == 0
+
+
+def test_a_curve_point_moves_by_hand_and_by_keys_and_can_be_undone(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    plot = editor.page.locator(".plot")
+    points = plot.locator("[role=slider]")
+    points.first.wait_for(timeout=WAIT_MS)
+    point = points.nth(points.count() // 2)  # about where the highlight falls off
+    before = editor.pixels()
+    box = point.locator(".mark").bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    editor.page.mouse.move(x, y)
+    editor.page.mouse.down()
+    editor.page.mouse.move(x, y - 60, steps=8)
+    editor.page.mouse.up()
+    dragged = editor.pixels()
+    assert changed(before, dragged) > 0.005
+    expect(editor.page.locator(".inspector .dot")).to_have_count(1)
+
+    before_keys = float(point.get_attribute("aria-valuenow") or "nan")
+    point.press("PageUp")
+    raised = editor.pixels()
+    assert float(point.get_attribute("aria-valuenow") or "nan") > before_keys
+    assert changed(dragged, raised) > 0
+
+    undo, redo = (editor.page.get_by_role("button", name=name, exact=True) for name in ("Undo", "Redo"))
+    undo.click()
+    assert changed(dragged, editor.pixels()) == 0
+    undo.click()
+    assert changed(before, editor.pixels()) == 0
+    expect(undo).to_be_disabled()
+    redo.click()
+    redo.click()
+    assert changed(raised, editor.pixels()) == 0
+
+
+def test_a_saved_look_survives_a_reload(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    plain = editor.pixels()
+    editor.slider(SIGMA).press("End")
+    edited = editor.pixels()
+    editor.page.keyboard.press("Control+s")
+    saved = editor.page.locator(".tiles.saved .tile-picture")
+    expect(saved).to_have_count(1)
+    editor.page.get_by_role("button", name="Reset this material").click()
+    assert changed(plain, editor.pixels()) == 0
+    editor.page.reload()
+    editor.wait_until_exact()
+    expect(saved).to_have_count(1)
+    saved.click()
+    assert changed(edited, editor.pixels()) == 0
+    editor.page.locator(".tiles.saved .tile").hover()
+    editor.page.get_by_role("button", name="Delete").first.click()
+    expect(saved).to_have_count(0)
+
+
+def test_a_reload_returns_to_the_same_place(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    editor.slider(SIGMA).press("End")
+    editor.page.keyboard.press("+")
+    url, pixels = editor.page.url, editor.pixels()
+    value = editor.slider(SIGMA).get_attribute("aria-valuenow")
+    editor.page.reload()
+    assert changed(pixels, editor.pixels()) == 0
+    assert editor.page.url == url
+    expect(editor.page.locator("[role=option][aria-selected=true]")).to_have_text("Ball")
+    assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
+
+
+def test_a_lost_server_is_said_and_edits_catch_up(editor: Editor, server: Server) -> None:
+    editor.choose("Ball", 1)
+    before = editor.pixels()
+    server.kill()
+    status = editor.page.locator(".status .state")
+    expect(status).to_contain_text("Connection lost", timeout=WAIT_MS)
+    editor.slider(SIGMA).press("End")  # kept until there is somebody to tell
+    assert editor.page.locator(".exactness").inner_text() == ""
+    server.start()
+    editor.page.get_by_role("button", name="Now").click(timeout=WAIT_MS)
+    expect(status).to_contain_text("Connected", timeout=WAIT_MS)
+    assert changed(before, editor.pixels()) > 0.01
+
+
+def test_export_downloads_the_picture(editor: Editor, tmp_path: Path) -> None:
+    with editor.page.expect_download() as download:
+        editor.page.get_by_role("button", name="PNG").click()
+    path = tmp_path / "picture.png"
+    download.value.save_as(path)
+    assert download.value.suggested_filename == "still-life-front.png"
+    with Image.open(path) as image:
+        assert image.size == SIZE
+        assert np.asarray(image.convert("RGB")).std() > 10
