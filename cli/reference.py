@@ -20,7 +20,6 @@ def reference(
     data: Data = None,
 ) -> None:
     """Render by brute force: every texel of the light, visibility traced, nothing baked."""
-    from relume.reference import reference_image
     from rich.console import Console
     from rich.progress import Progress
 
@@ -28,6 +27,7 @@ def reference(
     from cli.picture import check_output, save
     from relume.errors import NotFoundError
     from relume.look import default_look
+    from relume.reference import reference_image
     from relume.scene.archive import load_scene
     from worker.paths import scene_path
     from worker.presets import PRESETS
