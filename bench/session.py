@@ -8,6 +8,7 @@ its cook_torrance term to and fro, 60 edits a second, and acknowledges each fram
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from worker.paths import bake_path
 
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
 _EDITS_A_SECOND = 60.0
+_PARTS = ("wait", "update", "encode")
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -36,7 +38,7 @@ def measure(tiny: bool) -> list[Figure]:
             client.send(type="edit", revision=1, patch=[{"op": "replace", "path": _SIGMA, "value": 0.19}])
             client.exact(1)
             before = len(server.edit_ms())
-            num_bytes = _drag(client, num_edits)
+            frames = _drag(client, num_edits)
             times = server.edit_ms()[before:]
     p50, p95 = percentiles(times)
     context = {
@@ -44,7 +46,8 @@ def measure(tiny: bool) -> list[Figure]:
         "frames": len(times),
         "size": list(size),
         "share_of_picture": float(np.mean(ids == 0)),
-        "frame_bytes_median": float(np.median(num_bytes)),
+        "frame_bytes_median": float(np.median([num_bytes for _, num_bytes in frames])),
+        **{f"{part}_ms_median": float(np.median([header["ms"][part] for header, _ in frames])) for part in _PARTS},
         "max_ms": max(times),
     }
     return [
@@ -53,15 +56,15 @@ def measure(tiny: bool) -> list[Figure]:
     ]
 
 
-def _drag(client: SessionClient, num_edits: int) -> list[int]:
-    """Move σ on a steady clock, reading frames in between; returns the sizes of frames."""
-    began, sizes = time.perf_counter(), []
+def _drag(client: SessionClient, num_edits: int) -> list[tuple[dict[str, Any], int]]:
+    """Move σ on a steady clock, reading frames in between; returns their headers and sizes."""
+    began, frames = time.perf_counter(), []
     for k in range(num_edits):
         sigma = 0.2 + 0.15 * np.sin(2 * np.pi * k / 90)
         patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
         client.send(type="edit", revision=2 + k, patch=patch)
         while (left_s := began + (k + 1) / _EDITS_A_SECOND - time.perf_counter()) > 0:
             if (found := client.frame(left_s)) is not None:
-                sizes.append(found[1])
+                frames.append(found)
     client.exact(1 + num_edits)
-    return sizes
+    return frames
