@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from conftest import Server
 from editor_page import WAIT_MS, Editor
+from editor_server import Server
 from playwright.sync_api import Browser, Page
 
 NAMELESS = """() => {

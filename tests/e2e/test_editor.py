@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from conftest import SIZE, Server
 from editor_page import WAIT_MS, Editor, changed
+from editor_server import SIZE, Server
 from PIL import Image
 from playwright.sync_api import Browser, expect
 

@@ -1,0 +1,56 @@
+"""The server that the browser tests talk to."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SIZE = (320, 240)
+START_S = 60.0
+
+
+class Server:
+    """`relume serve` as a process of its own; `kill` takes it away as a power cut would."""
+
+    def __init__(self, data: Path) -> None:
+        self.data = data
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port: int = probe.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it and wait until it answers."""
+        command = [sys.executable, "-m", "cli.main", "serve", "--data", str(self.data), "--port", str(self.port)]
+        with (self.data / "server.txt").open("ab") as log:
+            self.process = subprocess.Popen(command, stdout=log, stderr=log)
+        deadline = time.monotonic() + START_S
+        while True:
+            try:
+                return urllib.request.urlopen(f"{self.url}/readyz", timeout=2).close()
+            except OSError:
+                if time.monotonic() > deadline or self.process.poll() is not None:
+                    pytest.fail(f"the server did not start: {(self.data / 'server.txt').read_text()}")
+                time.sleep(0.1)
+
+    def kill(self) -> None:
+        """End it at once, without goodbyes."""
+        assert self.process is not None
+        self.process.kill()
+        self.process.wait()
+
+    def call(self, path: str, body: dict[str, Any] | None = None) -> Any:
+        """GET, or POST where there is a body."""
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.url + path, data, {"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return json.load(answer)
