@@ -170,5 +170,7 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
             async with pool.using("broken", Path("broken")):
                 pass
 
-    asyncio.run(run())
+    # in a thread of its own: the browser tests' event loop may still stand in this one
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, run()).result()
     assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
