@@ -22,7 +22,7 @@ _HALF = np.float32(0.5)
 _TOLERANCE_BANDS = np.float32(0.12)
 _TOLERANCE_SHARE = np.float32(0.015)
 _QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
-_MAX_DEPTH = 3
+_MAX_DEPTH = 4
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
