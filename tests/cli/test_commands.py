@@ -173,7 +173,7 @@ def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert len(err.splitlines()) == 1
 
 
-LONG = ["bake", "quad", "--size", "640x480", "--lights", "300"]  # long enough for a cluster, which takes seconds to start
+LONG = ["bake", "quad", "--size", "640x480", "--lights", "300"]  # long enough for a cluster to start
 
 
 def wait_for_state(data: Path, state: str) -> None:
