@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from bench.figure import Figure
+from bench.machine import processor_ticks, stolen_share
 
 
 @dataclass(frozen=True)
@@ -27,14 +28,17 @@ class Group:
 
     def measure(self, tiny: bool) -> list[Figure]:
         """Run it; a failure is a figure without a value."""
-        began = time.perf_counter()
+        began, ticks = time.perf_counter(), processor_ticks()
         try:
             figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
         except Exception as error:  # the other groups shall be measured
             traceback.print_exc()
             return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
-        seconds = round(time.perf_counter() - began, 1)
-        return [Figure(f.name, f.value, f.unit, {**f.context, "measured_in_s": seconds}) for f in figures]
+        about = {
+            "measured_in_s": round(time.perf_counter() - began, 1),
+            "stolen_share": stolen_share(ticks, processor_ticks()),
+        }
+        return [Figure(f.name, f.value, f.unit, {**f.context, **about}) for f in figures]
 
 
 GROUPS = (
@@ -51,6 +55,9 @@ GROUPS = (
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
 )
+
+
+_NOTEWORTHY = 0.02
 
 
 def names() -> list[str]:
@@ -83,7 +90,9 @@ def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
 def _line(figure: Figure) -> str:
     if figure.value is None:
         return f"{figure.name:<32} -  {figure.context.get('skipped') or figure.context.get('failed')}"
-    return f"{figure.name:<32} {figure.value:.4g} {figure.unit}"
+    stolen = figure.context.get("stolen_share") or 0
+    beside = f"   (the host gave {stolen:.0%} of the processor time to others)" if stolen >= _NOTEWORTHY else ""
+    return f"{figure.name:<32} {figure.value:.4g} {figure.unit}{beside}"
 
 
 def _plain(value: Any) -> Any:

@@ -8,6 +8,7 @@ import pytest
 
 from bench import registry, table
 from bench.figure import Figure
+from bench.machine import stolen_share
 
 FIXED_NAMES = {
     "frame.bandwidth_ratio", "frame.incremental_rmse", "session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95",
@@ -55,6 +56,12 @@ def test_benchmark_runs_small(module: str) -> None:
 @pytest.mark.parametrize("module", WITH_PROCESSES)
 def test_benchmark_with_processes_runs_small(module: str) -> None:
     check(group_of(module))
+
+
+def test_stolen_share_is_a_share_of_what_was_wanted() -> None:
+    assert stolen_share((1000, 10), (1200, 60)) == 0.25
+    assert stolen_share((1000, 10), (1000, 10)) is None
+    assert stolen_share(None, (1, 1)) is None
 
 
 def test_json_is_a_list_of_figures(capsys: pytest.CaptureFixture[str]) -> None:
