@@ -2,20 +2,26 @@
 
 Numba's own cache notices a change in the file of a kernel, but not in the files of the functions that it calls, so a
 kernel could run on with a helper that has since been corrected. The folder's name is therefore a hash over all kernel
-sources. Folders are only ever added; the files inside are written by Numba, which tolerates several processes.
+sources; the files inside are written by Numba, which tolerates several processes. A process that starts marks its
+folder as used, and one that makes a new folder removes those that nobody has used for a month.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+import shutil
 import stat
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
 
 _PACKAGE = Path(__file__).parent
+UNUSED_S = 30 * 86_400.0
 
 
 def kernel_hash(package: Path = _PACKAGE) -> str:
@@ -58,9 +64,26 @@ def cache_folder(name: str) -> Path:
     return folder if _make_private(folder) else Path(tempfile.mkdtemp(prefix="relume-numba-"))
 
 
+def remove_unused(folder: Path, older_than_s: float = UNUSED_S) -> None:
+    """Delete the siblings of a cache folder that no process has started with for so long; errors leave them there."""
+    for sibling in folder.parent.iterdir():
+        if sibling == folder or not re.fullmatch("[0-9a-f]{16}", sibling.name):
+            continue
+        with suppress(OSError):  # another process may be removing it too
+            if _is_private(sibling) and time.time() - sibling.stat().st_mtime > older_than_s:
+                shutil.rmtree(sibling)
+
+
 def use_kernel_cache() -> None:
     """Point Numba at the folder of the present sources, in this process and in those it starts."""
-    folder = str(cache_folder(kernel_hash()))
+    name = kernel_hash()
+    chosen = cache_folder(name)
+    with suppress(OSError):
+        # Where it is empty the sources have changed: a good moment, and a rare one.
+        if chosen.name == name and not any(chosen.iterdir()):
+            remove_unused(chosen)
+        os.utime(chosen)
+    folder = str(chosen)
     os.environ["NUMBA_CACHE_DIR"] = folder  # read when Numba is imported; importing it here would cost half a second
     numba = sys.modules.get("numba")
     if numba is not None:

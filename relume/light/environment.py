@@ -21,6 +21,8 @@ F64 = NDArray[np.float64]
 MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
+MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near it
+FREE_BYTES = 64 << 20  # may be claimed by any file, however small
 HDR_RESOLUTION = re.compile(rb"-Y\s+(\d{1,9})\s+\+X\s+(\d{1,9})\s*\Z")
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
@@ -70,6 +72,7 @@ def read_environment(source: str | Path | bytes, name: str) -> Environment:
     if data.startswith(b"#?"):
         suffix, (width, height) = ".hdr", _hdr_size(data, name)
         _check_size(width, height, name)
+        _check_claim(width * height * 12, data, name)
     elif data.startswith(EXR_MAGIC):
         suffix = ".exr"
     else:
@@ -115,6 +118,25 @@ def _check_size(width: int, height: int, name: str) -> None:
         raise SceneError(f"environment {name!r} is {width}×{height}; an equirectangular map is twice as wide as high")
 
 
+def _check_claim(claimed_bytes: int, data: bytes, name: str) -> None:
+    """A header of a few bytes may claim gigabytes; what is made of it is held to what the file could unpack to."""
+    if claimed_bytes > max(FREE_BYTES, MAX_EXPANSION * len(data)):
+        raise SceneError(
+            f"environment {name!r} claims {claimed_bytes / 1e6:,.0f} MB of pixels and holds {len(data) / 1e6:,.1f} MB; "
+            "it is truncated or damaged, export it again"
+        )
+
+
+def _check_tiles(spec: oiio.ImageSpec, data: bytes, name: str) -> None:
+    """Tiles that can be in the file: each has 8 bytes in its table, and the decoder holds a whole one."""
+    if spec.tile_width == 0:
+        return
+    num_tiles = -(-spec.width // spec.tile_width) * -(-spec.height // spec.tile_height)
+    if 8 * num_tiles > len(data):
+        raise SceneError(f"environment {name!r} has more tiles than data; it is damaged, export it again")
+    _check_claim(spec.tile_width * spec.tile_height * spec.nchannels * 4, data, name)
+
+
 def _read_pixels(data: bytes, suffix: str, name: str) -> F32:
     """Lets OpenImageIO decode from a private temporary file, header first, pixels only when the size is allowed."""
     handle, path = tempfile.mkstemp(suffix=suffix)
@@ -126,7 +148,7 @@ def _read_pixels(data: bytes, suffix: str, name: str) -> F32:
             _forget_error(oiio.geterror)
             raise SceneError(f"environment {name!r} is damaged or not what its first bytes say; export it again")
         try:
-            return _read_open_image(image, name)
+            return _read_open_image(image, data, name)
         except UnicodeDecodeError:  # names in the header that are no text
             raise SceneError(f"environment {name!r} is damaged; export it again") from None
         finally:
@@ -135,7 +157,7 @@ def _read_pixels(data: bytes, suffix: str, name: str) -> F32:
         Path(path).unlink()
 
 
-def _read_open_image(image: oiio.ImageInput, name: str) -> F32:
+def _read_open_image(image: oiio.ImageInput, data: bytes, name: str) -> F32:
     spec = image.spec()
     _check_size(spec.width, spec.height, name)
     if spec.depth != 1 or spec.deep or not 1 <= spec.nchannels <= 16:
@@ -145,6 +167,8 @@ def _read_open_image(image: oiio.ImageInput, name: str) -> F32:
     first, last = min(order), max(order)
     if last - first > 3 and spec.width * spec.height > 1 << 24:
         raise SceneError(f"environment {name!r} has channels between its RGB; save it as plain RGB")
+    _check_tiles(spec, data, name)
+    _check_claim(spec.width * spec.height * (last + 1 - first) * 4, data, name)
     pixels = image.read_image(0, 0, first, last + 1, oiio.FLOAT)
     if pixels is None:
         _forget_error(image.geterror)

@@ -6,6 +6,8 @@ import os
 import stat
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -67,3 +69,35 @@ def test_folder_that_others_may_write_to_is_not_used(tmp_path, monkeypatch):
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
     assert tmp_path / "tmp" in numerics.cache_folder("abc").parents
+
+
+def _kernels(folder: Path, name: str, days: float) -> Path:
+    made = folder / name
+    made.mkdir(parents=True, mode=0o700)
+    (made / "kernel.nbi").write_bytes(b"code")
+    used = time.time() - days * 86_400
+    os.utime(made, (used, used))
+    return made
+
+
+def test_folders_unused_for_a_month_go_when_a_new_one_is_made(tmp_path):
+    caches = tmp_path / "relume" / "numba"
+    old, recent = _kernels(caches, "0123456789abcdef", 31), _kernels(caches, "fedcba9876543210", 29)
+    foreign = _kernels(caches, "notes", 400)
+    linked = caches / "aaaaaaaaaaaaaaaa"
+    linked.symlink_to(foreign)
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", "import relume"], env=environment, check=True)
+    assert not old.exists()
+    assert (recent / "kernel.nbi").exists()
+    assert (foreign / "kernel.nbi").exists()
+    assert linked.is_symlink()
+
+
+def test_folder_in_use_is_marked_and_prunes_nothing(tmp_path):
+    caches = tmp_path / "relume" / "numba"
+    present, old = _kernels(caches, numerics.kernel_hash(), 400), _kernels(caches, "0123456789abcdef", 400)
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", "import relume"], env=environment, check=True)
+    assert time.time() - present.stat().st_mtime < 86_400
+    assert old.exists()

@@ -1,0 +1,77 @@
+"""Broken, absurd or malicious glTF: the container, its JSON and its names."""
+
+from __future__ import annotations
+
+import pytest
+from glb_builder import Glb
+from hostile_scenes import changed, imported, refused
+
+
+@pytest.mark.parametrize("length", [0, 3, 4, 12, 19, 20, 100, 300])
+def test_import_refuses_a_truncated_glb(length: int) -> None:
+    refused(Glb().quad().bytes()[:length])
+
+
+def test_import_refuses_a_glb_cut_by_one_byte() -> None:
+    assert "truncated" in refused(Glb().quad().bytes()[:-1])
+
+
+@pytest.mark.parametrize(
+    "uri", ["mesh.bin", "../secret.bin", "http://127.0.0.1/x.bin", "/etc/passwd", "file:///etc/passwd"]
+)
+def test_import_opens_no_external_buffer(uri: str) -> None:
+    message = refused(changed(buffers=[{"uri": uri, "byteLength": 4}]))
+    assert "gltf-transform copy" in message
+
+
+def test_import_refuses_json_of_too_many_values() -> None:
+    assert "values" in refused(b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 4_000_001 + b"0]}")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"{}",
+        b"[]",
+        b"{" * 100_000,
+        b'{"asset":' * 50_000,
+        b'{"asset":{"version":"2.0"},"scene":NaN}',
+        b'{"asset":{"version":"1.0"}}',
+        b'{"asset":{"version":"2.0"},"nodes":{"a":1}}',
+        b"\xff\xfe{}",
+    ],
+)
+def test_import_refuses_json_that_is_no_gltf(text: bytes) -> None:
+    refused(text)
+
+
+@pytest.mark.parametrize(
+    ("extension", "command"),
+    [
+        ("KHR_draco_mesh_compression", "gltf-transform copy"),
+        ("EXT_meshopt_compression", "gltf-transform copy"),
+        ("KHR_texture_basisu", "gltf-transform ktxdecompress"),
+    ],
+)
+def test_import_says_how_to_unpack(extension: str, command: str) -> None:
+    assert command in refused(changed(extensionsRequired=[extension]))
+
+
+def test_import_shows_names_without_control_characters() -> None:
+    glb = Glb().quad({"extensions": {"EVIL\n\x1b[2J": {}}, "alphaMode": "A\nB"})
+    glb.document |= {"extensionsRequired": ["NEW\nLINE"], "cameras": [{"type": "orthographic", "name": "a\nb"}]}
+    glb.document["nodes"][0] |= {"camera": 0, "skin": 0, "name": "c\r\nd"}
+    warnings = imported(glb.bytes()).warnings
+    assert len(warnings) == 5
+    assert all(warning.isprintable() for warning in warnings)
+    glb.document["meshes"][0]["primitives"][0]["attributes"]["X\nY"] = -1
+    refused(glb.bytes())
+
+
+def test_import_keeps_control_characters_out_of_names() -> None:
+    glb = Glb().quad({"name": "a/b~c\x1b[31m\u202e" + "x" * 200})
+    name = imported(glb.bytes()).materials[0].name
+    assert name.startswith("a-b-c[31mx")
+    assert len(name) <= 80
+    assert name.isprintable()

@@ -1,0 +1,126 @@
+"""Absurd accessors, meshes and node trees: refused before anything of their size is made."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from glb_builder import QUAD, Glb, pack
+from hostile_scenes import changed, imported, refused, with_accessor
+
+from relume.scene.gltf import importer
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"count": 2**31},
+        {"count": 10**30},
+        {"count": -1},
+        {"count": 0},
+        {"count": 5},
+        {"byteOffset": 2**39},
+        {"byteOffset": 10**40},
+        {"byteOffset": -4},
+        {"bufferView": 99},
+        {"type": "MAT4"},
+        {"type": "VEC9"},
+        {"componentType": 5124},
+        {"bufferView": None, "count": 4_000_000_000},
+        {"sparse": {"count": 10**9, "indices": {"bufferView": 1, "componentType": 5125}, "values": {"bufferView": 0}}},
+    ],
+)
+def test_import_refuses_absurd_accessors(changes: dict[str, Any]) -> None:
+    refused(with_accessor(**changes))
+
+
+def test_import_refuses_zeros_without_data_that_claim_gigabytes() -> None:
+    sparse = {"count": 1, "indices": {"bufferView": 2, "componentType": 5123}, "values": {"bufferView": 0}}
+    glb = Glb().quad()
+    glb.document["accessors"][0] = {"componentType": 5126, "count": 70_000_000, "type": "VEC3", "sparse": sparse}
+    refused(glb.bytes())
+
+
+def test_import_refuses_views_that_reach_beyond_their_buffer() -> None:
+    glb = Glb().quad()
+    glb.document["bufferViews"][0]["byteLength"] = 10**9
+    assert "beyond its buffer" in refused(glb.bytes())
+
+
+@pytest.mark.parametrize("stride", [0, 4, 8, 253, 10**9])
+def test_import_refuses_strides_that_do_not_fit(stride: int) -> None:
+    glb = Glb().quad()
+    glb.document["bufferViews"][0]["byteStride"] = stride
+    refused(glb.bytes())
+
+
+def test_import_refuses_indices_out_of_range() -> None:
+    glb = Glb().quad()
+    glb.document["meshes"][0]["primitives"][0]["indices"] = glb.accessor(np.array([0, 1, 40_000], np.uint16))
+    assert "beyond its 4 vertices" in refused(glb.bytes())
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e30])
+def test_import_refuses_positions_that_are_not_finite(value: float) -> None:
+    positions = QUAD.copy()
+    positions[2, 1] = value
+    assert "not finite" in refused(Glb().quad(POSITION=positions).bytes())
+
+
+def test_import_refuses_a_mesh_without_triangles() -> None:
+    glb = Glb().quad()
+    glb.document["meshes"][0]["primitives"][0]["mode"] = 1
+    assert "no triangles" in refused(glb.bytes())
+
+
+def test_import_refuses_a_file_without_meshes() -> None:
+    assert "no triangles" in refused(pack({"asset": {"version": "2.0"}}, b""))
+
+
+def test_import_drops_degenerate_triangles_with_a_warning() -> None:
+    glb = Glb().quad()
+    corners = np.array([0, 1, 2, 1, 1, 2, 3, 3, 3], np.uint16)
+    glb.document["meshes"][0]["primitives"][0]["indices"] = glb.accessor(corners)
+    scene = imported(glb.bytes())
+    assert len(scene.meshes[0].faces) == 1
+    assert any("2 triangles" in warning for warning in scene.warnings)
+
+
+def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
+    assert "no triangles" in refused(Glb().quad(POSITION=np.zeros((4, 3), np.float32)).bytes())
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        [{"children": [0], "mesh": 0}],
+        [{"children": [1]}, {"children": [0], "mesh": 0}],
+        [{"children": [1, 1]}, {"mesh": 0}],
+        [{"children": [7], "mesh": 0}],
+        [{"mesh": 0, "matrix": [1e30] * 16}],
+        [{"mesh": 3}],
+        [{"camera": 3}],
+        [{"children": [i + 1]} for i in range(99)] + [{"mesh": 0}],
+        [{"mesh": 0}] * 4_097,
+    ],
+)
+def test_import_refuses_nodes_that_are_no_tree(nodes: list[dict[str, Any]]) -> None:
+    refused(changed(nodes=nodes))
+
+
+def test_import_refuses_instances_without_end() -> None:
+    glb = Glb().quad()
+    glb.document["meshes"][0]["primitives"] *= 1_000
+    glb.document["nodes"] = [{"mesh": 0}] * 30
+    glb.document["scenes"] = [{"nodes": list(range(30))}]
+    assert "20,000 meshes" in refused(glb.bytes())
+
+
+def test_import_refuses_degenerate_triangles_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importer, "MAX_CORNERS", 600)
+    glb = Glb().quad()
+    primitive = glb.document["meshes"][0]["primitives"][0]
+    primitive["indices"] = glb.accessor(np.zeros(300, np.uint16))
+    glb.document["meshes"][0]["primitives"] = [primitive] * 3
+    assert "triangles" in refused(glb.bytes())
