@@ -171,3 +171,39 @@ class LookEntry(Body):
     etag: str
     modified: str
     bytes: int
+
+
+class TruthRequest(Body):
+    """Compare a look with brute force, in so many passes; figures come from the second on."""
+
+    bake: Id
+    view: Name
+    look: dict[str, Any] = {}
+    passes: Annotated[int, Field(ge=2, le=1024)] = 16
+
+
+class TruthFigures(Body):
+    """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
+
+    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off; `significant`:
+    share of pixels whose difference the noise does not explain, 0.01 by chance.
+    """
+
+    rmse: float
+    noise: float
+    error: float
+    significant: float
+
+
+class TruthBody(Body):
+    """A comparison; `passes` are done."""
+
+    id: str
+    bake: str
+    view: str
+    state: Literal["queued", "running", "ready", "failed"]
+    passes: int
+    total: int
+    progress: float
+    found: TruthFigures | None
+    problem: str | None

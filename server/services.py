@@ -24,6 +24,7 @@ from server.looks import LookShelf
 from server.metrics import Metrics
 from server.renders import RenderQueue
 from server.settings import Settings
+from server.truths import TruthQueue
 from worker.service import BakeService
 
 
@@ -40,6 +41,7 @@ class Services:
     bakes: BakeService
     looks: LookShelf
     renders: RenderQueue
+    truths: TruthQueue
     threads: Threads
     transfers: TransferPool
     house: House
@@ -70,6 +72,7 @@ async def open_services(
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
     renders = RenderQueue(service.ledger.sessions, settings.data, library)
+    truths = TruthQueue(service.ledger.sessions, settings.data, library)
     house = House(
         library=library,
         threads=threads,
@@ -82,6 +85,7 @@ async def open_services(
     looks = LookShelf(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     renders.start()
+    truths.start()
     try:
         yield Services(
             settings=settings,
@@ -89,6 +93,7 @@ async def open_services(
             bakes=service,
             looks=looks,
             renders=renders,
+            truths=truths,
             threads=threads,
             transfers=transfers,
             house=house,
@@ -96,6 +101,7 @@ async def open_services(
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
+        await asyncio.to_thread(truths.close)
         await asyncio.to_thread(renders.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)

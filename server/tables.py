@@ -19,10 +19,10 @@ class LookRow(Base):
     modified: Mapped[float]
 
 
-class RenderRow(Base):
-    """A batch of renders; its pictures lie in renders/<id>/. `request` is the body as JSON."""
+class WorkRow(Base):
+    """A long work of the server, see `server.backlog`. `request` is the body as JSON."""
 
-    __tablename__ = "renders"
+    __abstract__ = True
 
     id: Mapped[str] = mapped_column(primary_key=True)
     request: Mapped[str] = mapped_column(Text)
@@ -30,3 +30,15 @@ class RenderRow(Base):
     done: Mapped[int]
     problem: Mapped[str | None] = mapped_column(Text)
     created: Mapped[float]
+
+
+class RenderRow(WorkRow):
+    """A batch of renders; `done` frames are finished."""
+
+    __tablename__ = "renders"
+
+
+class TruthRow(WorkRow):
+    """A comparison with brute force; `done` passes are finished."""
+
+    __tablename__ = "truths"

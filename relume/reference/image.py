@@ -31,6 +31,7 @@ def reference_image(
     spp: int,
     progress: Callable[[float], object] = lambda share: None,
     cancelled: Callable[[], bool] = lambda: False,
+    pass_index: int = 0,
 ) -> F32:
     """Render a look under the environment's light: direct, with shadows.
 
@@ -39,6 +40,7 @@ def reference_image(
         spp: texels of the environment for each view sample, drawn by power with a fixed seed; 0, or as many as the
             map has, for every texel.
         progress: called with the share done. cancelled: asked now and then.
+        pass_index: pictures with other indices draw independently.
     Returns:
         Linear radiance, the background seen where there is no surface. (height, width, 3) float32
     Raises:
@@ -61,7 +63,7 @@ def reference_image(
             progress((before + share * (rows.stop - rows.start)) / max(1, int(bounds[-1])))
 
         radiance[rows] = reference_radiance(
-            geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled
+            geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled, pass_index
         )[0]  # fmt: skip
     outside = samples.material == BACKGROUND
     towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)

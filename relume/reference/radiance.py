@@ -98,12 +98,14 @@ def reference_radiance(
     spp: int = 0,
     progress: Callable[[float], object] = lambda share: None,
     cancelled: Callable[[], bool] = lambda: False,
+    pass_index: int = 0,
 ) -> F64:
     """Radiance of all points under several materials, which share their shadow rays.
 
     Args:
         materials: of each its terms, as they stand in a complete look.
         spp: texels drawn by power for each point; 0, or as many as there are, for all of them.
+        pass_index: passes with other indices draw independently.
     Returns:
         (materials, n, 3) float64
     Raises:
@@ -119,7 +121,7 @@ def reference_radiance(
             raise CancelledError("the reference was cancelled")
         lights = texels
         if 0 < spp < texels.num_texels:
-            lights = texels.chosen(spp, np.random.default_rng((_SEED, start)))
+            lights = texels.chosen(spp, np.random.default_rng((_SEED, pass_index, start)))
         some = points.rows(slice(start, stop))
         for first in range(0, lights.num_texels, _TEXELS_AT_ONCE):
             rows = slice(first, first + _TEXELS_AT_ONCE)

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 from server.live.ports import Library
 
 
 def open_library(cache_bytes: int) -> Library:
     """relume's own, with a frozen cache of so many bytes for all sessions together."""
     # Imported here because they load compiled kernels, which a process that only describes the API can do without.
+    from relume.reference import reference_image
+    from relume.scene.archive import load_scene
     from relume.transfer.cache import FrozenCache
     from relume.transfer.opened import open_transfer
     from relume.transfer.picture import Picture
     from relume.transfer.render import render_image
+
+    def reference(scene: Path, *args: Any) -> Any:
+        return reference_image(load_scene(scene), *args)
 
     cache = FrozenCache(cache_bytes)
     return Library(
         open_transfer=open_transfer,
         make_picture=lambda transfer, view: Picture(transfer, view, cache),
         render=render_image,
+        reference=reference,
         cache_used_bytes=lambda: cache.used_bytes,
     )

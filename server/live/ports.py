@@ -75,10 +75,13 @@ class Library:
         open_transfer: path of a published store -> transfer; heavy.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3) linear radiance in the baked size; heavy.
+        reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index) -> the same
+            by brute force; heavy.
         cache_used_bytes: what the frozen caches hold now.
     """
 
     open_transfer: Callable[[Path], Transfer]
     make_picture: Callable[[Any, str], Picture]
     render: Callable[[Any, str, Any], F32]
+    reference: Callable[..., F32]
     cache_used_bytes: Callable[[], int]

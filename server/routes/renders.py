@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
 from fastapi.concurrency import run_in_threadpool
@@ -32,10 +32,15 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
     return _body(await run_in_threadpool(services.renders.get, identity))
 
 
+def baked_view(name: str, transfer: Transfer) -> Any:
+    """A view of a bake that a body names. Raises ParameterError."""
+    if name not in transfer.views:
+        raise ParameterError("view", name, "one of " + ", ".join(transfer.views)[:400])
+    return transfer.views[name]
+
+
 def _check(request: RenderRequest, transfer: Transfer) -> None:
-    if request.view not in transfer.views:
-        raise ParameterError("view", request.view, "one of " + ", ".join(transfer.views)[:400])
-    view = transfer.views[request.view]
+    view = baked_view(request.view, transfer)
     if request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)

@@ -90,3 +90,16 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
     assert real.get(real.get(f"/api/scenes/{scene['id']}").json()["thumbnail"]).status_code == 200
     assert probe["material"] == name
     assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
+
+
+def test_frame_is_true(real: TestClient) -> None:
+    """The comparison over REST, with the real reference: what it finds is the bake's error, not its own noise."""
+    glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
+    scene = real.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
+    bake_request: dict[str, Any] = {"scene": scene["id"], "size": [32, 24], "lights": 1000}
+    bake = wait_until_done(real, real.post("/api/bakes", json=bake_request).headers["location"])
+    request = {"bake": bake["id"], "view": scene["views"][0]["name"], "passes": 8}
+    truth = wait_until_done(real, real.post("/api/truths", json=request).headers["location"])
+    assert truth["state"] == "ready", truth["problem"]
+    assert truth["found"]["noise"] > 0
+    assert truth["found"]["error"] < 0.03

@@ -1,0 +1,79 @@
+"""/api/truths: a frame against brute force, pass by pass."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Literal
+
+from fastapi import APIRouter, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from relume import look as looks
+from relume.errors import ParameterError
+from server.bodies import Id, TruthBody, TruthFigures, TruthRequest
+from server.errors import NotReadyError
+from server.live.ports import Transfer
+from server.routes.bakes import ready_bake
+from server.routes.renders import baked_view
+from server.services import Shared
+from server.truths import TruthStatus
+
+router = APIRouter(prefix="/api/truths", tags=["truths"])
+
+
+@router.post("", status_code=202)
+async def submit_truth(request: TruthRequest, services: Shared, response: Response) -> TruthBody:
+    """Queue a comparison; the look is checked first."""
+    await run_in_threadpool(ready_bake, services, request.bake)
+    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        await run_in_threadpool(_check, request, transfer)
+    identity = await run_in_threadpool(services.truths.submit, request)
+    response.headers["Location"] = f"/api/truths/{identity}"
+    return _body(await run_in_threadpool(services.truths.get, identity))
+
+
+def _check(request: TruthRequest, transfer: Transfer) -> None:
+    baked_view(request.view, transfer)
+    try:
+        looks.complete(request.look, transfer.default_look)
+    except ParameterError as error:
+        raise ParameterError(f"/look{error.name}", error.value, error.allowed) from None
+
+
+@router.get("/{truth}")
+def get_truth(truth: Id, services: Shared) -> TruthBody:
+    """State, progress, and what was found so far."""
+    return _body(services.truths.get(truth))
+
+
+@router.delete("/{truth}", status_code=204)
+def delete_truth(truth: Id, services: Shared) -> Response:
+    """Stop a comparison and forget it."""
+    services.truths.delete(truth)
+    return Response(status_code=204)
+
+
+@router.get("/{truth}/{name}.png", response_class=FileResponse)
+def get_picture(truth: Id, name: Literal["error", "reference"], services: Shared) -> FileResponse:
+    """Where the frame differs, or the brute force so far; from the second pass on."""
+    status = services.truths.get(truth)
+    path = services.truths.picture_path(truth, name)
+    if not path.exists():
+        raise NotReadyError(f"two passes are needed, {status.passes} are done; wait a little")
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-store"})
+
+
+def _body(status: TruthStatus) -> TruthBody:
+    found = None if status.found is None else TruthFigures(**asdict(status.found))
+    return TruthBody(
+        id=status.id,
+        bake=status.request.bake,
+        view=status.request.view,
+        state=status.state,
+        passes=status.passes,
+        total=status.request.passes,
+        progress=status.progress,
+        found=found,
+        problem=status.problem,
+    )

@@ -1,0 +1,103 @@
+"""A frame compared with brute force over REST: figures, pictures, restart, deletion, bad requests."""
+
+import io
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from server_fakes import SIZE, Control
+from session_client import Baked
+
+from server.app import create_app
+from server.settings import Settings
+
+WAIT_S = 60.0
+
+
+def wait_until(client: TestClient, url: str, is_reached: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        body: dict[str, Any] = client.get(url).json()
+        if is_reached(body):
+            return body
+        time.sleep(0.02)
+    raise TimeoutError(url)
+
+
+def is_done(body: dict[str, Any]) -> bool:
+    return body["state"] in ("ready", "failed")
+
+
+def submit(client: TestClient, baked: Baked, passes: int) -> str:
+    queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes})
+    assert queued.status_code == 202, queued.text
+    return str(queued.headers["location"])
+
+
+def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 6)
+    body = wait_until(client, url, is_done)
+    assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
+    # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth
+    assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
+    assert body["found"]["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
+    assert body["found"]["significant"] > 0.99
+    error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/error.png").content)), int)
+    assert error.shape == (SIZE[1], SIZE[0], 3)
+    assert np.mean(error[..., 0] > error[..., 2] + 20) > 0.99  # too bright
+    assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE
+    assert client.get(f"{url}/other.png").status_code == 422
+
+
+def test_comparison_goes_on_after_a_restart(
+    settings: Settings, client: TestClient, control: Control, baked: Baked
+) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 3)
+    assert wait_until(client, url, is_done)["state"] == "ready"
+    queue = client.app.state.services.truths
+    identity = url.rsplit("/", 1)[1]
+    request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
+    queue._backlog._update(
+        identity, state="running", request=request
+    )  # as a kill after three passes leaves it
+    later = Control()
+    later.may_trace.set()
+    with TestClient(create_app(settings, open_library=later.open_library)) as restarted:
+        assert wait_until(restarted, url, is_done)["passes"] == 5
+    assert later.passes_asked[-2:] == [3, 4]
+
+
+def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, control: Control, baked: Baked) -> None:
+    url = submit(client, baked, 1000)
+    wait_until(client, url, lambda body: body["state"] == "running")
+    assert client.get(f"{url}/error.png").status_code == 409
+    assert client.delete(url).status_code == 204
+    assert client.get(url).status_code == 404
+    control.may_trace.set()  # the next one is worked on
+    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
+    folder = client.app.state.services.settings.data / "truths"
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({"bake": "0" * 16}, 404),
+        ({"view": "nowhere"}, 422),
+        ({"passes": 1}, 422),
+        ({"passes": 10**9}, 422),
+        ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
+        ({"spp": 5}, 422),
+    ],
+)
+def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[str, Any], status: int) -> None:
+    request = {"bake": baked.bake, "view": "front"} | change
+    answer = client.post("/api/truths", json=request)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
