@@ -115,7 +115,7 @@ def _full_image(transfer: Transfer, look: Look) -> F64:
 
 
 def _full_term(transfer: Transfer, receivers: Any, document: dict[str, Any], cos_theta_o: F64) -> F64:
-    term = TERMS[document["model"]]
+    term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
     active = max(bands, key=lambda name: bands[name].shape[1])
     frozen = freeze(term, bands, active, transfer.lights, receivers, lambda share: None, lambda: False)

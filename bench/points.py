@@ -51,7 +51,7 @@ def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights:
 
 def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
     """The operator of one term along one curve."""
-    term = TERMS[document["model"]]
+    term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
     return freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
 

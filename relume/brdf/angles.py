@@ -25,6 +25,9 @@ THETA_R = int(Angle.THETA_R)
 ALPHA = int(Angle.ALPHA)
 BETA = int(Angle.BETA)
 THETA_O = int(Angle.THETA_O)
+LOBE = int(Angle.LOBE)
+TILT_X = int(Angle.TILT_X)
+TILT_Y = int(Angle.TILT_Y)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -73,7 +76,7 @@ def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """γ of one pair of directions; `kind` is an `Angle`."""
+    """γ of one pair of directions; `kind` is an `Angle`, wo is multiplied by `Curve.axes` already."""
     if kind == THETA_I:
         return acos_clamped(iz)
     if kind == THETA_O:
@@ -81,6 +84,8 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     if kind == THETA_R:
         # reflection of wo about the normal is (-ox, -oy, oz)
         return acos_clamped(iz * oz - ix * ox - iy * oy)
+    if kind == LOBE:
+        return acos_clamped(ix * ox + iy * oy + iz * oz)
     hx, hy, hz = ix + ox, iy + oy, iz + oz
     # opposite directions have no half vector; the tiny constant keeps the length from vanishing
     inverse = _ONE / math.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-12))
@@ -88,6 +93,11 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
         return acos_clamped(hz * inverse)
     if kind == THETA_D:
         return acos_clamped((hx * ix + hy * iy + hz * iz) * inverse)
+    # tan γ = |h along the axis| / n·h, written without the tangent, which has a pole
+    if kind == TILT_X:
+        return acos_clamped(hz / math.sqrt(hz * hz + hx * hx + np.float32(1e-12)))
+    if kind == TILT_Y:
+        return acos_clamped(hz / math.sqrt(hz * hz + hy * hy + np.float32(1e-12)))
     # Ashikhmin–Shirley, eqs. 15 and 16, Ben-Artzi 2006
     cos_theta_h = min(max(hz * inverse, np.float32(1e-6)), _ONE)
     across = hx * hx + hy * hy
@@ -125,6 +135,15 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
     elif kind == BETA:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(BETA, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == LOBE:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(LOBE, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == TILT_X:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(TILT_X, ix[k], iy[k], iz[k], ox, oy, oz)
+    elif kind == TILT_Y:
+        for k in range(ix.shape[0]):
+            out[k] = scale * angle_at(TILT_Y, ix[k], iy[k], iz[k], ox, oy, oz)
     else:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(THETA_O, ix[k], iy[k], iz[k], ox, oy, oz)

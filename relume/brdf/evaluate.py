@@ -18,14 +18,16 @@ def _normalise(v: F64) -> F64:
     return np.asarray(v / np.where(length > 0, length, 1.0))
 
 
-def angles_numpy(angle: Angle, wi: F64, wo: F64) -> F64:
+def angles_numpy(angle: Angle, wi: F64, wo: F64, axes: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> F64:
     """γ(wi, wo) in radians, clamped to [0, π/2].
 
     Definitions: `THETA_R` between wi and the reflection of wo about the normal; `ALPHA` and `BETA` by eqs. 15 and 16,
-    Ben-Artzi 2006: cos γα = (cos θh)^(cos² φh), cos γβ = (cos θh)^(sin² φh), φh from the tangent x.
+    Ben-Artzi 2006: cos γα = (cos θh)^(cos² φh), cos γβ = (cos θh)^(sin² φh), φh from the tangent x; `TILT_X` and
+    `TILT_Y`: tan γ = tan θh |cos φh|, tan θh |sin φh|; `LOBE`: cos γ = Σ axes · wi · wo, axis by axis.
 
     Args:
         wi, wo: local frame, unit, z = normal. (..., 3)
+        axes: of the curve, see `Curve.axes`.
     Returns:
         (...) float64
     """
@@ -43,6 +45,11 @@ def angles_numpy(angle: Angle, wi: F64, wo: F64) -> F64:
             cosine = np.sum(half * wi, axis=-1)
         case Angle.THETA_R:
             cosine = np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1)
+        case Angle.LOBE:
+            cosine = np.sum(wi * wo * axes, axis=-1)
+        case Angle.TILT_X | Angle.TILT_Y:
+            along = half[..., 0 if angle is Angle.TILT_X else 1]
+            return np.arctan2(np.abs(along), np.maximum(half[..., 2], 0.0))
         case Angle.ALPHA | Angle.BETA:
             phi_h = np.arctan2(half[..., 1], half[..., 0])
             cosine = cos_theta_h ** np.square(np.cos(phi_h) if angle is Angle.ALPHA else np.sin(phi_h))
@@ -58,11 +65,11 @@ def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
     Returns:
         1/sr, no cosine. (..., 3) float64; zero below the horizon. Textures are not part of it.
     """
-    term = TERMS[term_document["model"]]
+    term = TERMS[term_document["model"]].settled(term_document)
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
     value = term.quotient(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0))[..., None]
     value = value * np.asarray(term_document.get("color", (1.0, 1.0, 1.0)), np.float64)
     for curve in term.curves:
-        gamma = angles_numpy(curve.angle, wi, wo)
+        gamma = angles_numpy(curve.angle, wi, wo, curve.axes)
         value = value * np.moveaxis(curve_values(term_document, curve, gamma), 0, -1)
     return np.asarray(value)

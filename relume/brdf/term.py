@@ -7,7 +7,7 @@ Eqs. 7 and 9, Ben-Artzi 2006. A term's own file declares one `Term`; the registr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -28,11 +28,16 @@ class Angle(IntEnum):
     ALPHA = 4
     BETA = 5
     THETA_O = 6
+    LOBE = 7
+    TILT_X = 8
+    TILT_Y = 9
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A number that generates curves; a look gives one value, or three for separate R, G, B.
+
+    One that is fixed at freeze (see `Term.fixed`) has one value for all channels.
 
     Attributes:
         unit: "" where the number has none.
@@ -59,6 +64,7 @@ class Curve:
         parameters: names of the parameters the generator reads.
         num_bands: J, a power of two.
         label: what people read, e.g. "half angle θh".
+        axes: what multiplies wo, axis by axis, before the angle is taken; other than ones for `LOBE` only.
     """
 
     name: str
@@ -67,6 +73,7 @@ class Curve:
     generator: Callable[[F64, Params], F64]
     parameters: tuple[str, ...]
     num_bands: int
+    axes: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     @property
     def outgoing(self) -> bool:
@@ -84,6 +91,8 @@ class Term:
             loops; zero where either direction is below the horizon.
         source: the equation it is built from.
         texture: the texture channel it takes by default, "diffuse" or "specular".
+        fixed: parameters that no curve reads: they shape the quotient or an angle, and changing one freezes anew.
+        settle: params -> the fields of this declaration that `fixed` changes; as declared they hold for the defaults.
     """
 
     model: str
@@ -94,6 +103,19 @@ class Term:
     source: str
     texture: str
     help: str
+    fixed: tuple[str, ...] = ()
+    settle: Callable[[Params], dict[str, Any]] | None = None
+
+    def fixed_values(self, document: Mapping[str, Any]) -> tuple[float, ...]:
+        """Of a term document, in the order of `fixed`; what it leaves out has its default."""
+        given = document.get("params") or {}
+        return tuple(float(given.get(name, self.parameter(name).default)) for name in self.fixed)
+
+    def settled(self, document: Mapping[str, Any]) -> Term:
+        """This term with its fixed parameters put in: quotient and angles have none left."""
+        if self.settle is None:
+            return self
+        return replace(self, **self.settle(dict(zip(self.fixed, self.fixed_values(document), strict=True))))
 
     def parameter(self, name: str) -> Parameter:
         """The declaration of one parameter; KeyError where there is none of that name."""

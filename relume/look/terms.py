@@ -61,7 +61,8 @@ def _complete_params(pointer: Pointer, given: Any, term: Term) -> dict[str, Any]
     params = {}
     for parameter in term.parameters:
         value = given.get(parameter.name, parameter.default)
-        check_number_or_rgb((*pointer, parameter.name), value, parameter.minimum, parameter.maximum)
+        check = check_number if parameter.name in term.fixed else check_number_or_rgb
+        check((*pointer, parameter.name), value, parameter.minimum, parameter.maximum)
         params[parameter.name] = value
     return params
 

@@ -12,7 +12,8 @@ import numba as nb
 from relume.brdf.term import Angle
 
 _THETA_I, _THETA_H, _THETA_D = int(Angle.THETA_I), int(Angle.THETA_H), int(Angle.THETA_D)
-_THETA_R, _ALPHA = int(Angle.THETA_R), int(Angle.ALPHA)
+_THETA_R, _ALPHA, _LOBE = int(Angle.THETA_R), int(Angle.ALPHA), int(Angle.LOBE)
+_TILT_X, _TILT_Y = int(Angle.TILT_X), int(Angle.TILT_Y)
 
 
 @nb.njit(nogil=True, cache=True)
@@ -49,12 +50,18 @@ def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: 
 
 @nb.njit(nogil=True, cache=True)
 def _angle(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """γ in radians, as `relume.brdf.evaluate.angles_numpy` defines it."""
+    """γ in radians, as `relume.brdf.evaluate.angles_numpy` defines it; wo is multiplied by the curve's axes."""
     if kind == _THETA_I:
         return math.acos(min(max(iz, 0.0), 1.0))
     if kind == _THETA_R:
         return math.acos(min(max(iz * oz - ix * ox - iy * oy, 0.0), 1.0))
+    if kind == _LOBE:
+        return math.acos(min(max(ix * ox + iy * oy + iz * oz, 0.0), 1.0))
     hx, hy, hz = ix + ox, iy + oy, iz + oz
+    if kind == _TILT_X:
+        return math.atan2(abs(hx), max(hz, 0.0))
+    if kind == _TILT_Y:
+        return math.atan2(abs(hy), max(hz, 0.0))
     length = max(math.sqrt(hx * hx + hy * hy + hz * hz), 1e-300)
     if kind == _THETA_D:
         return math.acos(min(max((hx * ix + hy * iy + hz * iz) / length, 0.0), 1.0))
@@ -77,10 +84,11 @@ def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def add_lights(kinds, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
+def add_lights(kinds, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
     """Σ power · shading · Π curves over the listed lights, per channel, added to out (3,).
 
     Args:
+        kinds, axes: `Curve.angle` and `Curve.axes` of each curve. (C,) int64, (C, 3) float64
         tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
         is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
         is_gray: the curve is the same in all channels. (C,) bool
@@ -93,7 +101,8 @@ def add_lights(kinds, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, s
         if r == 0.0:
             continue
         for k in range(kinds.shape[0]):
-            position = _angle(kinds[k], wi[0, n], wi[1, n], wi[2, n], ox, oy, oz) * scale
+            x, y, z = axes[k, 0] * ox, axes[k, 1] * oy, axes[k, 2] * oz
+            position = _angle(kinds[k], wi[0, n], wi[1, n], wi[2, n], x, y, z) * scale
             value = _read(tables[k, 0], position, is_stepped[k, 0])
             r *= value
             g *= value if is_gray[k] else _read(tables[k, 1], position, is_stepped[k, 1])

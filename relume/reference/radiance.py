@@ -64,21 +64,22 @@ class _Tables:
     document: Document
     term: Term
     kinds: NDArray[np.int64]
+    axes: F64
     values: F64
     is_stepped: NDArray[np.bool_]
     is_gray: NDArray[np.bool_]
 
 
 def _tabulate(document: Document) -> _Tables:
-    term = TERMS[document["model"]]
+    term = TERMS[document["model"]].settled(document)
     curves = [curve for curve in term.curves if not curve.outgoing]
     gamma = np.linspace(0.0, MAX_ANGLE, _STEPS + 1)
     values = np.array([curve_values(document, curve, gamma) for curve in curves]).reshape(len(curves), 3, _STEPS + 1)
     is_stepped = np.array([_stepped(document, curve) for curve in curves], np.bool_).reshape(-1, 3)
     is_gray = np.array([bool(np.all(value == value[0])) for value in values], np.bool_)
-    return _Tables(
-        document, term, np.array([int(curve.angle) for curve in curves], np.int64), values, is_stepped, is_gray
-    )
+    kinds = np.array([int(curve.angle) for curve in curves], np.int64)
+    axes = np.array([curve.axes for curve in curves]).reshape(-1, 3)
+    return _Tables(document, term, kinds, axes, values, is_stepped, is_gray)
 
 
 def _stepped(document: Document, curve: Curve) -> list[bool]:
@@ -153,7 +154,7 @@ def _add_texels(
                 shading = table.term.quotient(x, y, z, ox, oy, oz) * z
                 total = np.zeros(3)
                 add_lights(
-                    table.kinds, table.values, table.is_stepped, table.is_gray,
+                    table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,
                     light, num, wi, ox, oy, oz, shading, power, total,
                 )  # fmt: skip
                 out[m, p] += total * _factor(table, points, p, oz)

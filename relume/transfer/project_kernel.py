@@ -134,7 +134,7 @@ def _quarter(gamma, entry, share, leaves, shares, num):  # type: ignore[no-untyp
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, local, gamma, entry, ox, oy, oz, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
+    kinds, scale, scaled_wo, local, gamma, entry, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
 ):
     """Divide an entry's triangle in four until its angles are linear, depth first (appendix A).
 
@@ -165,6 +165,7 @@ def _divide(  # type: ignore[no-untyped-def]
             g = own_gamma[k, :, 0]
             for corner in range(3):
                 g[corner] = stack_gamma[top, k, corner]
+            ox, oy, oz = scaled_wo[k, 0], scaled_wo[k, 1], scaled_wo[k, 2]
             for node in range(3, 6):
                 g[node] = scale[k] * angle_at(kinds[k], dirs[node, 0], dirs[node, 1], dirs[node, 2], ox, oy, oz)
             bend = max(bend, _bend_of(g[0], g[1], g[2], g[3], g[4], g[5]))
@@ -267,7 +268,7 @@ def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, power,
-    kinds, num_bands, bands, is_gray, support, active, start, stop, out,
+    kinds, axes, num_bands, bands, is_gray, support, active, start, stop, out,
 ):  # fmt: skip
     """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their visible lights.
 
@@ -287,20 +288,22 @@ def project_points(  # type: ignore[no-untyped-def]
     stack, depth = np.empty((3 * _MAX_DEPTH + 4, 3, 3), np.float32), np.empty(3 * _MAX_DEPTH + 4, np.int64)
     stack_gamma = np.empty((3 * _MAX_DEPTH + 4, num_curves, 3), np.float32)
     dirs, own_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6, 1), np.float32)
+    scaled_wo = np.empty((num_curves, 3), np.float32)
     one = np.float32(1)
     for p in range(start, stop):
         row = p - start
         begin, end = first[row], first[row + 1]
         if begin == end:
             continue
-        ox, oy, oz = local_wo[0, begin], local_wo[1, begin], local_wo[2, begin]
         if num_curves > 0:
             _turn_nodes(normal[p], tangent[p], nodes, light, begin, end, local)
         for k in range(num_curves):
+            for axis in range(3):
+                scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
             for node in range(6):
                 angles_into(
                     kinds[k], scale[k], local[0, node, : end - begin], local[1, node, : end - begin],
-                    local[2, node, : end - begin], ox, oy, oz, gamma[k, node],
+                    local[2, node, : end - begin], scaled_wo[k, 0], scaled_wo[k, 1], scaled_wo[k, 2], gamma[k, node],
                 )  # fmt: skip
         _bends(gamma, support, end - begin, bend)
         num, num_bent = _gather_linear(gamma, end - begin, bend, leaves, shares, of_entry, bent)
@@ -315,7 +318,7 @@ def project_points(  # type: ignore[no-untyped-def]
                 num = _quarter(gamma, entry, one, leaves, shares, num)
             else:
                 num = _divide(
-                    kinds, scale, local, gamma, entry, ox, oy, oz,
+                    kinds, scale, scaled_wo, local, gamma, entry,
                     stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num,
                 )  # fmt: skip
             of_entry[before:num] = entry

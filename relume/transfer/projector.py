@@ -46,6 +46,7 @@ class Contraction:
 
     Attributes:
         kinds: `Angle` of each curve that depends on wi. (C,) int64
+        axes: `Curve.axes` of each. (C, 3) float32
         num_bands: (C,) int64
         bands: padded with the last band. (C, max J, 3) float32
         is_gray: the curve is the same in all channels. (C,) bool
@@ -55,6 +56,7 @@ class Contraction:
     """
 
     kinds: NDArray[np.int64]
+    axes: F32
     num_bands: NDArray[np.int64]
     bands: F32
     is_gray: NDArray[np.bool_]
@@ -99,6 +101,7 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
     padded = [np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge") for row in rows]
     return Contraction(
         np.array([int(curve.angle) for curve in curves], np.int64),
+        np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
         np.array([row.shape[1] for row in rows], np.int64),
         np.ascontiguousarray(np.array(padded, np.float32).reshape(len(rows), 3, widest).transpose(0, 2, 1)),
         np.array([bool(np.all(row == row[0])) for row in rows], np.bool_),
@@ -159,6 +162,7 @@ class Projector:
             lights.nodes,
             self._power,
             c.kinds,
+            c.axes,
             c.num_bands,
             c.bands,
             c.is_gray,

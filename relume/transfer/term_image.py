@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
-from relume.brdf.term import Term
 from relume.errors import EditError
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.shade import Shaded
@@ -32,6 +31,7 @@ class TermImage:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
         active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
+        term: the declaration of the term's model, fixed parameters put in.
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
@@ -43,19 +43,18 @@ class TermImage:
         self.active: str | None = None
         self.shown: F64 | None = None
         self.is_composed = False
+        self._kind: tuple[str, tuple[float, ...]] | None = None
         self.set_document(document)
 
-    @property
-    def term(self) -> Term:
-        """The declaration of the term's model."""
-        return TERMS[self.document["model"]]
-
     def set_document(self, document: Mapping[str, Any]) -> None:
-        """A new target; another model starts from nothing."""
-        previous = getattr(self, "document", None)
-        self.document = document
-        if previous is not None and previous["model"] != document["model"]:
+        """A new target; another model, or another value of a fixed parameter, starts from nothing."""
+        model: str = document["model"]
+        kind = (model, TERMS[model].fixed_values(document))
+        if kind != self._kind:
             self.effective = self.active = self.shown = None
+        self._kind = kind
+        self.document = document
+        self.term = TERMS[model].settled(document)
         self.target = {curve.name: curve_bands(document, curve) for curve in self.term.curves if not curve.outgoing}
         self.outgoing = self._outgoing()
         self.is_composed = False
@@ -88,7 +87,7 @@ class TermImage:
         """What a frozen operator, or an image where no curve is active, depends on besides view and material."""
         bands = self.target if of_target or self.effective is None else self.effective
         return (
-            self.document["model"],
+            self._kind,
             active,
             *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name != active),
         )

@@ -103,7 +103,7 @@ def project(term, bands, active, lights, receivers, depth=5):
 
 def band_of(curve, wi, wo):
     """The band that the exact angle of each pair of directions falls in."""
-    gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape))
+    gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
     return np.minimum((gamma * curve.num_bands / (np.pi / 2)).astype(int), curve.num_bands - 1)
 
 
@@ -123,7 +123,7 @@ def project_points(term, bands, lights, receivers):
 
 def integrate_texels(document, radiance, receivers, seen=None):
     """The reflection integral of one term over all texels at exact angles. seen: (n, texels) bool. (n, 3)"""
-    term = TERMS[document["model"]]
+    term = TERMS[document["model"]].settled(document)
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3).astype(float)
     power = (radiance * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
@@ -137,7 +137,7 @@ def integrate_texels(document, radiance, receivers, seen=None):
         weight = power[above] * (term.quotient(*wi.T, *(np.full(len(wi), o) for o in wo)) * wi[:, 2])[:, None]
         for curve in term.curves:
             if not curve.outgoing:
-                gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape))
+                gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
                 weight = weight * curve_values(document, curve, gamma).T
         out[row] = weight.sum(axis=0)
     return out
@@ -157,7 +157,7 @@ def radiance_of(transfer, view: View, look):
             continue
         receivers = view.receivers(index)
         for document in look.materials[name].terms:
-            term = TERMS[document["model"]]
+            term = TERMS[document["model"]].settled(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
             projector = Projector(term, contract(term, bands, None), transfer.lights, receivers)
             image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
