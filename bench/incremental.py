@@ -111,7 +111,7 @@ def _full_image(transfer: Transfer, look: Look) -> F64:
     pixel_of = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
     for c in range(3):
         weighted[:, c] = np.bincount(pixel_of, view.weight * radiance[view.order, c], len(weighted))
-    return look.environment.scale * weighted.reshape(view.height, view.width, 3)
+    return np.array(look.environment.gain) * weighted.reshape(view.height, view.width, 3)
 
 
 def _full_term(transfer: Transfer, receivers: Any, document: dict[str, Any], cos_theta_o: F64) -> F64:

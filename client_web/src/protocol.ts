@@ -47,7 +47,7 @@ export interface MaterialLook {
 }
 export interface Look {
   materials: Record<string, MaterialLook>;
-  environment: { scale: number; rotation: number };
+  environment: { scale: number; color: Rgb; rotation: number };
   lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
   display: { exposure: number; tone_map: string };
 }

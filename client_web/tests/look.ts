@@ -11,7 +11,7 @@ export const LOOK: Look = {
     },
     "a/b~c": { terms: [{ model: "lambert", color: [0.5, 0.5, 0.5] }] },
   },
-  environment: { scale: 1, rotation: 0 },
+  environment: { scale: 1, color: [1, 1, 1], rotation: 0 },
   lights: {},
   display: { exposure: 0, tone_map: "agx" },
 };

@@ -28,7 +28,7 @@ def default_look(scene_materials: Sequence[Material], light_names: Sequence[str]
             material.name: {"terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ())}
             for material in scene_materials
         },
-        "environment": {"scale": 1.0, "rotation": 0.0},
+        "environment": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
         "lights": {name: {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True} for name in light_names},
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
@@ -92,6 +92,7 @@ def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[
 def _complete_environment(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     merged = _merged(("environment",), given, default)
     check_number(("environment", "scale"), merged["scale"], 0.0, MAX_SCALE)
+    check_rgb(("environment", "color"), merged["color"], 0.0, MAX_COLOR)
     check_number(("environment", "rotation"), merged["rotation"], -360.0, 360.0)
     return merged
 

@@ -43,10 +43,18 @@ class MaterialLook(_Frozen):
 
 
 class EnvironmentLook(_Frozen):
-    """`scale` multiplies the environment; `rotation` turns it about +Y, degrees, counter-clockwise from above."""
+    """The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
+    seen from above."""
 
     scale: float
+    color: Rgb
     rotation: float
+
+    @property
+    def gain(self) -> Rgb:
+        """What multiplies each channel of the environment: scale · color."""
+        red, green, blue = self.color
+        return self.scale * red, self.scale * green, self.scale * blue
 
 
 class LightLook(_Frozen):

@@ -68,7 +68,7 @@ def reference_image(
     outside = samples.material == BACKGROUND
     towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
     radiance[outside] = lookup(scene.environment.radiance, towards.astype(np.float32))
-    return _resolve(samples, look.environment.scale * radiance, size)
+    return _resolve(samples, np.array(look.environment.gain) * radiance, size)
 
 
 def points_of(samples: ViewSamples, eye: F64) -> Points:

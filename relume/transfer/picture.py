@@ -66,7 +66,7 @@ class Picture:
             for index, name in enumerate(transfer.material_names)
         }
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
-        self._scale = -1.0
+        self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
         self._baked_rotation = self._look.environment.rotation
         self._touched: CurvePointer | None = None
 
@@ -155,8 +155,8 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        if self._scale != self._look.environment.scale:
-            self._scale = self._look.environment.scale
+        if not np.array_equal(self._gain, self._look.environment.gain):
+            self._gain = np.array(self._look.environment.gain)
             first = self._view.num_surface_samples
             self._radiance[:, first:] = self._view.background().T
             tiles.update(self._view.all_tiles)
@@ -168,12 +168,12 @@ class Picture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
-        return encode(self._view, self._radiance, tiles, form, self._scale)
+        return encode(self._view, self._radiance, tiles, form, self._gain)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""
         whole = [(0, 0, self._view.width, self._view.height)]
-        pixels = resolve(self._view, self._radiance, whole, self._scale)
+        pixels = resolve(self._view, self._radiance, whole, self._gain)
         return pixels.reshape(self._view.height, self._view.width, 3)
 
     def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -194,7 +194,7 @@ class Picture:
         pixel = y * view.width + x
         entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
         samples, weights = view.order[entries], view.weight[entries]
-        radiance = self._scale * (self._radiance[:, samples] * weights).sum(axis=1)
+        radiance = self._gain * (self._radiance[:, samples] * weights).sum(axis=1)
         heaviest = int(samples[np.argmax(weights)])
         index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
         if index >= len(self._materials):
@@ -221,7 +221,7 @@ class Picture:
                     tile, offset = divmod(row, frozen.transport.shape[3])
                     columns = synthesis(frozen.transport[tile, :, :, offset].astype(np.float64))
                     bands += weight * columns * material.factors_at(term, row)[:, None] * curve
-            return str(CurvePointer(name, k, term.active)), self._scale * bands
+            return str(CurvePointer(name, k, term.active)), self._gain[:, None] * bands
         return None, None
 
     def _active_first(self, name: str, material: MaterialImage) -> list[tuple[int, TermImage]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from relume.errors import ParameterError
 from relume.parallel import for_shares
@@ -42,7 +42,7 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _resolve(radiance, scale, first, order, weight, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
+def _resolve(radiance, gain, first, order, weight, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
     for t in range(start, stop):
         x0, y0, tile_width, tile_height = tiles[t, 0], tiles[t, 1], tiles[t, 2], tiles[t, 3]
@@ -52,11 +52,11 @@ def _resolve(radiance, scale, first, order, weight, width, tiles, offsets, start
                 p = y * width + x
                 red = green = blue = np.float32(0)
                 for k in range(first[p], first[p + 1]):
-                    s, w = order[k], scale * weight[k]
+                    s, w = order[k], weight[k]
                     red += w * radiance[0, s]
                     green += w * radiance[1, s]
                     blue += w * radiance[2, s]
-                out[at, 0], out[at, 1], out[at, 2] = red, green, blue
+                out[at, 0], out[at, 1], out[at, 2] = gain[0] * red, gain[1] * green, gain[2] * blue
                 at += 1
 
 
@@ -66,12 +66,12 @@ def _pack(pixels, start, stop, out):  # type: ignore[no-untyped-def]
         out[p] = pack_rgb9e5(pixels[p, 0], pixels[p, 1], pixels[p, 2])
 
 
-def resolve(view: View, radiance: F32, tiles: Sequence[Tile], scale: float) -> F32:
+def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike) -> F32:
     """Pixels of tiles, one tile after another, row-major.
 
     Args:
         radiance: of every view sample. (3, samples) float32
-        scale: multiplies all, as the environment's scale does.
+        gain: multiplies each channel, as the environment's scale and colour do: a number or three.
     Returns:
         (pixels, 3) float32
     """
@@ -79,18 +79,19 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], scale: float) -> F
     sizes = table[:, 2] * table[:, 3]
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
-    args = (radiance, np.float32(scale), view.first, view.order, view.weight, view.width, table, offsets)
+    factors = np.array(np.broadcast_to(np.asarray(gain, np.float32), 3))
+    args = (radiance, factors, view.first, view.order, view.weight, view.width, table, offsets)
     for_shares(lambda start, stop: _resolve(*args, start, stop, out), len(table))
     return out
 
 
-def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, scale: float) -> bytes:
+def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: ArrayLike) -> bytes:
     """Pixels of tiles as a frame's payload: "rgb9e5" or "f32" (see docs/api.md).
 
     Raises:
         ParameterError: another format.
     """
-    pixels = resolve(view, radiance, tiles, scale)
+    pixels = resolve(view, radiance, tiles, gain)
     if form == "f32":
         return pixels.tobytes()
     if form != "rgb9e5":

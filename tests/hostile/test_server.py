@@ -124,6 +124,7 @@ def test_old_revision_is_refused(client: TestClient, baked: Baked, revision: int
         ("/materials/Paper/terms/1/curves", {"theta_h": {"points": [[k / 100, 1] for k in range(4097)]}}),
         ("/materials/Paper/terms/99/color", [1, 1, 1]),
         ("/environment/scale", -1),
+        ("/environment/color", [1, 1]),
         ("/__class__/__init__", 1),
         ("no pointer", 1),
         ("", {"materials": {"Nothing": {}}}),

@@ -67,6 +67,7 @@ def random_edit(rng, document):
     )
     if kind == "scale":
         document["environment"]["scale"] = float(rng.uniform(0, 3))
+        document["environment"]["color"] = rng.uniform(0, 1, 3).tolist()
         return kind
     if kind == "add" and len(terms) < 3:
         terms.append(random_term(rng))

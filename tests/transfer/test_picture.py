@@ -259,16 +259,22 @@ def test_probe_of_background_and_outside(transfer):
             picture.probe(x, y)
 
 
-def test_scaled_light_scales_probe_and_picture_alike(transfer):
-    def double(document):
-        document["environment"]["scale"] = 2.0
+@pytest.mark.parametrize(("scale", "color"), [(2.0, [1.0, 1.0, 1.0]), (0.5, [1.0, 0.2, 3.0])])
+def test_scaled_and_coloured_light_changes_probe_and_picture_alike_without_freezing(transfer, scale, color):
+    def brighten(document):
+        document["environment"] |= {"scale": scale, "color": color}
 
     one = opened(transfer, BALL + "theta_h")
-    two = opened(transfer, BALL + "theta_h", look=look_of(transfer, double))
-    np.testing.assert_allclose(two.image(), 2 * one.image(), rtol=1e-6)
+    two = opened(transfer, BALL + "theta_h")
+    two.set_look(look_of(transfer, brighten))
+    assert two.waiting() is None
+    assert two.advance(None).tiles == two.all_tiles()
+    gain = scale * np.array(color)
+    np.testing.assert_allclose(two.image(), gain * one.image(), rtol=1e-6)
     y, x = (int(v) for v in np.argwhere(pixels_of_ball_alone(transfer))[100])
     for key in ("radiance", "bands"):
-        np.testing.assert_allclose(two.probe(x, y)[key], 2 * np.asarray(one.probe(x, y)[key]), rtol=1e-6)
+        found, expected = np.asarray(two.probe(x, y)[key]), np.asarray(one.probe(x, y)[key])
+        np.testing.assert_allclose(found.T, gain * expected.T, rtol=1e-6)
 
 
 def test_brush_over_everything_is_the_material_and_stretches_add_up(transfer):

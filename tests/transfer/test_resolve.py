@@ -39,10 +39,10 @@ def radiance(view):
     return np.exp(np.random.default_rng(1).normal(size=(3, view.num_view_samples))).astype(np.float32)
 
 
-@pytest.mark.parametrize("scale", [0.0, 1.0, 2.5])
-def test_whole_picture_is_the_weighted_sum(view, radiance, scale):
-    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], scale).reshape(view.height, view.width, 3)
-    np.testing.assert_allclose(pixels, scale * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
+@pytest.mark.parametrize("gain", [0.0, 1.0, 2.5, (2.0, 0.0, 0.5)])
+def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
+    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain).reshape(view.height, view.width, 3)
+    np.testing.assert_allclose(pixels, np.array(gain) * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
 
 
 @pytest.mark.parametrize("count", [1, 3, 4])

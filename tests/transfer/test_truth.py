@@ -40,7 +40,7 @@ EDITED = {
             ]
         },
     },
-    "environment": {"scale": 1.5},
+    "environment": {"scale": 1.5, "color": [1.0, 0.8, 0.5]},
 }
 
 
@@ -86,7 +86,7 @@ def truth_of(scene, transfer, material, rows, look):
             if curve.outgoing:
                 image *= curve_values(document, curve, np.arccos(view.cos_theta_o[first + rows])).T
         total += image
-    return look.environment.scale * total
+    return np.array(look.environment.gain) * total
 
 
 @pytest.mark.parametrize(("edit", "bound"), [({}, 0.01), (EDITED, 0.01)], ids=["default", "edited"])

@@ -168,7 +168,7 @@ def radiance_of(transfer, view: View, look):
                     image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
             out[rows] += image
     out[view.num_surface_samples :] = view.background()
-    return look.environment.scale * out
+    return np.array(look.environment.gain) * out
 
 
 def resolve(view: View, radiance):

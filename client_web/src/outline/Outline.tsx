@@ -1,10 +1,9 @@
-/** What is in the scene: materials to select, and the environment's brightness. */
+/** What is in the scene: materials to select, and the light around them. */
 import { toHex } from "../inspector/color";
 import type { MaterialLook } from "../protocol";
-import { edit } from "../state/edit";
 import { select } from "../state/select";
 import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial } from "../state/store";
-import { Slider } from "../ui/Slider";
+import { EnvironmentPanel } from "./EnvironmentPanel";
 
 /** A ball in the material's colours: body from its diffuse term, highlight from the rest. */
 function Swatch({ material }: { material: MaterialLook | undefined }) {
@@ -77,22 +76,7 @@ export function Outline() {
         <span class="count">{materialNames.value.length}</span>
       </header>
       <Materials />
-      <header class="panel-head">
-        <h2>Environment</h2>
-      </header>
-      <div class="param alone">
-        <span class="param-label">Brightness</span>
-        <Slider
-          label="Environment brightness"
-          value={look.value?.environment.scale ?? 1}
-          initial={defaultLook.value?.environment.scale ?? 1}
-          minimum={0.01}
-          maximum={100}
-          scale="log"
-          unit="×"
-          onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
-        />
-      </div>
+      <EnvironmentPanel />
     </nav>
   );
 }

@@ -1,0 +1,40 @@
+/** The light around the scene: how bright it is and its tint. */
+import { ColorField } from "../inspector/ColorField";
+import { edit } from "../state/edit";
+import { defaultLook, look } from "../state/store";
+import { Slider } from "../ui/Slider";
+
+export function EnvironmentPanel() {
+  const shown = look.value?.environment;
+  const initial = defaultLook.value?.environment;
+  if (shown === undefined || initial === undefined) return null;
+  return (
+    <>
+      <header class="panel-head">
+        <h2>Environment</h2>
+      </header>
+      <div class="param alone">
+        <span class="param-label">Brightness</span>
+        <Slider
+          label="Environment brightness"
+          value={shown.scale}
+          initial={initial.scale}
+          minimum={0.01}
+          maximum={100}
+          scale="log"
+          unit="×"
+          onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
+        />
+      </div>
+      <div class="param alone">
+        <span class="param-label">Tint</span>
+        <ColorField
+          label="Environment tint"
+          value={shown.color}
+          initial={initial.color}
+          onChange={(value) => edit("Environment tint", "/environment/color", value)}
+        />
+      </div>
+    </>
+  );
+}
