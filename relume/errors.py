@@ -19,6 +19,10 @@ class MissingNormalsError(SceneError):
     """A mesh has no normals and none can be made from its triangles."""
 
 
+class MaterialError(RelumeError, ValueError):
+    """A measured material cannot be used as it is."""
+
+
 class ParameterError(RelumeError, ValueError):
     """A value lies outside what its parameter allows.
 

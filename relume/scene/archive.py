@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
-import tempfile
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -18,6 +16,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.replacing import Replacing
 from relume.scene.checks import check_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
 
@@ -67,9 +66,9 @@ def save_scene(scene: Scene, folder: str | Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     document, arrays = _describe(scene)
     document["id"] = scene.id
-    with _Replacing(folder / "arrays.npz") as arrays_file:
+    with Replacing(folder / "arrays.npz") as arrays_file:
         np.savez(arrays_file, allow_pickle=False, **arrays)
-    with _Replacing(folder / "scene.json") as json_file:
+    with Replacing(folder / "scene.json") as json_file:
         json_file.write(json.dumps(document, indent=1, allow_nan=False).encode())
 
 
@@ -95,29 +94,6 @@ def load_scene(folder: str | Path) -> Scene:
     if scene_id(*_describe(scene)) != scene.id:
         raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
     return scene
-
-
-class _Replacing:
-    """A file that takes its name only when it is complete and on the disk."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> BinaryIO:
-        handle, self._temporary = tempfile.mkstemp(prefix=".", suffix=".part", dir=self._path.parent)
-        self._file = os.fdopen(handle, "wb")
-        return self._file
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        try:
-            if kind is None:
-                self._file.flush()
-                os.fsync(self._file.fileno())
-            self._file.close()
-            if kind is None:
-                os.replace(self._temporary, self._path)
-        finally:
-            Path(self._temporary).unlink(missing_ok=True)
 
 
 def _textures(material: Material) -> Iterator[tuple[str, Texture]]:

@@ -1,0 +1,150 @@
+"""A measured BRDF at any pair of directions: linear between the nodes of the MERL grid, in its own mapping.
+
+Also what is left of it when a product of curves is divided out: the quotients of the measured terms (docs/method.md).
+All arithmetic is float64; directions and results keep their type.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from relume.measured.merl import CHANNEL_SCALE, F64, SHAPE, is_measured
+
+F32 = NDArray[np.float32]
+
+NUM_KNOTS = 90
+_NUM_H, _NUM_D, _NUM_P = SHAPE
+_PER_RADIAN = NUM_KNOTS / (math.pi / 2)
+
+
+class Part(IntEnum):
+    """What of a measured BRDF a quotient leaves: all of it by `WHOLE`, the lobes of eq. 18, or eq. 17's product."""
+
+    WHOLE = 0
+    DIFFUSE = 1
+    SPECULAR = 2
+    HOMOMORPHIC = 3
+
+
+THETA_I, THETA_H, THETA_D, THETA_O = range(4)  # rows of a table of curves
+_WHOLE, _DIFFUSE, _SPECULAR = int(Part.WHOLE), int(Part.DIFFUSE), int(Part.SPECULAR)
+
+
+def table_of(planes: F64) -> F32:
+    """Planes of a MERL file as `quotients` reads them: 1/sr, channels last; gaps have the nearest measured value.
+
+    Returns:
+        (90, 90, 180, 3) float32
+    """
+    measured = is_measured(planes)
+    nearest = distance_transform_edt(~measured, return_distances=False, return_indices=True)
+    filled = planes[:, nearest[0], nearest[1], nearest[2]]
+    return np.ascontiguousarray(np.moveaxis(filled * CHANNEL_SCALE[:, None, None, None], 0, -1), np.float32)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _between(position, num):  # type: ignore[no-untyped-def]
+    """Node below a position, and how far it is on the way to the next; constant beyond the last one."""
+    position = min(max(position, 0.0), num - 1.0)
+    node = min(int(position), num - 2)
+    return node, position - node
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _on_curve(knots, position):  # type: ignore[no-untyped-def]
+    node, share = _between(position, NUM_KNOTS)
+    return (1.0 - share) * knots[node] + share * knots[node + 1]
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _measured(table, h, d, phi, out):  # type: ignore[no-untyped-def]
+    """Trilinear; φd goes round at π. h, d, phi: positions in nodes. out: (3,), written."""
+    h0, th = _between(h, _NUM_H)
+    d0, td = _between(d, _NUM_D)
+    p0 = int(phi)
+    tp = phi - p0
+    p0 = p0 % _NUM_P
+    p1 = (p0 + 1) % _NUM_P
+    for c in range(3):
+        low = (1.0 - tp) * table[h0, d0, p0, c] + tp * table[h0, d0, p1, c]
+        high = (1.0 - tp) * table[h0, d0 + 1, p0, c] + tp * table[h0, d0 + 1, p1, c]
+        near = (1.0 - td) * low + td * high
+        low = (1.0 - tp) * table[h0 + 1, d0, p0, c] + tp * table[h0 + 1, d0, p1, c]
+        high = (1.0 - tp) * table[h0 + 1, d0 + 1, p0, c] + tp * table[h0 + 1, d0 + 1, p1, c]
+        out[c] = (1.0 - th) * near + th * ((1.0 - td) * low + td * high)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _quotients(part, table, curves, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z, out):  # type: ignore[no-untyped-def]
+    """See `quotients`; directions flat, (n,) each. out: (3, n), written."""
+    value = np.empty(3)
+    for n in range(wi_x.shape[0]):
+        ix, iy, iz = float(wi_x[n]), float(wi_y[n]), float(wi_z[n])
+        ox, oy, oz = float(wo_x[n]), float(wo_y[n]), float(wo_z[n])
+        if iz <= 0.0 or oz <= 0.0:
+            out[0, n] = out[1, n] = out[2, n] = 0.0
+            continue
+        hx, hy, hz = ix + ox, iy + oy, iz + oz
+        theta_h = math.atan2(math.sqrt(hx * hx + hy * hy), hz)
+        apart = math.sqrt((ix - ox) ** 2 + (iy - oy) ** 2 + (iz - oz) ** 2)
+        theta_d = math.atan2(apart, math.sqrt(hx * hx + hy * hy + hz * hz))
+        # sin θh sin θd times cosine and sine of φd, but for a common factor; exchanging wi and wo adds π
+        phi_d = math.atan2(iy * ox - ix * oy, 0.5 * (oz - iz) * math.sqrt(hx * hx + hy * hy + hz * hz))
+        if phi_d < 0.0:
+            phi_d += math.pi
+        h = math.sqrt(theta_h * (NUM_KNOTS * _PER_RADIAN))
+        d = theta_d * _PER_RADIAN
+        _measured(table, h, d, phi_d * (_NUM_P / math.pi), value)
+        i, o = math.acos(min(iz, 1.0)) * _PER_RADIAN, math.acos(min(oz, 1.0)) * _PER_RADIAN
+        for c in range(3):
+            if part == _WHOLE:
+                out[c, n] = value[c]
+                continue
+            product = _on_curve(curves[THETA_I, c], i) * _on_curve(curves[THETA_O, c], o)
+            if part == _DIFFUSE:
+                out[c, n] = min(value[c], product) / product
+                continue
+            lobe = _on_curve(curves[THETA_H, c], h)
+            if part == _SPECULAR:
+                rest = value[c] - min(value[c], product)
+                out[c, n] = rest / (lobe * _on_curve(curves[THETA_D, c], d))
+            else:
+                out[c, n] = value[c] / (product * lobe)
+
+
+def quotients(part: Part, table: F32, curves: F64, *directions: NDArray[np.floating]) -> NDArray[np.floating]:
+    """What is left of a measured BRDF.
+
+    With M the measured value, G = g(θi) g'(θo), and the curves' rows being θi, θh, θd, θo: `WHOLE` M; `DIFFUSE`
+    min(M, G)/G; `SPECULAR` (M − min(M, G))/(f(θh) f'(θd)); `HOMOMORPHIC` M/(G f(θh)).
+
+    Args:
+        table: of `table_of`. curves: at their knots, above zero. (4, 3, 90)
+        directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
+    Returns:
+        (3, ...) of the directions' type; zero at and below the horizon.
+    """
+    spread = np.broadcast_arrays(*directions)
+    ix, iy, iz, ox, oy, oz = (np.ascontiguousarray(axis).ravel() for axis in spread)
+    out = np.empty((3, ix.size), ix.dtype)
+    _quotients(int(part), table, curves, ix, iy, iz, ox, oy, oz, out)
+    return out.reshape(3, *spread[0].shape)
+
+
+def measured_brdf(table: F32, wi: F64, wo: F64) -> F64:
+    """The measured BRDF, 1/sr, no cosine.
+
+    Args:
+        wi, wo: local frame, unit, z = normal; they broadcast. (..., 3)
+    Returns:
+        (..., 3) float64; zero at and below the horizon.
+    """
+    none = np.empty((4, 3, NUM_KNOTS))
+    values = quotients(Part.WHOLE, table, none, *np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0))
+    return np.moveaxis(np.asarray(values, np.float64), 0, -1)
