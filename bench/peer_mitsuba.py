@@ -8,18 +8,12 @@ counted; nor is our bake.
 
 Our error: the frame of 4,000 light triangles against `relume.reference` over 2,000 random view samples. Our time: a
 change of σ that moves every coefficient, from the look to the encoded bytes (it does not depend on the lights).
-
-Mitsuba lives in its own environment: `python3 -m venv bench/.venv-peers` and `bench/.venv-peers/bin/pip install mitsuba
-numpy`, or RELUME_PEERS_PYTHON names an interpreter that has it. DRJIT_LIBLLVM_PATH names the LLVM library if it is not
-found under /usr/lib.
+bench/mitsuba.py says where Mitsuba is looked for.
 """
 
 from __future__ import annotations
 
 import copy
-import json
-import os
-import subprocess
 import tempfile
 import time
 from pathlib import Path
@@ -28,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure, skipped
+from bench.mitsuba import bsdf, missing, render
 from bench.points import frame_radiance, lit_points, relative_rmse
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
 from relume.look import validate
@@ -43,23 +38,20 @@ from relume.transfer.picture import Picture
 
 _NAMES = ("peer.mitsuba_time_ratio",)
 _SIGMA, _CURVES = 0.2, ("theta_i", "theta_h")
-_MOST_SPP = 32  # at once; more would not fit in memory
 _TERMS = tuple(complete_term(("peer",), term, None) for term in (LAMBERT, cook_torrance(_SIGMA)))
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Their time to our error, and our time."""
-    python, llvm = _interpreter(), _llvm()
-    if python is None:
-        return skipped(_NAMES, "ratio", "Mitsuba is not installed; bench/peer_mitsuba.py says where it is looked for")
-    if llvm is None:
-        return skipped(_NAMES, "ratio", "there is no LLVM library; install libllvm19 or set DRJIT_LIBLLVM_PATH")
+    if (why := missing()) is not None:
+        return skipped(_NAMES, "ratio", why)
     size = (32, 32) if tiny else (512, 512)
     scene = teapot_on_table(environments()[0], _TERMS, _TERMS)
     error = _our_error(scene, tiny)
     edit_s, frame = _our_edit(scene, size, tiny)
     with tempfile.TemporaryDirectory() as folder:
-        found = _render(python, llvm, scene, size, [1, 4] if tiny else [8, 32, 128, 512], Path(folder))
+        job = {"spp": [1, 4] if tiny else [8, 32, 128, 512], "bsdfs": [bsdf(*_TERMS)] * len(scene.meshes)}
+        found = render(scene, size, job, Path(folder))
         picture = np.load(Path(folder) / "picture.npy", allow_pickle=False)
     last = found["steps"][-1]
     theirs_s = last["seconds"] * max(1.0, (last["error"] / error) ** 2)
@@ -74,17 +66,6 @@ def measure(tiny: bool) -> list[Figure]:
         "size": list(size),
     }
     return [Figure(_NAMES[0], theirs_s / edit_s, "ratio", context)]
-
-
-def _interpreter() -> Path | None:
-    default = Path(__file__).parent / ".venv-peers" / "bin" / "python"
-    python = Path(os.environ.get("RELUME_PEERS_PYTHON", default))
-    return python if python.is_file() else None
-
-
-def _llvm() -> str | None:
-    found = sorted(map(str, Path("/usr/lib").glob("*/libLLVM*19*")))
-    return os.environ.get("DRJIT_LIBLLVM_PATH") or (found[0] if found else None)
 
 
 def _our_error(scene: Scene, tiny: bool) -> float:
@@ -120,26 +101,3 @@ def _settle(picture: Picture) -> None:
     while not picture.advance(None).exact or picture.waiting() is not None:
         if picture.waiting() is not None:
             picture.freeze(lambda share: None, lambda: False)
-
-
-def _render(
-    python: Path, llvm: str, scene: Scene, size: tuple[int, int], spp: list[int], folder: Path
-) -> dict[str, Any]:
-    """Hand the scene over as arrays and let the peer render."""
-    camera = scene.cameras[0]
-    arrays: dict[str, Any] = {"camera": camera.to_world, "environment": scene.environment.radiance}
-    for k, mesh in enumerate(scene.meshes):
-        arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
-    np.savez(folder / "scene.npz", allow_pickle=False, **arrays)
-    lambert, glossy = _TERMS
-    bsdf = {
-        "type": "lambert_cook_torrance", "albedo": lambert["color"][0], "gain": glossy["color"][0],
-        "sigma": _SIGMA, "ior": glossy["params"]["ior"],
-    }  # fmt: skip
-    job = {"yfov": camera.yfov, "size": list(size), "spp": spp, "most": _MOST_SPP, "bsdfs": [bsdf] * len(scene.meshes)}
-    (folder / "job.json").write_text(json.dumps(job))
-    script = Path(__file__).with_name("peer_mitsuba_render.py")
-    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": llvm}
-    subprocess.run([str(python), "-I", str(script), str(folder)], env=environment, check=True, timeout=3600)
-    found: dict[str, Any] = json.loads((folder / "result.json").read_text())
-    return found

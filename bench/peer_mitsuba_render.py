@@ -1,6 +1,7 @@
 """Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
 
-python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json and picture.npy
+python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json and picture.npy, or
+                                            passes.npy where the job asks for independent passes instead
 """
 
 from __future__ import annotations
@@ -134,12 +135,10 @@ def render(scene: Any, spp: int, most: int, seed: int) -> Any:
     return total / passes
 
 
-def main(folder: Path) -> None:
+def steps(scene: Any, job: dict[str, Any], folder: Path) -> None:
     """Two pictures with different seeds at each count: their difference is √2 times the error of one."""
-    job = json.loads((folder / "job.json").read_text())
-    scene = load(folder, job)
     render(scene, job["spp"][0], job["most"], 99)  # compiles
-    steps = []
+    found = []
     for spp in job["spp"]:
         if spp >= job["most"]:
             render(scene, job["most"], job["most"], 98)  # each wavefront size warms up by itself
@@ -149,9 +148,23 @@ def main(folder: Path) -> None:
         picture = (one + other) / 2
         scale = np.sqrt(np.mean(picture[..., :3] ** 2))
         error = np.sqrt(np.mean((one - other) ** 2) / 2) / scale
-        steps.append({"spp": spp, "seconds": taken_s, "error": float(error)})
+        found.append({"spp": spp, "seconds": taken_s, "error": float(error)})
     np.save(folder / "picture.npy", np.ascontiguousarray(picture[..., :3], np.float32))
-    (folder / "result.json").write_text(json.dumps({"steps": steps, "version": mi.__version__}))
+    (folder / "result.json").write_text(json.dumps({"steps": found, "version": mi.__version__}))
+
+
+def passes(scene: Any, job: dict[str, Any], folder: Path) -> None:
+    """Pictures that are independent of each other. (passes, height, width, 3)"""
+    pictures = [render(scene, job["spp"][0], job["most"], seed)[..., :3] for seed in range(job["passes"])]
+    np.save(folder / "passes.npy", np.array(pictures, np.float32))
+    (folder / "result.json").write_text(json.dumps({"version": mi.__version__}))
+
+
+def main(folder: Path) -> None:
+    """One job."""
+    job = json.loads((folder / "job.json").read_text())
+    scene = load(folder, job)
+    (passes if "passes" in job else steps)(scene, job, folder)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.light.environment import read_environment
+from relume.light.environment import read_environment, texel_directions
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.studio import studio
@@ -39,15 +39,18 @@ def environments() -> list[Environment]:
     paths = [shared_data() / "envmaps" / f"{name}.hdr" for name in REAL]
     if all(path.is_file() for path in paths):
         return [read_environment(path, path.stem) for path in paths]
-    return [studio(), _sky("high sun (made by code)", 0.8), _sky("low sun (made by code)", 0.15)]
+    return [studio(), sky("high sun (made by code)", 0.8), sky("low sun (made by code)", 0.15)]
 
 
-def _sky(name: str, height: float) -> Environment:
-    from relume.light.environment import texel_directions
+def sky(name: str, height: float, num_rows: int = 256, spread: float = 0.0004) -> Environment:
+    """A sky with a sun whose radiance falls to 1/e where 1 − cos = spread, the same power whatever the spread.
 
-    d = texel_directions(256, 512)
+    Args:
+        height: of the sun; the tangent of its elevation is about 1.28 of it.
+    """
+    d = texel_directions(num_rows, 2 * num_rows)
     sun = np.array([0.6, height, 0.5]) / np.linalg.norm([0.6, height, 0.5])
-    glow = np.exp((d @ sun - 1) / 0.0004)[..., None] * [4000.0, 3500.0, 2600.0]
+    glow = np.exp((d @ sun - 1) / spread)[..., None] * np.array([1.6, 1.4, 1.04]) / spread
     sky = np.where(d[..., 1:2] > 0, 0.4 + 0.6 * d[..., 1:2], 0.1) * [0.5, 0.7, 1.0]
     return Environment(name, (sky + glow).astype(np.float32))
 

@@ -37,7 +37,11 @@ TARGETS = {
 
 def document_of(name: str) -> str:
     """Which document a figure belongs to."""
-    return "accuracy.md" if name.startswith("accuracy.") or name == "frame.incremental_rmse" else "performance.md"
+    return (
+        "accuracy.md"
+        if name.startswith(("accuracy.", "truth.")) or name == "frame.incremental_rmse"
+        else "performance.md"
+    )
 
 
 def row(figure: dict[str, Any]) -> str:
@@ -56,6 +60,8 @@ def row(figure: dict[str, Any]) -> str:
 def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
+    if isinstance(value, dict):
+        return "(" + ", ".join(f"{key} {_short(item)}" for key, item in value.items()) + ")"
     return "×".join(map(_short, value)) if isinstance(value, list) else str(value)
 
 

@@ -20,7 +20,7 @@ IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rays", "bench.bake",
     "bench.store_size",
 ]  # fmt: skip
-WITH_PROCESSES = ["bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba"]
+WITH_PROCESSES = ["bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth"]
 
 
 def group_of(module: str) -> registry.Group:

@@ -48,6 +48,15 @@ def test_faces_look_where_their_normals_do() -> None:
         assert (faces * mesh.normals[mesh.faces].mean(1)).sum(1).min() > 0.3, mesh.name
 
 
+@pytest.mark.parametrize("name", ["Table", "Cloth"])
+def test_what_lies_open_shows_its_front_to_both_views(name: str) -> None:
+    """A renderer that draws fronts only must see it."""
+    mesh = MESHES[name]
+    for camera in SCENE.cameras:
+        towards = camera.to_world[:3, 3] - mesh.positions
+        assert np.mean((mesh.normals * towards).sum(axis=1) > 0) > 0.95
+
+
 def test_spheres_and_shells_are_closed_and_turned_outwards() -> None:
     for name in ("Tray", "Bowl", "Pearls"):
         mesh = MESHES[name]

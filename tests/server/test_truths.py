@@ -63,9 +63,7 @@ def test_comparison_goes_on_after_a_restart(
     queue = client.app.state.services.truths
     identity = url.rsplit("/", 1)[1]
     request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
-    queue._backlog._update(
-        identity, state="running", request=request
-    )  # as a kill after three passes leaves it
+    queue._backlog._update(identity, state="running", request=request)  # as a kill after three passes leaves it
     later = Control()
     later.may_trace.set()
     with TestClient(create_app(settings, open_library=later.open_library)) as restarted:

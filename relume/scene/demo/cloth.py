@@ -66,4 +66,4 @@ def stage(num_columns: int = 97, num_rows: int = 28) -> Surface:
     y = (STAGE_CURVE * (1 - np.cos(a)) + np.maximum(beyond - quarter, 0)) * behind
     points = np.stack([radius * np.cos(phi), y, radius * np.sin(phi)], -1)
     uvs = np.stack(np.broadcast_arrays(phi / (2 * np.pi), s), -1)
-    return closed_grid_surface(points[:, ::-1], uvs[:, ::-1])
+    return closed_grid_surface(points, uvs)

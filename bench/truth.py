@@ -1,0 +1,90 @@
+"""truth.mitsuba: the reference itself against Mitsuba 3, three scenes, same formulas and maps; the worst of the three.
+
+Both render independent passes, ours at four times the size, averaged over 4 × 4 view samples as Mitsuba's box filter
+averages over a pixel. With m_k Mitsuba's passes and o_k ours, m_k − (o_k − ō) has Mitsuba's mean and the noise of both,
+so that `relume.reference.truth` tells a disagreement from noise per pixel. Mitsuba reads the map bilinearly and we read
+its texels, so the maps are smooth at the size of a texel.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.figure import Figure, skipped
+from bench.mitsuba import bsdf, missing, render
+from bench.scenes import cook_torrance, sky, teapot_on_table
+from relume.look import default_look, validate
+from relume.look.terms import complete_term
+from relume.reference import reference_image
+from relume.reference.truth import Estimate, compare
+from relume.scene.archive import make_scene
+from relume.scene.demo import demo_scene
+from relume.scene.model import Environment, Material, Scene
+
+F32 = NDArray[np.float32]
+_NAMES = ("truth.mitsuba",)
+_FINER = 4
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Noise taken off, how far apart the two are; significant pixels would be 0.01 by chance."""
+    if (why := missing()) is not None:
+        return skipped(_NAMES, "relative RMSE", why)
+    size, spp, passes = ((16, 12), 4, 2) if tiny else ((96, 72), 64, 8)
+    found: dict[str, Any] = {}
+    for name, scene in _scenes(64 if tiny else 1024).items():
+        found[name] = _disagreement(scene, size, spp, passes)
+    context = {"size": list(size), "spp": spp, "passes": passes, **found}
+    return [Figure(_NAMES[0], max(scene["error"] for scene in found.values()), "relative RMSE", context)]
+
+
+def _scenes(num_rows: int) -> dict[str, Scene]:
+    """The teapot under a high sun, the still life under a low one, and from the left under a hazy one."""
+    terms = _terms(0.5, 0.2)
+    demo = demo_scene()
+    grey = [
+        Material(material.name, _terms(0.15 + 0.1 * k, 0.1 + 0.05 * k)) for k, material in enumerate(demo.materials)
+    ]
+
+    def still_life(view: int, light: Environment) -> Scene:
+        return make_scene("Still life", demo.meshes, grey, demo.cameras[view : view + 1], light)
+
+    return {
+        "teapot, high sun": teapot_on_table(sky("high", 0.8, num_rows), terms, terms),
+        "still life, low sun": still_life(0, sky("low", 0.3, num_rows)),
+        "still life from the left, haze": still_life(1, sky("haze", 0.5, num_rows, spread=0.02)),
+    }
+
+
+def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
+    lambert = {"model": "lambert", "color": [albedo] * 3}
+    return tuple(complete_term(("truth",), term, None) for term in (lambert, cook_torrance(sigma)))
+
+
+def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) -> dict[str, float]:
+    """`relume.reference.truth.Comparison` of the two means."""
+    bsdfs = [bsdf(*scene.materials[mesh.material].terms) for mesh in scene.meshes]
+    with tempfile.TemporaryDirectory() as folder:
+        render(scene, size, {"spp": [spp], "bsdfs": bsdfs, "passes": passes}, Path(folder))
+        theirs = np.load(Path(folder) / "passes.npy", allow_pickle=False)
+    ours = np.array([_our_pass(scene, size, spp, k) for k in range(passes)])
+    mean = ours.mean(axis=0)
+    estimate = Estimate.nothing(size[1], size[0])
+    for one, other in zip(theirs, ours, strict=True):
+        estimate = estimate.with_pass(one - (other - mean))
+    return {**asdict(compare(mean, estimate)), "mean_ratio": float(mean.mean() / theirs.mean())}
+
+
+def _our_pass(scene: Scene, size: tuple[int, int], spp: int, index: int) -> F32:
+    width, height = size
+    finer = (_FINER * width, _FINER * height)
+    look = validate({}, default_look(scene.materials))
+    image = reference_image(scene, scene.cameras[0].name, look, finer, spp, pass_index=index)
+    blocks = image.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3), dtype=np.float64)
+    return np.asarray(blocks, np.float32)
