@@ -48,10 +48,9 @@ def test_faces_look_where_their_normals_do() -> None:
         assert (faces * mesh.normals[mesh.faces].mean(1)).sum(1).min() > 0.3, mesh.name
 
 
-@pytest.mark.parametrize("name", ["Table", "Cloth"])
-def test_what_lies_open_shows_its_front_to_both_views(name: str) -> None:
-    """A renderer that draws fronts only must see it."""
-    mesh = MESHES[name]
+def test_the_table_shows_its_front_to_both_views() -> None:
+    """It is no closed surface; a renderer that draws fronts only must see it."""
+    mesh = MESHES["Table"]
     for camera in SCENE.cameras:
         towards = camera.to_world[:3, 3] - mesh.positions
         assert np.mean((mesh.normals * towards).sum(axis=1) > 0) > 0.95
