@@ -38,6 +38,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     *CLIENT_MESSAGES,
     bodies.BakeRequest,
     bodies.RenderRequest,
+    bodies.TruthRequest,
 )
 OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
@@ -49,6 +50,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.BakeBody,
     bodies.DryRunBody,
     bodies.RenderBody,
+    bodies.TruthBody,
     bodies.LookEntry,
 )
 

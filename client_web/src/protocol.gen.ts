@@ -76,6 +76,14 @@ export interface TouchMessage {
   curve: string;
 }
 
+/** Compare a look with brute force, in so many passes; figures come from the second on. */
+export interface TruthRequest {
+  bake: string;
+  view: string;
+  look?: Record<string, unknown>;
+  passes?: number;
+}
+
 /** client → server: show this view. `size` is the space the client has; frames come in the baked size. */
 export interface ViewMessage {
   type: "view";
@@ -292,6 +300,27 @@ export interface StatusMessage {
   state: "freezing" | "ready";
   what: string;
   progress: number;
+}
+
+/** A comparison; `passes` are done. */
+export interface TruthBody {
+  id: string;
+  bake: string;
+  view: string;
+  state: "queued" | "running" | "ready" | "failed";
+  passes: number;
+  total: number;
+  progress: number;
+  found: TruthFigures | null;
+  problem: string | null;
+}
+
+/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off; `significant`: share of pixels whose difference the noise does not explain, 0.01 by chance. */
+export interface TruthFigures {
+  rmse: number;
+  noise: number;
+  error: number;
+  significant: number;
 }
 
 /** A baked view and its size in pixels. */

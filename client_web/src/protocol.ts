@@ -19,6 +19,8 @@ export type {
   RenderRequest,
   ServerMessage,
   StatusMessage,
+  TruthBody,
+  TruthRequest,
 } from "./protocol.gen";
 export { MAX_MESSAGE_BYTES, SUBPROTOCOL } from "./protocol.gen";
 

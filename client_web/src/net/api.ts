@@ -8,6 +8,8 @@ import type {
   RenderBody,
   RenderRequest,
   SceneBody,
+  TruthBody,
+  TruthRequest,
 } from "../protocol";
 
 export class ApiError extends Error {
@@ -82,3 +84,16 @@ export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
 }
 export const getRender = (id: string) => get<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
+
+const truthPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
+
+export async function startTruth(body: TruthRequest): Promise<TruthBody> {
+  return (await (await request("/api/truths", json("POST", body))).json()) as TruthBody;
+}
+export const getTruth = (id: string) => get<TruthBody>(truthPath(id));
+export async function deleteTruth(id: string): Promise<void> {
+  await request(truthPath(id), { method: "DELETE" });
+}
+/** The address of a comparison's picture as it is after so many passes. */
+export const truthPicture = (id: string, name: "error" | "reference", passes: number) =>
+  `${truthPath(id)}/${name}.png?passes=${passes}`;

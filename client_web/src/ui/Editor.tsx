@@ -4,6 +4,8 @@ import { Inspector } from "../inspector/Inspector";
 import { Outline } from "../outline/Outline";
 import { PictureView } from "../picture/PictureView";
 import { filmstripOpen, helpOpen, inspectorOpen, inspectorWidth, outlineOpen } from "../state/store";
+import { TruthPanel } from "../truth/TruthPanel";
+import { truthOpen } from "../truth/truth";
 import { Help } from "./Help";
 import { Splitter } from "./Splitter";
 import { StatusBar } from "./StatusBar";
@@ -18,6 +20,7 @@ export function Editor() {
       <div class="middle">
         {outlineOpen.value && <Outline />}
         <PictureView />
+        {truthOpen.value && <TruthPanel />}
         {inspectorOpen.value && <Splitter />}
         {inspectorOpen.value && <Inspector />}
       </div>

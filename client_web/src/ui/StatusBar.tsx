@@ -4,6 +4,7 @@ import { cancelBake } from "../net/api";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
 import { coming, connection, exact, freezing, latencyMs, look, retryInMs } from "../state/store";
+import { toggleTruth, truthOpen } from "../truth/truth";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
 
@@ -58,6 +59,9 @@ export function StatusBar() {
         edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
       <span class={`exactness ${exact.value ? "is-exact" : ""}`}>{pictureWords()}</span>
+      <button aria-pressed={truthOpen.value} title="Compare this picture with brute force" onClick={toggleTruth}>
+        How true is this?
+      </button>
       {freezing.value !== null && <progress max={1} value={freezing.value.progress} aria-label={pictureWords()} />}
       <span class="spacer" />
       {coming.value !== null && (
