@@ -46,6 +46,7 @@ GROUPS = (
     Group("bench.incremental", ("frame.incremental_rmse",)),
     Group("bench.curve_switch", ("freeze.curve_switch_s",)),
     Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
+    Group("bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear")),
     Group("bench.truth", ("truth.mitsuba",)),
     Group("bench.rays", ("bake.rays_vs_embreex",)),
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),

@@ -39,7 +39,7 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.")) or name == "frame.incremental_rmse"
+        if name.startswith(("accuracy.", "truth.", "paper.")) or name == "frame.incremental_rmse"
         else "performance.md"
     )
 
