@@ -54,6 +54,12 @@ def direction_to_uv(w: NDArray[np.floating]) -> tuple[F64, F64]:
     return u, 0.5 - np.arcsin(np.clip(direction[..., 1], -1, 1)) / np.pi
 
 
+def turned(direction: F64, degrees: float) -> F64:
+    """Directions turned about +Y, counter-clockwise seen from above. (n, 3)"""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.asarray(direction @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]))
+
+
 def read_environment(source: str | Path | bytes, name: str) -> Environment:
     """Reads an equirectangular .hdr or .exr image.
 

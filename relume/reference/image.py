@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.environment import lookup
-from relume.light.triangles import MIN_LIGHTS
+from relume.light.environment import lookup, turned
+from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look
 from relume.reference.radiance import Points, reference_radiance
-from relume.reference.texels import texels_of, turned
+from relume.reference.texels import texels_of
 from relume.scene.model import Scene
 from relume.trace.geometry import merge
 from relume.trace.view_samples import BACKGROUND, ViewSamples, sample_view

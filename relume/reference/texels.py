@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.environment import texel_solid_angles, uv_to_direction
+from relume.light.environment import texel_solid_angles, turned, uv_to_direction
 from relume.scene.model import Environment
 
 F64 = NDArray[np.float64]
@@ -42,12 +42,6 @@ class Texels:
         probability = np.diff(self.share, prepend=0.0)[index]
         weight = count / (num_samples * probability)
         return Texels(self.direction[index], self.power[index] * weight[:, None], np.empty(0))
-
-
-def turned(direction: F64, degrees: float) -> F64:
-    """Directions turned about +Y, counter-clockwise seen from above. (n, 3)"""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.asarray(direction @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]))
 
 
 def texels_of(environment: Environment, rotation: float = 0.0) -> Texels:

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import PlanError
-from relume.light.triangles import MAX_LIGHTS, MIN_LIGHTS, subdivide
+from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS
+from relume.light.triangles import subdivide
 from relume.look import default_look
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge

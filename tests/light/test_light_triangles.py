@@ -9,7 +9,8 @@ from tiny_scenes import studio
 from relume.color import luminance
 from relume.errors import PlanError
 from relume.light.environment import texel_directions, texel_solid_angles
-from relume.light.triangles import MAX_LIGHTS, _Subdivision, subdivide
+from relume.light.tiles import MAX_LIGHTS, choose_tiles
+from relume.light.triangles import subdivide
 
 
 def solid_angles(corners):
@@ -35,11 +36,9 @@ def corners_of(lights):
 
 def tiles_of(radiance, num_lights):
     """The tiles behind `subdivide`, in its order: corners (M, 3, 3) and the texels in each."""
-    tree = _Subdivision(radiance)
-    while len(tree.heap) + 3 <= num_lights and tree.split_largest():
-        pass
-    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])
-    return np.asarray(tree.vertices)[[leaf[2] for leaf in leaves]], [leaf[3] for leaf in leaves]
+    tiles = choose_tiles(radiance, num_lights)
+    found = tiles.locate(texel_directions(*radiance.shape[:2]).reshape(-1, 3).astype(float))
+    return tiles.corners, [np.nonzero(found == m)[0] for m in range(len(tiles.codes))]
 
 
 def texel_power(radiance):

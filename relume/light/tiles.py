@@ -1,0 +1,191 @@
+"""Spherical triangles that tile the sphere: leaves of a hierarchy that begins as an octahedron.
+
+Ben-Artzi 2006, section 5.2: each triangle is split into four at its edges' midpoints where the metric of structured
+importance sampling (Agarwal 2003, L · ΔΩ^b) is largest.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.color import luminance
+from relume.errors import PlanError
+from relume.light.environment import texel_directions, texel_solid_angles
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+MIN_LIGHTS, MAX_LIGHTS = 8, 65_536
+MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
+
+# Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
+# here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
+_SOLID_ANGLE_EXPONENT = 0.4
+_UNIFORM_SHARE = 1e-2
+
+_OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
+# counter-clockwise seen from outside, and so are all their descendants; in the order of the signs of x, y, z
+_OCTANTS = ((5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 3, 0), (5, 2, 0), (0, 2, 4))
+
+
+def unit(v: F64) -> F64:
+    """Vectors of length one, along the last axis."""
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """M triangles that tile the sphere.
+
+    Attributes:
+        codes: place of each in the hierarchy: 8 + octant, then two bits for the child at each level. (M,) uint64
+    """
+
+    codes: NDArray[np.uint64]
+
+    @cached_property
+    def corners(self) -> F64:
+        """Unit corners of each, counter-clockwise seen from outside. (M, 3, 3)"""
+        return np.array([_corners(int(code)) for code in self.codes])
+
+    @cached_property
+    def centroids(self) -> F64:
+        """Unit direction to the middle of each. (M, 3)"""
+        return unit(self.corners.mean(axis=1))
+
+    def locate(self, directions: F64) -> NDArray[np.int32]:
+        """The tile that each direction (n, 3) lies in; one on an edge has exactly one. (n,)"""
+        edges, children = self._tree
+        found = np.empty(len(directions), np.int32)
+        for_shares(lambda start, stop: _locate(directions, edges, children, start, stop, found), len(directions))
+        return found
+
+    @cached_property
+    def _tree(self) -> tuple[F64, NDArray[np.int32]]:
+        """Of each inner node: the normals of its middle child's edges (N, 3, 3), and its children (N, 4).
+
+        The first eight nodes are the octants. A child below zero is tile −1 − child.
+        """
+        index = {code: -1 - tile for tile, code in enumerate(map(int, self.codes))}
+        inner = {code >> shift for code in index for shift in range(2, code.bit_length() - 3, 2)}
+        roots = [8 + octant for octant in range(8)]
+        nodes = roots + sorted(inner.difference(roots))
+        index.update((node, k) for k, node in enumerate(nodes) if node not in index)
+        children = np.zeros((len(nodes), 4), np.int32)
+        edges = np.zeros((len(nodes), 3, 3))
+        for k, node in enumerate(nodes):
+            if index[node] < 0:  # an octant that is a tile itself
+                children[k] = index[node]
+            else:
+                children[k] = [index[4 * node + child] for child in range(4)]
+            edges[k] = _middle_edges(_corners(node))
+        return edges, children
+
+
+def _corners(code: int) -> F64:
+    """Corners of a node of the hierarchy. (3, 3)"""
+    levels = (code.bit_length() - 4) // 2
+    corners = _OCTAHEDRON[list(_OCTANTS[(code >> 2 * levels) - 8])]
+    for level in reversed(range(levels)):
+        a, b, c = corners
+        ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
+        corners = np.stack(((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))[(code >> 2 * level) & 3])
+    return corners
+
+
+def _middle_edges(corners: F64) -> F64:
+    """Normals of the edges of a triangle's middle child, each towards the corner that it cuts off. (3, 3)"""
+    a, b, c = corners
+    ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
+    return np.stack([np.cross(ab, ca), np.cross(bc, ab), np.cross(ca, bc)])
+
+
+@nb.njit(nogil=True, cache=True)
+def _child(d, edges):  # type: ignore[no-untyped-def]
+    """Which of four children a direction lies in: 0, 1, 2 at the corners, 3 in the middle.
+
+    The middle child's three edges decide: outside edge k means child k. Every direction gets exactly one child, also
+    where rounding puts it on an edge.
+    """
+    for k in range(3):
+        if edges[k, 0] * d[0] + edges[k, 1] * d[1] + edges[k, 2] * d[2] > 0:
+            return k
+    return 3
+
+
+@nb.njit(nogil=True, cache=True)
+def _locate(directions, edges, children, start, stop, found):  # type: ignore[no-untyped-def]
+    for n in range(start, stop):
+        d = directions[n]
+        node = 4 * (d[0] >= 0) + 2 * (d[1] >= 0) + (d[2] >= 0)
+        while node >= 0:
+            node = children[node, _child(d, edges[node])]
+        found[n] = -1 - node
+
+
+@nb.njit(nogil=True, cache=True)
+def _split(texels, directions, edges, child_of):  # type: ignore[no-untyped-def]
+    for k in range(texels.shape[0]):
+        child_of[k] = _child(directions[texels[k]], edges)
+
+
+class _Subdivision:
+    """The growing hierarchy: a heap of leaves by metric."""
+
+    def __init__(self, radiance: F32, uniform_share: float) -> None:
+        height, width, _ = radiance.shape
+        self.directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
+        self.solid_angles = np.repeat(texel_solid_angles(height, width), width)
+        self.luminous = luminance(radiance.reshape(-1, 3)).astype(np.float64) * self.solid_angles
+        self.uniform = uniform_share * float(self.luminous.sum()) / (4 * np.pi)
+        self.heap: list[tuple[float, int, int, NDArray[np.int64]]] = []
+        self.count = 0
+        sign = (self.directions >= 0).astype(np.int64)
+        octant = sign[:, 0] * 4 + sign[:, 1] * 2 + sign[:, 2]
+        for k in range(8):
+            self._push(8 + k, np.nonzero(octant == k)[0])
+
+    def _push(self, code: int, texels: NDArray[np.int64]) -> None:
+        light = float(self.luminous[texels].sum())
+        extent = float(self.solid_angles[texels].sum())
+        metric = light * max(extent, 1e-12) ** _SOLID_ANGLE_EXPONENT + self.uniform * extent
+        # fewer than two texels hold nothing more to resolve: last in the queue
+        can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
+        heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, texels))
+        self.count += 1
+
+    def split_largest(self) -> bool:
+        """Replace the leaf of largest metric by its four children; False where nothing is left to split."""
+        if self.heap[0][0] == 0.0:
+            return False
+        _, _, code, texels = heapq.heappop(self.heap)
+        child_of = np.empty(len(texels), np.int8)
+        _split(texels, self.directions, _middle_edges(_corners(code)), child_of)
+        for child in range(4):
+            self._push(4 * code + child, texels[child_of == child])
+        return True
+
+
+def choose_tiles(radiance: F32, num_lights: int) -> Tiles:
+    """Divide the sphere into about `num_lights` triangles (the next count of the form 8 + 3k, or fewer).
+
+    Args:
+        radiance: equirectangular, top row first. (height, width, 3) float32
+    Raises:
+        PlanError: `num_lights` outside [8, 65536].
+    Cost: O(texels · depth) time.
+    """
+    if not MIN_LIGHTS <= num_lights <= MAX_LIGHTS:
+        raise PlanError(f"{num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
+    tree = _Subdivision(radiance, _UNIFORM_SHARE)
+    while len(tree.heap) + 3 <= num_lights and tree.split_largest():
+        pass
+    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together
+    return Tiles(np.array([leaf[2] for leaf in leaves], np.uint64))
