@@ -48,6 +48,7 @@ GROUPS = (
     Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
     Group("bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear")),
     Group("bench.truth", ("truth.mitsuba",)),
+    Group("bench.rotation", ("accuracy.rotation_lambert", "accuracy.rotation_cook_torrance_0.2")),
     Group("bench.rays", ("bake.rays_vs_embreex",)),
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
     Group("bench.store_size", ("store.bytes_per_view_sample",)),

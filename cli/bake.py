@@ -27,6 +27,9 @@ def bake(
     ] = None,
     size: Size = None,
     lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: 2000]")] = None,
+    relightable: Annotated[
+        bool, typer.Option("--relightable", help="Divide the light so that the environment can be turned or exchanged.")
+    ] = False,
     watch: Annotated[
         bool, typer.Option(help="Bake here and show it; --no-watch leaves it to a running server and returns.")
     ] = True,
@@ -44,7 +47,7 @@ def bake(
     service = open_bakes(settings)
     try:
         record = find_scene(service.ledger, scene)
-        identity = service.submit(record.id, _recipe(record, method, view, size, lights))
+        identity = service.submit(record.id, _recipe(record, method, view, size, lights, relightable))
         if not watch:
             typer.echo(identity)
             return 0
@@ -53,7 +56,9 @@ def bake(
         service.close()
 
 
-def _recipe(record: SceneRecord, method: str, views: list[str] | None, size: str | None, lights: int | None) -> Recipe:
+def _recipe(
+    record: SceneRecord, method: str, views: list[str] | None, size: str | None, lights: int | None, relightable: bool
+) -> Recipe:
     from relume.errors import ParameterError
     from relume.transfer.base import Recipe
     from worker.presets import PRESETS
@@ -65,7 +70,8 @@ def _recipe(record: SceneRecord, method: str, views: list[str] | None, size: str
         raise ParameterError("--lights", lights, "a number of at least 1")
     preset = PRESETS["good"]
     chosen = tuple(dict.fromkeys(views or record.views))
-    return Recipe(method, chosen, parse_size(size) if size else preset.size, lights or preset.num_lights)
+    pixels = parse_size(size) if size else preset.size
+    return Recipe(method, chosen, pixels, lights or preset.num_lights, relightable)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:

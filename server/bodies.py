@@ -86,7 +86,10 @@ class ModelBody(Body):
 
 
 class BakeRequest(Body):
-    """What to bake. A preset gives size and lights; what is named beside it wins."""
+    """What to bake. A preset gives size and lights; what is named beside it wins.
+
+    `relightable`: divide the light so that turning or exchanging the environment errs little.
+    """
 
     scene: Id
     method: Name = "direct"
@@ -94,6 +97,7 @@ class BakeRequest(Body):
     preset: Preset | None = None
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    relightable: bool = False
     dry_run: bool = False
 
 
@@ -114,6 +118,7 @@ class RecipeBody(Body):
     views: list[str]
     size: tuple[int, int]
     lights: int
+    relightable: bool
 
 
 class BakeBody(Body):

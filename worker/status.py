@@ -66,7 +66,13 @@ def recipe_from_json(text: str) -> Recipe:
     """The inverse of `recipe_json`."""
     document: dict[str, Any] = json.loads(text)
     width, height = document["size"]
-    return Recipe(str(document["method"]), tuple(document["views"]), (width, height), int(document["num_lights"]))
+    return Recipe(
+        str(document["method"]),
+        tuple(document["views"]),
+        (width, height),
+        int(document["num_lights"]),
+        bool(document["relightable"]),
+    )
 
 
 def bake_id(scene_id: str, recipe: Recipe) -> str:

@@ -29,6 +29,8 @@ MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
 # here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
 _SOLID_ANGLE_EXPONENT = 0.4
 _UNIFORM_SHARE = 1e-2
+# Light that may come to any azimuth has more dim places where a lamp may arrive (docs/adr/0013-relightable-bakes.md).
+_RELIGHTABLE_UNIFORM_SHARE = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
 # counter-clockwise seen from outside, and so are all their descendants; in the order of the signs of x, y, z
@@ -49,6 +51,15 @@ class Tiles:
     """
 
     codes: NDArray[np.uint64]
+
+    def is_whole(self) -> bool:
+        """Whether they are leaves of a hierarchy, and cover the sphere once."""
+        codes = set(map(int, self.codes))
+        bits = [code.bit_length() for code in codes]
+        if len(codes) != len(self.codes) or any(n % 2 or not 4 <= n <= 4 + 2 * MAX_DEPTH for n in bits):
+            return False
+        inner = {code >> shift for code in codes for shift in range(2, code.bit_length() - 3, 2)}
+        return inner.isdisjoint(codes) and sum(4 ** (MAX_DEPTH - (n - 4) // 2) for n in bits) == 8 * 4**MAX_DEPTH
 
     @cached_property
     def corners(self) -> F64:
@@ -173,18 +184,23 @@ class _Subdivision:
         return True
 
 
-def choose_tiles(radiance: F32, num_lights: int) -> Tiles:
+def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> Tiles:
     """Divide the sphere into about `num_lights` triangles (the next count of the form 8 + 3k, or fewer).
 
     Args:
         radiance: equirectangular, top row first. (height, width, 3) float32
+        relightable: the environment will be turned or exchanged: divide rings about +Y evenly, by their mean light.
     Raises:
         PlanError: `num_lights` outside [8, 65536].
     Cost: O(texels · depth) time.
     """
     if not MIN_LIGHTS <= num_lights <= MAX_LIGHTS:
         raise PlanError(f"{num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
-    tree = _Subdivision(radiance, _UNIFORM_SHARE)
+    if relightable:
+        ring = radiance.mean(axis=1, keepdims=True, dtype=np.float64).astype(np.float32)
+        tree = _Subdivision(np.broadcast_to(ring, radiance.shape), _RELIGHTABLE_UNIFORM_SHARE)
+    else:
+        tree = _Subdivision(radiance, _UNIFORM_SHARE)
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
     leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together

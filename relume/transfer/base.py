@@ -26,12 +26,14 @@ class Recipe:
         views: camera names, in order.
         size: width and height in pixels.
         num_lights: triangles that the environment is divided into.
+        relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
     """
 
     method: str
     views: tuple[str, ...]
     size: tuple[int, int]
     num_lights: int
+    relightable: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
+    lights/environment                                       radiance, to weigh it again
+    lights/tiles                                             relume.light.tiles.Tiles
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular
@@ -19,15 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import PlanError
-from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS
-from relume.light.triangles import subdivide
+from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
+from relume.light.triangles import weigh
 from relume.look import default_look
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
-from relume.transfer.stored import read_lights
+from relume.transfer.stored import read_lights, read_tiles
 
 CHUNK_ROWS, SHARD_ROWS = 1024, 16_384
 MAX_PIXELS = 4096 * 4096
@@ -66,7 +68,7 @@ class DirectMethod:
         return Plan(
             num_view_samples=samples,
             num_rays=samples * recipe.num_lights,
-            store_bytes=samples * (bits + _SURFACE_BYTES),
+            store_bytes=samples * (bits + _SURFACE_BYTES) + scene.environment.radiance.nbytes,
             # the sampling stage holds eight rays of each edge pixel with their surfaces, the others one shard
             peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + 200) + 200_000_000,
         )
@@ -79,6 +81,7 @@ class DirectMethod:
             "scene": scene.id,
             "size": list(recipe.size),
             "num_lights": recipe.num_lights,
+            "relightable": recipe.relightable,
             "look": default_look(scene.materials),
             "materials": [material.name for material in scene.materials],
             "views": [{"name": view, "eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views],
@@ -117,9 +120,7 @@ class DirectMethod:
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
-            lights = subdivide(scene.environment.radiance, recipe.num_lights)
-            names = ("nodes", "direction", "power")
-            return Written({f"lights/{name}": getattr(lights, name) for name in names}, 0, 0.0)
+            return Written(self._lights(scene, recipe), 0, 0.0)
         samples = sample_view(scene, self._geometry_of(scene), task.view, recipe.size)
         surface = samples.surface
         arrays: dict[str, NDArray[Any]] = {
@@ -130,13 +131,23 @@ class DirectMethod:
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
 
+    @staticmethod
+    def _lights(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        radiance = scene.environment.radiance
+        tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
+        lights = weigh(tiles, radiance)
+        arrays: dict[str, NDArray[Any]] = {f"lights/{name}": value for name, value in vars(lights).items()}
+        return {**arrays, "lights/tiles": tiles.codes, "lights/environment": radiance}
+
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
-        lights = read_lights(store)
+        # light that may come to any part of a tile is asked for in its middle
+        relightable = bool(store.attributes["relightable"])
+        towards = read_tiles(store).centroids.astype(np.float32) if relightable else read_lights(store).direction
         geometry = self._geometry_of(scene)
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        traced = trace_visibility(geometry.embree, position, normal, lights.direction)
+        traced = trace_visibility(geometry.embree, position, normal, towards)
         return Written({f"{prefix}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 
     def _geometry_of(self, scene: Scene) -> Geometry:

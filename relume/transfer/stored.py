@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.errors import StoreError
+from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
 from relume.transfer.base import StoreReader
 from relume.transfer.projector import Receivers
@@ -13,6 +15,14 @@ from relume.transfer.projector import Receivers
 def read_lights(store: StoreReader) -> TriangleLights:
     """The light triangles of a store."""
     return TriangleLights(*(store.read(f"lights/{name}") for name in ("nodes", "direction", "power")))
+
+
+def read_tiles(store: StoreReader) -> Tiles:
+    """The tiles that its light triangles stand for. Raises StoreError where they do not tile the sphere."""
+    tiles = Tiles(store.read("lights/tiles"))
+    if not tiles.is_whole():
+        raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
+    return tiles
 
 
 def read_receivers(store: StoreReader, k: int, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:

@@ -116,7 +116,8 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
         raise ParameterError("views", unknown[0], "some of " + ", ".join(known)[:400])
     preset = PRESETS[request.preset or "good"]
     views = tuple(dict.fromkeys(request.views or known))
-    return Recipe(request.method, views, request.size or preset.size, request.lights or preset.num_lights)
+    lights = request.lights or preset.num_lights
+    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
@@ -136,7 +137,13 @@ def bake_body(status: BakeStatus, services: Services) -> BakeBody:
 
 
 def _recipe_body(recipe: Recipe) -> RecipeBody:
-    return RecipeBody(method=recipe.method, views=list(recipe.views), size=recipe.size, lights=recipe.num_lights)
+    return RecipeBody(
+        method=recipe.method,
+        views=list(recipe.views),
+        size=recipe.size,
+        lights=recipe.num_lights,
+        relightable=recipe.relightable,
+    )
 
 
 def _plan(plan: Plan, services: Services) -> PlanBody:

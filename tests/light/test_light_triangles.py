@@ -9,8 +9,8 @@ from tiny_scenes import studio
 from relume.color import luminance
 from relume.errors import PlanError
 from relume.light.environment import texel_directions, texel_solid_angles
-from relume.light.tiles import MAX_LIGHTS, choose_tiles
-from relume.light.triangles import subdivide
+from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
+from relume.light.triangles import subdivide, weigh
 
 
 def solid_angles(corners):
@@ -211,3 +211,68 @@ def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
 def test_absurd_counts_are_refused(asked):
     with pytest.raises(PlanError, match="give 8 to"):
         subdivide(np.ones((2, 4, 3), np.float32), asked)
+
+
+@pytest.mark.parametrize("columns", [0, 3, 16, 40])
+def test_a_turned_environment_weighs_as_its_turned_image(columns):
+    radiance = studio()  # 64 texels wide
+    tiles = choose_tiles(radiance, 200)
+    turned = weigh(tiles, radiance, 360 * columns / 64)
+    rolled = weigh(tiles, np.roll(radiance, -columns, axis=1))
+    # a texel's centre that rounding puts on the other side of an edge changes two tiles; most tiles have none there
+    same = np.isclose(turned.power, rolled.power, rtol=1e-5, atol=1e-9).all(axis=1)
+    assert same.mean() > 0.9
+    np.testing.assert_allclose(turned.direction[same], rolled.direction[same], atol=1e-5)
+    np.testing.assert_allclose(turned.power.sum(axis=0, dtype=float), rolled.power.sum(axis=0, dtype=float), rtol=1e-5)
+
+
+def test_another_environment_keeps_all_its_light_in_the_tiles_it_lies_in():
+    tiles = choose_tiles(studio(), 300)
+    other = np.random.default_rng(4).random((38, 76, 3), np.float32)
+    lights = weigh(tiles, other)
+    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
+    depth = np.diagonal(depth_inside(tiles.corners, lights.direction.astype(float)))
+    assert (depth > -1e-6).all()
+
+
+@pytest.mark.parametrize("relightable", [False, True])
+def test_directions_are_located_in_the_tile_they_lie_in(relightable):
+    tiles = choose_tiles(studio(), 500, relightable)
+    directions = np.random.default_rng(7).normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    found = tiles.locate(directions)
+    depth = depth_inside(tiles.corners, directions)
+    assert (depth[np.arange(len(found)), found] > -1e-9).all()
+    np.testing.assert_array_equal(tiles.locate(tiles.centroids), np.arange(len(tiles.codes)))
+    np.testing.assert_array_equal(tiles.locate(tiles.corners.mean(axis=1)), np.arange(len(tiles.codes)))
+
+
+def test_relightable_tiles_are_the_same_however_the_environment_is_turned():
+    radiance = studio()
+    tiles = choose_tiles(radiance, 400, relightable=True)
+    np.testing.assert_array_equal(tiles.codes, choose_tiles(np.roll(radiance, 9, axis=1), 400, relightable=True).codes)
+    angles = solid_angles(tiles.corners)
+    plain = solid_angles(choose_tiles(radiance, 400).corners)
+    assert angles.max() / angles.min() < plain.max() / plain.min()
+
+
+@pytest.mark.parametrize(
+    "codes",
+    [
+        [],
+        range(8, 15),
+        [*range(8, 16), 8],
+        [*range(9, 16), 32, 33, 34],
+        [*range(8, 16), 32],
+        [*range(8, 15), 7],
+        [*range(8, 15), 31],
+        [*range(8, 15), 15 << (2 * MAX_DEPTH + 2)],
+    ],
+)
+def test_codes_that_do_not_tile_the_sphere_are_told(codes):
+    assert not Tiles(np.array(list(codes), np.uint64)).is_whole()
+
+
+@pytest.mark.parametrize("num_lights", [8, 11, 500])
+def test_chosen_tiles_are_whole(num_lights):
+    assert choose_tiles(studio(), num_lights).is_whole()

@@ -50,7 +50,9 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
     request = {"scene": scene["id"], "preset": "preview"}
     plan = client.post("/api/bakes", json=request | {"dry_run": True})
     assert plan.status_code == 200
-    assert plan.json()["recipe"] == {"method": "direct", "views": ["front"], "size": [320, 240], "lights": 300}
+    assert plan.json()["recipe"] == {
+        "method": "direct", "views": ["front"], "size": [320, 240], "lights": 300, "relightable": False,
+    }  # fmt: skip
     assert client.get("/api/bakes").json() == []
     queued = client.post("/api/bakes", json=request)
     assert queued.status_code == 202
