@@ -38,6 +38,8 @@ def import_scene(
     for material in record.materials:
         typer.echo(f"  material {material['name']}: {' + '.join(str(term['model']) for term in material['terms'])}")
     typer.echo(f"  views: {', '.join(record.views)}")
+    if record.variants:
+        typer.echo(f"  variants: {', '.join(record.variants)}")
     typer.echo(f"  light: {scene.environment.name}, {width} × {height}")
     for warning in record.warnings:
         typer.echo(f"warning: {warning}", err=True)

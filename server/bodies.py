@@ -34,6 +34,13 @@ class SceneMaterial(Body):
     terms: list[dict[str, Any]]
 
 
+class SceneVariant(Body):
+    """A look that came with the scene's file; partial, in look-document form."""
+
+    name: str
+    look: dict[str, Any]
+
+
 class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first."""
 
@@ -43,6 +50,7 @@ class SceneBody(Body):
     views: list[SceneView]
     materials: list[SceneMaterial]
     lights: list[str]
+    variants: list[SceneVariant]
     warnings: list[str]
     triangles: int
     thumbnail: str | None

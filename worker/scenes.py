@@ -28,6 +28,7 @@ class SceneRecord:
         created: seconds since 1970.
         views: camera names, in order.
         materials: {"name", "terms"} each, in the order of material ids.
+        variants: partial looks that the file brought, by name.
     """
 
     id: str
@@ -37,6 +38,7 @@ class SceneRecord:
     materials: tuple[dict[str, Any], ...]
     warnings: tuple[str, ...]
     num_triangles: int
+    variants: dict[str, dict[str, Any]]
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -47,6 +49,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         "materials": [{"name": material.name, "terms": list(material.terms)} for material in scene.materials],
         "warnings": list(scene.warnings),
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
+        "variants": scene.variants,
     }
     row = SceneRow(id=scene.id, name=scene.name, created=time.time(), summary=json.dumps(summary))
     try:
@@ -98,4 +101,5 @@ def _record(row: SceneRow) -> SceneRecord:
         materials=tuple(summary["materials"]),
         warnings=tuple(summary["warnings"]),
         num_triangles=summary["num_triangles"],
+        variants=summary.get("variants", {}),  # rows of before there were any
     )

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -36,6 +36,7 @@ def make_scene(
     cameras: Sequence[Camera],
     environment: Environment,
     warnings: Sequence[str] = (),
+    variants: Mapping[str, dict[str, Any]] | None = None,
 ) -> Scene:
     """Checks the parts and joins them to a scene that knows its id.
 
@@ -43,7 +44,8 @@ def make_scene(
         SceneError: the parts do not make a scene (see `relume.scene.checks`).
     """
     check_scene(meshes, materials, cameras, environment)
-    scene = Scene("", name, tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings))
+    parts = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
+    scene = Scene("", name, *parts)
     document, arrays = _describe(scene)
     return replace(scene, id=scene_id(document, arrays))
 
@@ -126,6 +128,8 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "environment": {"name": scene.environment.name},
         "warnings": list(scene.warnings),
     }
+    if scene.variants:
+        document["variants"] = scene.variants
     return document, arrays
 
 
@@ -146,6 +150,7 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
         tuple(cameras),
         Environment(str(document["environment"]["name"]), arrays["environment"]),
         tuple(str(warning) for warning in document["warnings"]),
+        {str(name): dict(look) for name, look in document.get("variants", {}).items()},
     )
 
 

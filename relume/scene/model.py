@@ -105,6 +105,7 @@ class Scene:
     Attributes:
         id: hash of the content, hexadecimal; the same content has the same id.
         warnings: what the importer did not understand, one sentence each.
+        variants: partial looks by the names that the file gives them.
     """
 
     id: str
@@ -114,3 +115,4 @@ class Scene:
     cameras: tuple[Camera, ...]
     environment: Environment
     warnings: tuple[str, ...] = ()
+    variants: dict[str, dict[str, Any]] = field(default_factory=dict)

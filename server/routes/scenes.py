@@ -15,7 +15,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import Id, SceneBody, SceneMaterial, SceneView
+from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import thumbnail
@@ -125,6 +125,7 @@ def _body(record: SceneRecord, bakes: list[str], ready: Mapping[str, str]) -> Sc
         views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
         materials=[SceneMaterial(name=m["name"], terms=m["terms"]) for m in record.materials],
         lights=[],
+        variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=list(record.warnings),
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,

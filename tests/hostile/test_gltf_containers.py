@@ -21,7 +21,7 @@ def test_import_refuses_a_glb_cut_by_one_byte() -> None:
 )
 def test_import_opens_no_external_buffer(uri: str) -> None:
     message = refused(changed(buffers=[{"uri": uri, "byteLength": 4}]))
-    assert "gltf-transform copy" in message
+    assert "@gltf-transform/cli copy" in message
 
 
 def test_import_refuses_json_of_too_many_values() -> None:
@@ -49,9 +49,9 @@ def test_import_refuses_json_that_is_no_gltf(text: bytes) -> None:
 @pytest.mark.parametrize(
     ("extension", "command"),
     [
-        ("KHR_draco_mesh_compression", "gltf-transform copy"),
-        ("EXT_meshopt_compression", "gltf-transform copy"),
-        ("KHR_texture_basisu", "gltf-transform ktxdecompress"),
+        ("KHR_draco_mesh_compression", "@gltf-transform/cli copy"),
+        ("EXT_meshopt_compression", "@gltf-transform/cli copy"),
+        ("KHR_texture_basisu", "@gltf-transform/cli ktxdecompress"),
     ],
 )
 def test_import_says_how_to_unpack(extension: str, command: str) -> None:

@@ -285,14 +285,14 @@ def test_each_thing_not_understood_is_one_warning_that_names_it() -> None:
         "emissiveFactor": [1, 1, 1],
         "alphaMode": "BLEND",
         "occlusionTexture": texture,
-        "extensions": {"KHR_materials_sheen": {}},
+        "extensions": {"KHR_materials_volume": {}},
     }
     glb.quad(description, COLOR_0=colours)
     glb.document |= {"animations": [{}], "extensionsUsed": ["KHR_lights_punctual"], "skins": [{}]}
     glb.document["meshes"][0]["primitives"][0]["targets"] = [{}]
     glb.document["nodes"][0]["skin"] = 0
     warnings = imported(glb).warnings
-    words = ["glows", "see-through", "occlusion", "sheen", "vertex colours", "animations", "lights", "morph", "skin"]
+    words = ["glows", "see-through", "occlusion", "volume", "vertex colours", "animations", "lights", "morph", "skin"]
     for word in words:
         assert len([warning for warning in warnings if word in warning]) == 1, word
     assert len(warnings) == len(words)

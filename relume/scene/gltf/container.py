@@ -17,23 +17,26 @@ from pydantic import ValidationError
 
 from relume.errors import SceneError
 from relume.scene.gltf.document import Buffer, Document
+from relume.scene.gltf.layers import UNDERSTOOD
 from relume.scene.gltf.names import UNREADABLE
 
 MAX_FILE_BYTES = 512 << 20
 MAX_JSON_VALUES = 4_000_000
-PACK = "pack everything into one file: gltf-transform copy in.gltf out.glb"
+PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
 # Required extensions that change what an accessor or image holds, with what undoes them.
 PACKED_EXTENSIONS = {
-    "KHR_draco_mesh_compression": "gltf-transform copy in.glb out.glb",
-    "EXT_meshopt_compression": "gltf-transform copy in.glb out.glb",
-    "KHR_meshopt_compression": "gltf-transform copy in.glb out.glb",
-    "KHR_texture_basisu": "gltf-transform ktxdecompress in.glb out.glb",
+    "KHR_draco_mesh_compression": "npx @gltf-transform/cli copy in.glb out.glb",
+    "EXT_meshopt_compression": "npx @gltf-transform/cli copy in.glb out.glb",
+    "KHR_meshopt_compression": "npx @gltf-transform/cli copy in.glb out.glb",
+    "KHR_texture_basisu": "npx @gltf-transform/cli ktxdecompress in.glb out.glb",
 }
 READ_EXTENSIONS = {
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "EXT_texture_webp",
+    "KHR_materials_variants",
+    *UNDERSTOOD,
 }
 
 

@@ -41,7 +41,7 @@ class ImageReader:
         self._texels_left = MAX_TEXELS
 
     def texture(self, index: int, what: str) -> tuple[U8, tuple[str, str]]:
-        """The bytes (height, width, 3) of a texture and how it wraps along u and v.
+        """The bytes (height, width, 4), RGBA, of a texture and how it wraps along u and v.
 
         Raises:
             SceneError: the texture does not exist, lies outside the file, is too large, damaged or of another format.
@@ -88,7 +88,7 @@ class ImageReader:
         try:
             with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 self._check_size(*image.size, what)
-                return _rgb(image)
+                return _rgba(image)
         except SceneError:
             raise
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
@@ -104,11 +104,9 @@ class ImageReader:
             raise SceneError(f"the scene's images have more than {MAX_TEXELS:,} texels together; scale them down")
 
 
-def _rgb(image: PIL.Image.Image) -> U8:
-    """8-bit RGB; 16-bit grey is scaled, alpha is dropped, not multiplied in."""
+def _rgba(image: PIL.Image.Image) -> U8:
+    """8-bit RGBA, colours not multiplied by alpha; 16-bit grey is scaled."""
     if image.mode.startswith("I"):
         grey = np.clip(np.asarray(image, np.int64) // 257, 0, 255).astype(np.uint8)
-        return np.repeat(grey[..., None], 3, axis=2)
-    if image.mode in ("P", "PA"):
-        image = image.convert("RGBA")
-    return np.asarray(image.convert("RGB"), np.uint8)
+        return np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
+    return np.asarray(image.convert("RGBA"), np.uint8)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +23,8 @@ from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.materials import MaterialReader, Understood
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.nodes import placed_nodes
-from relume.scene.gltf.uvs import made_tangents
+from relume.scene.gltf.uvs import made_tangents, turned_tangents
+from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
 from relume.scene.model import Camera, Environment, Mesh, Scene
 
 F64 = NDArray[np.float64]
@@ -50,7 +53,7 @@ def import_gltf(source: str | Path | bytes, name: str, environment: Environment 
     if len(warnings) > MAX_WARNINGS:
         warnings = [*warnings[:MAX_WARNINGS], f"and {len(warnings) - MAX_WARNINGS:,} more of the kind"]
     materials = [understood.material for understood in reading.materials]
-    return make_scene(name, reading.meshes, materials, reading.cameras, environment, warnings)
+    return make_scene(name, reading.meshes, materials, reading.cameras, environment, warnings, reading.variants)
 
 
 def _read_bytes(source: str | Path | bytes) -> bytes:
@@ -73,7 +76,7 @@ class _Reading:
         self.warnings: list[str] = []
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
         self._geometry: dict[tuple[int, int], Geometry | None] = {}
-        self._material_index: dict[int | None, int] = {}
+        self._material_index: dict[tuple[int | None, Choices], int] = {}
         self._mesh_names: dict[str, int] = {}
         self._camera_names: dict[str, int] = {}
         self._places_left, self._corners_left = MAX_PLACED, MAX_CORNERS
@@ -86,6 +89,7 @@ class _Reading:
             self._place(node, to_world)
         if not self.meshes:
             raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+        self.variants = self._read_variants()
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, slug("front", self._camera_names)))
 
@@ -121,21 +125,34 @@ class _Reading:
         self._vertices_left -= len(geometry.positions)
         if min(self._triangles_left, self._vertices_left) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
-        material = self._material(primitive.material)
+        material = self._material(primitive)
         placed = _placed(geometry, self.materials[material], to_world, name, material)
         if placed is None:
             self.warnings.append(f"mesh {name!r} is scaled to nothing or out of range; it is left out")
         else:
             self.meshes.append(placed)
 
-    def _material(self, index: int | None) -> int:
-        if index not in self._material_index:
-            if index is not None and index >= len(self._document.materials):
-                raise SceneError(f"material {index} does not exist; export the scene again")
-            material = GltfMaterial(name="default") if index is None else self._document.materials[index]
-            self._material_index[index] = len(self.materials)
-            self.materials.append(self._material_reader.read(material))
-        return self._material_index[index]
+    def _material(self, primitive: Primitive) -> int:
+        """Number of the primitive's material; those that variants exchange differently are different ones."""
+        exchanges = choices(primitive)
+        key = (primitive.material, exchanges)
+        if key not in self._material_index:
+            self._material_index[key] = len(self.materials)
+            self.materials.append(self._read_material(primitive.material))
+        return self._material_index[key]
+
+    def _read_material(self, index: int | None) -> Understood:
+        if index is not None and index >= len(self._document.materials):
+            raise SceneError(f"material {index} does not exist; export the scene again")
+        material = GltfMaterial(name="default") if index is None else self._document.materials[index]
+        return self._material_reader.read(material)
+
+    def _read_variants(self) -> dict[str, dict[str, Any]]:
+        known = {index: self.materials[number] for (index, _), number in self._material_index.items()}
+        wanted = {index for _, exchanges in self._material_index for _, index in exchanges}
+        wardrobe = {index: known.get(index) or self._read_material(index) for index in sorted(wanted)}
+        worn = [(self.materials[number], exchanges) for (_, exchanges), number in self._material_index.items()]
+        return variant_looks(variant_names(self._document), worn, wardrobe, self.warnings)
 
     def _place_camera(self, node: Node, to_world: F64) -> None:
         if node.camera is None or node.camera >= len(self._document.cameras):
@@ -155,7 +172,7 @@ class _Reading:
         if document.animations:
             self.warnings.append(f"{len(document.animations)} animations are not used; everything has its rest pose")
         if "KHR_lights_punctual" in document.extensions or "KHR_lights_punctual" in document.extensionsUsed:
-            self.warnings.append("the file's lights are not used; the environment is the only light")
+            self.warnings.append("the file's lights are not used; light the scene by its environment")
         for extension in document.extensionsRequired:
             if extension not in READ_EXTENSIONS:
                 self.warnings.append(
@@ -184,10 +201,13 @@ def _placed(geometry: Geometry, understood: Understood, to_world: F64, name: str
         faces,
         material,
     )
-    if understood.material.normal_map is None or placed.tangents.any():
+    if understood.material.normal_map is None and understood.turn is None:
         return placed
-    made = made_tangents(placed.positions, placed.normals, placed.uvs, faces)
-    return Mesh(name, placed.positions, placed.normals, made, placed.uvs, faces, material)
+    if not placed.tangents.any():
+        placed = replace(placed, tangents=made_tangents(placed.positions, placed.normals, placed.uvs, faces))
+    if not understood.turn:
+        return placed
+    return replace(placed, tangents=turned_tangents(placed.tangents, placed.normals, understood.turn))
 
 
 def _unit(vectors: F64) -> F64:

@@ -1,6 +1,8 @@
-"""Metallic-roughness as `lambert` + `ggx`, with textures as multipliers of the terms.
+"""Materials of a glTF file: numbers and textures brought to the base layer that `terms` describes.
 
-Base colour b, metallic m: lambert takes b·(1 − m), ggx takes f0 = mix(0.04, b, m). glTF 2.0 specification, appendix B.
+Base colour b, metallic m, specular s with colour c: lambert takes b (1 - m), the highlight has
+f0 = mix(s min(c f, 1), b, m) and f90 = mix(s, 1, m), with f from the index of refraction. glTF 2.0 specification,
+appendix B, and the extensions' own.
 """
 
 from __future__ import annotations
@@ -9,27 +11,32 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import PIL.Image
 
 from relume.errors import SceneError
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import TextureInfo
 from relume.scene.gltf.images import ImageReader, to_linear
+from relume.scene.gltf.layers import Layers, read_layers
 from relume.scene.gltf.names import unique_name
+from relume.scene.gltf.raster import Raster
+from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
-from relume.scene.model import F32, Material, Texture
+from relume.scene.model import Material, Texture
 
-DIELECTRIC_F0 = 0.04
-MIN_ROUGHNESS = 0.03
 MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
 
 
 @dataclass(frozen=True)
 class Understood:
-    """A material and which texture coordinates its meshes must carry."""
+    """A material, which texture coordinates its meshes must carry, and how far their tangents are turned, or None.
+
+    Attributes:
+        turn: radians, from the tangent towards the bitangent; None where the material is isotropic.
+    """
 
     material: Material
     uv_use: UvUse
+    turn: float | None = None
 
 
 class MaterialReader:
@@ -49,78 +56,130 @@ class MaterialReader:
         """
         name = unique_name(material.name or "material", self._names)
         what = f"material {name!r}"
-        pbr = material.pbrMetallicRoughness
+        layers = read_layers(material.extensions, what, self._warnings)
         self._warn_of_the_rest(material, what)
-        infos = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
-        use = uv_use([info for info in infos if info is not None], what, self._warnings)
-        if pbr.baseColorTexture is None and pbr.metallicRoughnessTexture is None:
-            base = np.array(pbr.baseColorFactor[:3])
-            f0 = _mix(base, pbr.metallicFactor)
-            terms = _terms(base * (1 - pbr.metallicFactor), pbr.roughnessFactor, f0, None, None)
-            textures: dict[str, Texture] = {}
-        else:
-            terms, textures = self._textured(material, what)
-        normal_map = self._normal_map(material.normalTexture, what)
-        return Understood(Material(name, terms, textures, normal_map, material.doubleSided), use)
+        use = uv_use([info for info in _infos(material, layers) if info is not None], what, self._warnings)
+        surface = self._surface(material, layers, what)
+        strength, turn = self._anisotropy(layers, what)
+        over = self._over(layers, strength, what)
+        normal_map = self._normal_map(material.normalTexture, turn, what)
+        if over.coat > 0 and normal_map is not None:
+            self._warnings.append(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
+        made = Material(name, make_terms(surface, over), surface.textures, normal_map, material.doubleSided)
+        return Understood(made, use, turn if strength > 0 else None)
 
-    def _textured(self, material: GltfMaterial, what: str) -> tuple[tuple[dict[str, Any], ...], dict[str, Texture]]:
-        pbr = material.pbrMetallicRoughness
-        factor = np.array(pbr.baseColorFactor[:3], np.float32)
-        texel, wrap = self._base_texels(pbr.baseColorTexture, what)
-        metallic, roughness, packed_wrap = self._packed_texels(material, texel, what)
-        if pbr.baseColorTexture is None:
-            wrap = packed_wrap
-            texel = np.broadcast_to(texel, (*np.shape(metallic)[:2], 3)) if np.ndim(metallic) else texel
-        diffuse = np.ascontiguousarray(texel * (1 - metallic), np.float32)
-        textures = {"diffuse": self._made(diffuse, wrap, what)}
-        if not np.any(metallic):
-            return _terms(factor, roughness, np.full(3, DIELECTRIC_F0), "diffuse", None), textures
-        f0 = DIELECTRIC_F0 + (factor * texel - DIELECTRIC_F0) * metallic
-        mean_f0 = np.maximum(f0.mean(axis=(0, 1), dtype=np.float64), 1e-4)
-        textures["specular"] = self._made((f0 / mean_f0).astype(np.float32), wrap, what)
-        return _terms(factor, roughness, mean_f0, "diffuse", "specular"), textures
-
-    def _base_texels(self, info: TextureInfo | None, what: str) -> tuple[F32, tuple[str, str]]:
-        if info is None:
-            return np.ones((1, 1, 3), np.float32), ("repeat", "repeat")
-        pixels, wrap = self._images.texture(info.index, f"the base colour texture of {what}")
-        self._spend(pixels.shape[0] * pixels.shape[1])
-        return to_linear(pixels), wrap
-
-    def _packed_texels(
-        self, material: GltfMaterial, texel: F32, what: str
-    ) -> tuple[F32 | float, float, tuple[str, str]]:
-        """Metallic per texel (h, w, 1) in the size of the base texture, one roughness for all, and the wrap."""
-        pbr = material.pbrMetallicRoughness
-        info = pbr.metallicRoughnessTexture
-        if info is None:
-            return pbr.metallicFactor, pbr.roughnessFactor, ("repeat", "repeat")
-        packed, wrap = self._images.texture(info.index, f"the metallic-roughness texture of {what}")
-        roughness = float(packed[..., 1].mean()) / 255 * pbr.roughnessFactor
-        if np.ptp(packed[..., 1]) > 2:
+    def _surface(self, material: GltfMaterial, layers: Layers, what: str) -> Surface:
+        """The base layer; images only where a texture says more than one value."""
+        pbr, specular = material.pbrMetallicRoughness, layers.specular
+        factor = np.array(pbr.baseColorFactor[:3])
+        dielectric = _f0(layers.ior.ior) * np.array(specular.specularColorFactor)
+        raster = self._raster(material, layers, what)
+        roughness = raster.mean("packed", 1) * pbr.roughnessFactor
+        if raster.varies("packed", 1):
             self._warnings.append(f"the roughness texture of {what} is replaced by its mean, {roughness:.2f}")
-        blue = PIL.Image.fromarray(np.ascontiguousarray(packed[..., 2]))
-        if pbr.baseColorTexture is not None:
-            blue = blue.resize((texel.shape[1], texel.shape[0]), PIL.Image.Resampling.BILINEAR)
-        if not packed[..., 2].any() or pbr.metallicFactor == 0:
-            return 0.0, roughness, wrap
-        self._spend(blue.width * blue.height)
-        metallic = np.asarray(blue, np.float32)[..., None] / np.float32(255) * np.float32(pbr.metallicFactor)
-        return metallic, roughness, wrap
+        if raster.empty:
+            metallic, weight = pbr.metallicFactor, specular.specularFactor
+            f0 = _mix(weight * np.minimum(dielectric, 1), factor, metallic)
+            return Surface(factor * (1 - metallic), f0, _mix(weight, 1, metallic), roughness)
+        self._spend(4 * raster.num_texels)  # base, metallic, diffuse and f0
+        texel = to_linear(raster.rgb("base"))
+        metallic_texel = raster.channel("packed", 2) * np.float32(pbr.metallicFactor)
+        weight_texel = raster.channel("specular", 3) * np.float32(specular.specularFactor)
+        diffuse = np.ascontiguousarray(texel * (1 - metallic_texel))
+        textures = {"diffuse": Texture(diffuse, raster.wrap)}
+        head_on = np.minimum(to_linear(raster.rgb("tint")) * dielectric.astype(np.float32), 1) * weight_texel
+        f0_texel = _mix(head_on, factor.astype(np.float32) * texel, metallic_texel)
+        f90 = float(_mix(weight_texel, 1, metallic_texel).mean(dtype=np.float64))
+        if np.ptp(f0_texel.reshape(-1, 3), axis=0).max() < 1e-6:
+            return Surface(factor, f0_texel.reshape(-1, 3)[0].astype(np.float64), f90, roughness, textures)
+        mean_f0 = np.maximum(f0_texel.mean(axis=(0, 1), dtype=np.float64), 1e-4)
+        textures["specular"] = Texture((f0_texel / mean_f0).astype(np.float32), raster.wrap)
+        return Surface(factor, mean_f0, f90, roughness, textures)
 
-    def _normal_map(self, info: TextureInfo | None, what: str) -> Texture | None:
+    def _raster(self, material: GltfMaterial, layers: Layers, what: str) -> Raster:
+        """The images that the base layer is made of, all in the size of the first."""
+        pbr = material.pbrMetallicRoughness
+        infos = {
+            "base": (pbr.baseColorTexture, "base colour"),
+            "packed": (pbr.metallicRoughnessTexture, "metallic-roughness"),
+            "specular": (layers.specular.specularTexture, "specular"),
+            "tint": (layers.specular.specularColorTexture, "specular colour"),
+        }
+        images = {
+            key: self._images.texture(info.index, f"the {words} texture of {what}")
+            for key, (info, words) in infos.items()
+            if info is not None
+        }
+        return Raster(images)
+
+    def _over(self, layers: Layers, anisotropy: float, what: str) -> Over:
+        coat, sheen = layers.clearcoat, layers.sheen
+        if coat.clearcoatNormalTexture is not None:
+            self._warnings.append(f"the normal texture of the coat of {what} is not used")
+        weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"coat texture of {what}")
+        coat_roughness = coat.clearcoatRoughnessFactor
+        if coat.clearcoatRoughnessTexture is not None:
+            coat_roughness *= self._mean(coat.clearcoatRoughnessTexture, 1, f"coat roughness texture of {what}")
+        sheen_roughness = sheen.sheenRoughnessFactor
+        if sheen.sheenRoughnessTexture is not None:
+            sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {what}")
+        tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {what}")
+        r, g, b = (round(float(value), 6) for value in tint)
+        if r + g + b > 0:
+            self._warnings.append(f"the sheen of {what} is a curve over the half angle; its masking is averaged")
+        return Over(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
+
+    def _anisotropy(self, layers: Layers, what: str) -> tuple[float, float]:
+        """Strength, and radians from the tangent to the direction of it; (0, 0) where the material is isotropic."""
+        stretched = layers.anisotropy
+        strength, turn = stretched.anisotropyStrength, stretched.anisotropyRotation
+        if stretched.anisotropyTexture is not None and strength > 0:
+            pixels, _ = self._images.texture(stretched.anisotropyTexture.index, f"the anisotropy texture of {what}")
+            x, y = (pixels[..., :2].mean((0, 1), dtype=np.float64) / 127.5 - 1).tolist()
+            strength *= float(pixels[..., 2].mean()) / 255
+            turn += float(np.arctan2(y, x))
+            if np.hypot(x, y) < 0.5:
+                self._warnings.append(f"the anisotropy of {what} runs in all directions; its highlight is round")
+                return 0.0, 0.0
+            if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
+                self._warnings.append(f"the anisotropy texture of {what} is replaced by its mean")
+        if strength == 0:
+            return 0.0, 0.0
+        self._warnings.append(f"{what} is anisotropic; its highlight is Ashikhmin-Shirley's, of about the same width")
+        return strength, float(np.remainder(turn, 2 * np.pi))
+
+    def _normal_map(self, info: TextureInfo | None, turn: float, what: str) -> Texture | None:
+        """Unit normals, in the frame of tangents turned by `turn`."""
         if info is None:
             return None
         pixels, wrap = self._images.texture(info.index, f"the normal texture of {what}")
-        self._spend(pixels.shape[0] * pixels.shape[1])
-        normals = pixels.astype(np.float32) / np.float32(127.5) - np.float32(1)
+        self._spend(2 * pixels.shape[0] * pixels.shape[1])
+        normals = pixels[..., :3].astype(np.float32) / np.float32(127.5) - np.float32(1)
         normals[..., :2] *= np.float32(np.clip(info.scale, -100, 100))
+        if turn:
+            c, s = np.cos(turn), np.sin(turn)
+            normals[..., :2] = normals[..., :2] @ np.array([[c, -s], [s, c]], np.float32)
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
-        return self._made(np.where(length > 1e-3, normals / np.maximum(length, 1e-3), (0, 0, 1)), wrap, what)
+        unit = np.where(length > 1e-3, normals / np.maximum(length, 1e-3), (0, 0, 1))
+        return Texture(np.ascontiguousarray(unit, np.float32), wrap)
 
-    def _made(self, pixels: Any, wrap: tuple[str, str], what: str) -> Texture:
+    def _mean(self, info: TextureInfo | None, channel: int, words: str) -> float:
+        """Mean of one channel, in [0, 1]; 1 without a texture, and a warning where it varies."""
+        if info is None:
+            return 1.0
+        pixels, _ = self._images.texture(info.index, f"the {words}")
+        if np.ptp(pixels[..., channel]) > 2:
+            self._warnings.append(f"the {words} is replaced by its mean")
+        return float(pixels[..., channel].mean()) / 255
+
+    def _mean_color(self, info: TextureInfo | None, words: str) -> Any:
+        if info is None:
+            return np.ones(3)
+        pixels, _ = self._images.texture(info.index, f"the {words}")
         self._spend(pixels.shape[0] * pixels.shape[1])
-        return Texture(np.ascontiguousarray(pixels, np.float32), wrap)
+        if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
+            self._warnings.append(f"the {words} is replaced by its mean")
+        return to_linear(pixels[..., :3]).mean((0, 1), dtype=np.float64)
 
     def _spend(self, num_texels: int) -> None:
         self._texels_left -= num_texels
@@ -134,22 +193,19 @@ class MaterialReader:
             self._warnings.append(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here")
         if material.occlusionTexture is not None:
             self._warnings.append(f"the occlusion texture of {what} is not used; relume traces occlusion")
-        for extension in sorted(material.extensions):
-            self._warnings.append(f"extension {extension[:60]!r} of {what} is not used")
 
 
-def _mix(base: Any, metallic: float) -> Any:
-    return DIELECTRIC_F0 + (base - DIELECTRIC_F0) * metallic
+def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:
+    """The textures that are kept as images, first those that the others should follow."""
+    pbr, specular = material.pbrMetallicRoughness, layers.specular
+    images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
+    return [*images, specular.specularTexture, specular.specularColorTexture]
 
 
-def _terms(
-    color: Any, roughness: float, f0: Any, diffuse: str | None, specular: str | None
-) -> tuple[dict[str, Any], ...]:
-    params = {
-        "roughness": round(float(np.clip(roughness, MIN_ROUGHNESS, 1)), 6),
-        "f0": [round(float(np.clip(value, 0, 1)), 6) for value in f0],
-    }
-    return (
-        {"model": "lambert", "color": [round(float(value), 6) for value in color], "texture": diffuse},
-        {"model": "ggx", "color": [1.0, 1.0, 1.0], "params": params, "texture": specular},
-    )
+def _f0(ior: float) -> float:
+    """Reflectance of a dielectric head-on; the extension's 0 stands for a mirror."""
+    return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
+
+
+def _mix(a: Any, b: Any, share: Any) -> Any:
+    return a + (b - a) * share

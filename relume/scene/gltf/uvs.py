@@ -81,3 +81,10 @@ def made_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
     tangents = np.where(length > 1e-20, tangents / np.maximum(length, 1e-20), 0)
     mirrored = (np.cross(normals, tangents) * bitangents).sum(1) > 0
     return np.column_stack([tangents, np.where(mirrored, -1.0, 1.0)]).astype(np.float32)
+
+
+def turned_tangents(tangents: F32, normals: F32, turn: float) -> F32:
+    """Tangents turned by `turn` radians towards the bitangent cross(normal, tangent)·w. (num_vertices, 4)"""
+    along, hand = tangents[:, :3], tangents[:, 3:]
+    turned = np.cos(turn) * along + np.sin(turn) * np.cross(normals, along) * hand
+    return np.column_stack([turned, hand]).astype(np.float32)

@@ -1,0 +1,94 @@
+"""Material extensions as typed models: what the file says beyond metallic-roughness.
+
+Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy and _emissive_strength.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, Field, ValidationError
+
+from relume.scene.gltf.document import Extensions, Factor, Number, TextureInfo
+
+Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
+Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
+M = TypeVar("M", bound=BaseModel)
+
+
+class Ior(BaseModel, frozen=True):
+    """KHR_materials_ior; 0 stands for a mirror."""
+
+    ior: Weight = 1.5
+
+
+class Specular(BaseModel, frozen=True):
+    """KHR_materials_specular: how much a dielectric reflects, and in which colour head-on."""
+
+    specularFactor: Factor = 1.0  # noqa: N815  (glTF's own spelling, here and below)
+    specularTexture: TextureInfo | None = None  # noqa: N815
+    specularColorFactor: Weights = [1.0, 1.0, 1.0]  # noqa: N815
+    specularColorTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Clearcoat(BaseModel, frozen=True):
+    """KHR_materials_clearcoat: a dielectric film over everything else."""
+
+    clearcoatFactor: Factor = 0.0  # noqa: N815
+    clearcoatTexture: TextureInfo | None = None  # noqa: N815
+    clearcoatRoughnessFactor: Factor = 0.0  # noqa: N815
+    clearcoatRoughnessTexture: TextureInfo | None = None  # noqa: N815
+    clearcoatNormalTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Sheen(BaseModel, frozen=True):
+    """KHR_materials_sheen: fibres that scatter at grazing angles."""
+
+    sheenColorFactor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
+    sheenColorTexture: TextureInfo | None = None  # noqa: N815
+    sheenRoughnessFactor: Factor = 0.0  # noqa: N815
+    sheenRoughnessTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Anisotropy(BaseModel, frozen=True):
+    """KHR_materials_anisotropy: the highlight is stretched along the tangent turned by `anisotropyRotation`."""
+
+    anisotropyStrength: Factor = 0.0  # noqa: N815
+    anisotropyRotation: Number = 0.0  # noqa: N815
+    anisotropyTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Layers(BaseModel, frozen=True):
+    """All that relume understands of one material's extensions."""
+
+    ior: Ior = Ior()
+    specular: Specular = Specular()
+    clearcoat: Clearcoat = Clearcoat()
+    sheen: Sheen = Sheen()
+    anisotropy: Anisotropy = Anisotropy()
+
+
+UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields} | {"KHR_materials_emissive_strength"}
+
+
+def read_layers(extensions: Extensions, what: str, warnings: list[str]) -> Layers:
+    """The extensions that are understood; a warning for each that is not, or is not valid."""
+
+    def read(model: type[M]) -> M:
+        extension = f"KHR_materials_{model.__name__.lower()}"
+        try:
+            return model.model_validate(extensions.get(extension, {}))
+        except (ValidationError, RecursionError):
+            warnings.append(f"extension {extension!r} of {what} is not valid; it is not used")
+            return model()
+
+    warnings.extend(
+        f"extension {extension[:60]!r} of {what} is not used" for extension in sorted(extensions.keys() - UNDERSTOOD)
+    )
+    return Layers(
+        ior=read(Ior),
+        specular=read(Specular),
+        clearcoat=read(Clearcoat),
+        sheen=read(Sheen),
+        anisotropy=read(Anisotropy),
+    )

@@ -1,0 +1,102 @@
+"""A glTF material in numbers, and the terms that stand for it.
+
+Base: lambert and ggx, F = f90 · schlick(f0 / f90). Anisotropic: ashikhmin_shirley instead of ggx, its exponents from
+the widths of the facet distribution, n = 2/α² - 2 (Walter 2007, section 5.2). Clearcoat: a second ggx; sheen: a drawn
+curve. What lies under a coat or sheen is dimmed by its mean albedo: the look's colours know no direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Term
+from relume.scene.gltf.sheen import sheen_curve
+from relume.scene.model import Texture
+
+F64 = NDArray[np.float64]
+COAT_F0 = 0.04
+COAT_ALBEDO = COAT_F0 + (1 - COAT_F0) / 21  # mean of schlick(0.04), weighted by the cosine
+Terms = tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What lies under coat and sheen.
+
+    Attributes:
+        diffuse: albedo. f0, f90: reflectance head-on and at the horizon. (3,), (3,), one
+        roughness: as artists know it.
+        textures: multipliers of the two terms.
+    """
+
+    diffuse: F64
+    f0: F64
+    f90: float
+    roughness: float
+    textures: dict[str, Texture] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Over:
+    """What changes or covers the surface: strength of anisotropy; weight and roughness of the coat; the sheen's."""
+
+    anisotropy: float = 0.0
+    coat: float = 0.0
+    coat_roughness: float = 0.0
+    sheen: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sheen_roughness: float = 0.0
+
+
+def make_terms(surface: Surface, over: Over) -> Terms:
+    """The terms of a look, bottom up: diffuse, highlight, sheen, coat."""
+    textures = {channel: channel if channel in surface.textures else None for channel in ("diffuse", "specular")}
+    layers = [
+        {"model": "lambert", "color": _rounded(surface.diffuse), "texture": textures["diffuse"]},
+        _highlight(surface, over.anisotropy) | {"texture": textures["specular"]},
+    ]
+    if any(over.sheen):
+        points, albedo = sheen_curve(over.sheen_roughness)
+        layers = _dimmed(layers, max(over.sheen) * albedo)
+        curves = {"theta_h": {"points": points, "channels": "rgb"}}
+        layers.append({"model": "blinn_phong", "color": list(over.sheen), "texture": None, "curves": curves})
+    if over.coat > 0:
+        params = _within(TERMS["ggx"], roughness=over.coat_roughness, f0=COAT_F0)
+        layers = _dimmed(layers, over.coat * COAT_ALBEDO)
+        layers.append({"model": "ggx", "color": [over.coat] * 3, "params": params, "texture": None})
+    return tuple(layers)
+
+
+def _highlight(surface: Surface, anisotropy: float) -> dict[str, Any]:
+    color = _rounded(np.full(3, surface.f90))
+    f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
+    if anisotropy == 0:
+        params = _within(TERMS["ggx"], roughness=surface.roughness, f0=f0)
+        return {"model": "ggx", "color": color, "params": params}
+    across = max(surface.roughness**2, 1e-3)
+    along = across + (1 - across) * anisotropy**2
+    params = _within(TERMS["ashikhmin_shirley"], nu=2 / along**2 - 2, nv=2 / across**2 - 2, f0=f0)
+    return {"model": "ashikhmin_shirley", "color": color, "params": params}
+
+
+def _within(term: Term, **values: Any) -> dict[str, Any]:
+    """Parameters held to their ranges."""
+    held = {}
+    for name, value in values.items():
+        parameter = term.parameter(name)
+        clipped = np.round(np.clip(value, parameter.minimum, parameter.maximum), 6)
+        held[name] = clipped.tolist()
+    return held
+
+
+def _dimmed(layers: list[dict[str, Any]], reflected: float) -> list[dict[str, Any]]:
+    keep = max(1 - reflected, 0.0)
+    return [layer | {"color": _rounded(np.array(layer["color"]) * keep)} for layer in layers]
+
+
+def _rounded(color: Any) -> list[float]:
+    return [round(float(value), 6) for value in color]

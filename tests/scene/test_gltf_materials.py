@@ -1,0 +1,164 @@
+"""Material extensions of glTF as terms: what each means, and what is said where it cannot be kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from glb_builder import Glb
+
+from relume.brdf.fresnel import schlick
+from relume.brdf.registry import TERMS
+from relume.look.terms import complete_term
+from relume.scene.gltf import import_gltf
+from relume.scene.gltf.sheen import MIN_ALPHA, sheen_curve
+from relume.scene.gltf.terms import COAT_ALBEDO
+from relume.scene.model import Environment, Scene
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+PLASTIC = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.5}
+
+
+def imported(extensions: dict[str, Any], glb: Glb | None = None, **material: Any) -> Scene:
+    described = {"name": "Thing", "pbrMetallicRoughness": PLASTIC, **material}
+    described["extensions"] = {f"KHR_materials_{name}": value for name, value in extensions.items()}
+    scene = import_gltf((glb or Glb()).quad(described).bytes(), "test", LIGHT)
+    for term in scene.materials[0].terms:
+        for name, value in term.get("params", {}).items():
+            parameter = TERMS[term["model"]].parameter(name)
+            assert parameter.minimum <= np.min(value) <= np.max(value) <= parameter.maximum
+    return scene
+
+
+def terms_of(extensions: dict[str, Any], **material: Any) -> tuple[dict[str, Any], ...]:
+    return imported(extensions, **material).materials[0].terms
+
+
+@pytest.mark.parametrize(("ior", "f0"), [(1.0, 0.0), (1.33, 0.02005946), (1.5, 0.04), (2.42, 0.172394), (0.0, 1.0)])
+def test_ior_gives_the_reflectance_head_on(ior: float, f0: float) -> None:
+    ggx = terms_of({"ior": {"ior": ior}})[1]
+    np.testing.assert_allclose(ggx["params"]["f0"], f0, atol=1e-6)
+
+
+def test_specular_gives_both_ends_of_the_fresnel_curve() -> None:
+    tint = [0.5, 1.0, 100.0]
+    ggx = terms_of({"ior": {"ior": 2.0}, "specular": {"specularFactor": 0.4, "specularColorFactor": tint}})[1]
+    cos_theta_d = np.linspace(0, 1, 5)
+    for channel, wanted in enumerate([0.5 / 9, 1 / 9, 1.0]):
+        expected = 0.4 * schlick(cos_theta_d, wanted)
+        found = ggx["color"][channel] * schlick(cos_theta_d, ggx["params"]["f0"][channel])
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_metals_do_not_mind_what_is_said_of_dielectrics() -> None:
+    metal = {"pbrMetallicRoughness": PLASTIC | {"metallicFactor": 1}}
+    plain = terms_of({}, **metal)
+    assert terms_of({"ior": {"ior": 1.1}, "specular": {"specularFactor": 0.1}}, **metal) == plain
+
+
+def test_specular_textures_share_out_the_reflectance() -> None:
+    glb = Glb()
+    weight = glb.texture([[[255, 255, 255, 0], [255, 255, 255, 255]]])
+    scene = imported({"specular": {"specularTexture": {"index": weight}}}, glb)
+    ggx, texture = scene.materials[0].terms[1], scene.materials[0].textures["specular"]
+    head_on = np.array(ggx["color"]) * np.array(ggx["params"]["f0"]) * texture.pixels[0]
+    np.testing.assert_allclose(head_on, [[0] * 3, [0.04] * 3], atol=1e-6)
+
+
+def test_a_coat_is_a_second_highlight_that_dims_what_is_below() -> None:
+    bare = terms_of({})
+    lambert, below, coat = terms_of({"clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1}})
+    assert coat["model"] == "ggx"
+    assert coat["color"] == [0.5, 0.5, 0.5]
+    assert coat["params"] == {"roughness": 0.1, "f0": 0.04}
+    # mean of Schlick's curve over the cosine: ∫ schlick(c) 2c dc
+    cosine = (np.arange(4_000) + 0.5) / 4_000
+    assert float((schlick(cosine, 0.04) * 2 * cosine).mean()) == pytest.approx(COAT_ALBEDO, rel=1e-6)
+    keep = 1 - 0.5 * COAT_ALBEDO
+    np.testing.assert_allclose(lambert["color"], np.array(bare[0]["color"]) * keep, atol=1e-6)
+    np.testing.assert_allclose(below["color"], np.array(bare[1]["color"]) * keep, atol=1e-6)
+
+
+def test_anisotropy_stretches_along_the_turned_tangent() -> None:
+    scene = imported({"anisotropy": {"anisotropyStrength": 0.6, "anisotropyRotation": np.pi / 2}})
+    highlight = scene.materials[0].terms[1]
+    across = 0.25
+    along = across + (1 - across) * 0.36
+    assert highlight["model"] == "ashikhmin_shirley"
+    assert highlight["params"]["nv"] == pytest.approx(2 / across**2 - 2)
+    assert highlight["params"]["nu"] == pytest.approx(2 / along**2 - 2)
+    # u runs along +X; a quarter turn towards the bitangent, up
+    np.testing.assert_allclose(scene.meshes[0].tangents, [[0, 1, 0, 1]] * 4, atol=1e-6)
+    assert any("Ashikhmin" in warning for warning in scene.warnings)
+
+
+def test_a_turned_normal_map_means_the_same_directions() -> None:
+    glb = Glb()
+    info = {"index": glb.texture([[[200, 150, 220]]])}
+    scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyRotation": 0.7}}, glb, normalTexture=info)
+    plain = imported({}, (other := Glb()), normalTexture={"index": other.texture([[[200, 150, 220]]])})
+
+    def in_world(scene: Scene) -> np.ndarray:
+        assert scene.materials[0].normal_map is not None
+        x, y, z = scene.materials[0].normal_map.pixels[0, 0]
+        tangent, normal = scene.meshes[0].tangents[0, :3], scene.meshes[0].normals[0]
+        return x * tangent + y * np.cross(normal, tangent) * scene.meshes[0].tangents[0, 3] + z * normal
+
+    np.testing.assert_allclose(in_world(scene), in_world(plain), atol=1e-6)
+
+
+def test_anisotropy_in_all_directions_is_a_round_highlight() -> None:
+    glb = Glb()
+    index = glb.texture([[[255, 128, 255], [0, 128, 255]]])
+    scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": index}}}, glb)
+    assert scene.materials[0].terms[1]["model"] == "ggx"
+    assert any("all directions" in warning for warning in scene.warnings)
+
+
+def test_sheen_is_a_drawn_curve_over_the_half_angle() -> None:
+    scene = imported({"sheen": {"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.5}})
+    lambert, _, sheen = scene.materials[0].terms
+    assert sheen["color"] == [1, 0.5, 0]
+    points = np.array(sheen["curves"]["theta_h"]["points"])
+    assert points[0].tolist() == [0, 0]
+    assert (np.diff(points[:, 1]) >= 0).all()
+    assert lambert["color"][0] < 0.5
+    for number, term in enumerate(scene.materials[0].terms):
+        complete_term((number,), term, None)  # raises where a look could not say it
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.3, 1.0])
+def test_sheen_keeps_the_energy_of_the_formula(roughness: float) -> None:
+    # Σ D V (n·wi)(n·wo) over all pairs of directions, by Monte Carlo; the curve's albedo is the same sum
+    rng = np.random.default_rng(4)
+    wi, wo = rng.normal(size=(2, 400_000, 3))
+    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) * np.sign(w[:, 2:]) for w in (wi, wo))
+    h = wi + wo
+    cos_h = np.clip(h[:, 2] / np.linalg.norm(h, axis=1), 0, 1)
+    exponent = 1 / max(roughness**2, MIN_ALPHA)
+    d = (2 + exponent) * np.sqrt(1 - cos_h**2) ** exponent / (2 * np.pi)
+    i, o = wi[:, 2], wo[:, 2]
+    values = d / (4 * (i + o - i * o)) * i * o * (2 * np.pi) ** 2 / np.pi
+    error = values.std() / np.sqrt(len(values))
+    points, albedo = sheen_curve(roughness)
+    assert np.isfinite(points).all()
+    assert albedo == pytest.approx(values.mean(), abs=4 * error + 0.02 * values.mean())
+
+
+@pytest.mark.parametrize(
+    "extensions",
+    [
+        {"ior": {"ior": -1}},
+        {"ior": {"ior": 1e300}},
+        {"specular": {"specularColorFactor": [1]}},
+        {"clearcoat": {"clearcoatFactor": "much"}},
+        {"sheen": []},
+        {"anisotropy": {"anisotropyRotation": 1e300}},
+    ],
+)
+def test_what_is_not_valid_is_a_warning_and_not_used(extensions: dict[str, Any]) -> None:
+    scene = imported(extensions)
+    assert scene.materials[0].terms == terms_of({})
+    assert len(scene.warnings) == 1
+    assert "not valid" in scene.warnings[0]

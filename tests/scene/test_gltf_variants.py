@@ -1,0 +1,125 @@
+"""KHR_materials_variants as looks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from glb_builder import Glb
+
+from relume.errors import SceneError
+from relume.scene.archive import load_scene, save_scene
+from relume.scene.gltf import import_gltf
+from relume.scene.model import Environment, Scene
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+
+
+def plain(name: str, *color: float, **pbr: Any) -> dict[str, Any]:
+    return {"name": name, "pbrMetallicRoughness": {"baseColorFactor": [*color, 1], "metallicFactor": 0, **pbr}}
+
+
+def dressed(glb: Glb, materials: list[dict[str, Any]], mappings: list[list[dict[str, Any]]]) -> Glb:
+    """A quad for each list of mappings, all wearing material 0, with the variants "day" and "night"."""
+    glb.quad(materials[0])
+    primitive = glb.document["meshes"][0]["primitives"][0]
+    glb.document["materials"] = materials
+    glb.document["extensions"] = {"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}}
+    glb.document["meshes"][0]["primitives"] = [
+        primitive | {"extensions": {"KHR_materials_variants": {"mappings": each}}} for each in mappings
+    ]
+    return glb
+
+
+def imported(glb: Glb) -> Scene:
+    return import_gltf(glb.bytes(), "test", LIGHT)
+
+
+def test_each_variant_is_a_look_of_the_materials_it_changes() -> None:
+    mappings = [{"material": 0, "variants": [0]}, {"material": 1, "variants": [1]}]
+    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+    assert [material.name for material in scene.materials] == ["Red"]
+    assert scene.variants["day"] == {"materials": {}}
+    terms = scene.variants["night"]["materials"]["Red"]["terms"]
+    assert terms[0] == {"model": "lambert", "color": [0, 0, 1], "texture": None}
+    assert scene.warnings == ()
+
+
+def test_meshes_that_change_differently_have_materials_of_their_own() -> None:
+    mappings = [[{"material": 1, "variants": [1]}], []]
+    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
+    assert [material.name for material in scene.materials] == ["Red", "Red 2"]
+    assert list(scene.variants["night"]["materials"]) == ["Red"]
+
+
+def test_a_texture_is_kept_where_it_is_the_same_up_to_a_colour() -> None:
+    glb = Glb()
+    info = {"index": glb.texture(np.arange(48).reshape(4, 4, 3) * 5 + 10)}
+    red = plain("Red", 1, 0, 0, baseColorTexture=info)
+    gold = plain("Gold", 0.5, 0.4, 0.0, baseColorTexture=info)
+    gold["pbrMetallicRoughness"]["metallicFactor"] = 1
+    scene = imported(dressed(glb, [red, gold], [[{"material": 1, "variants": [1]}]]))
+    lambert, ggx = scene.variants["night"]["materials"]["Red"]["terms"]
+    assert lambert["color"] == [0, 0, 0]
+    assert ggx["texture"] == "diffuse"
+    shown = np.array(ggx["color"]) * ggx["params"]["f0"] * scene.materials[0].textures["diffuse"].pixels
+    expected = np.array([0.5, 0.4, 0.0]) * scene.materials[0].textures["diffuse"].pixels
+    np.testing.assert_allclose(shown, expected, atol=1e-4)  # f0 keeps clear of 0
+    assert not any("mean colour" in warning for warning in scene.warnings)
+
+
+def test_another_texture_becomes_its_mean_with_a_warning() -> None:
+    glb = Glb()
+    first, second = glb.texture([[[255, 0, 0], [0, 255, 0]]]), glb.texture([[[255, 255, 255], [0, 0, 0]]])
+    red = plain("Red", 1, 1, 1, baseColorTexture={"index": first})
+    grey = plain("Grey", 1, 0.5, 1, baseColorTexture={"index": second})
+    scene = imported(dressed(glb, [red, grey], [[{"material": 1, "variants": [0]}]]))
+    lambert = scene.variants["day"]["materials"]["Red"]["terms"][0]
+    assert lambert == {"model": "lambert", "color": [0.5, 0.25, 0.5], "texture": None}
+    assert any("mean colour" in warning for warning in scene.warnings)
+
+
+def test_another_normal_map_is_a_warning() -> None:
+    glb = Glb()
+    bumpy = plain("Bumpy", 1, 1, 1) | {"normalTexture": {"index": glb.texture([[[200, 128, 255]]])}}
+    scene = imported(dressed(glb, [plain("Red", 1, 0, 0), bumpy], [[{"material": 1, "variants": [0]}]]))
+    assert any("normal map" in warning for warning in scene.warnings)
+
+
+def test_variants_are_kept_with_the_scene(tmp_path) -> None:
+    scene = imported(
+        dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [[{"material": 1, "variants": [1]}]])
+    )
+    save_scene(scene, tmp_path)
+    assert load_scene(tmp_path).variants == scene.variants
+    other = imported(Glb().quad(plain("Red", 1, 0, 0)))
+    assert other.id != scene.id
+
+
+@pytest.mark.parametrize(
+    "mappings",
+    [
+        "many",
+        [{"material": 9, "variants": [0]}],
+        [{"material": -1, "variants": [0]}],
+        [{"material": 1, "variants": [0] * 101}],
+        [{"material": 1, "variants": [0]}] * 101,
+    ],
+)
+def test_mappings_that_are_wrong_are_refused(mappings: Any) -> None:
+    with pytest.raises(SceneError):
+        imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+
+
+def test_a_mapping_to_a_variant_that_there_is_not_changes_nothing() -> None:
+    mappings = [[{"material": 1, "variants": [7]}]]
+    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
+    assert all(look == {"materials": {}} for look in scene.variants.values())
+
+
+def test_too_many_variants_are_refused() -> None:
+    glb = dressed(Glb(), [plain("Red", 1, 0, 0)], [[]])
+    glb.document["extensions"]["KHR_materials_variants"]["variants"] = [{}] * 101
+    with pytest.raises(SceneError, match="variants"):
+        imported(glb)
