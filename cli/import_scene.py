@@ -11,7 +11,10 @@ from cli.options import Data
 
 
 def import_scene(
-    file: Annotated[Path, typer.Argument(metavar="FILE.glb", help="Binary glTF 2.0.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE.glb", help="A .glb, .gltf, .obj, .ply or .zip file; may name files beside it."),
+    ],
     environment: Annotated[
         Path | None,
         typer.Option(metavar="FILE.hdr", help="Equirectangular light, .hdr or .exr; else the demo's studio."),
@@ -22,11 +25,11 @@ def import_scene(
     """Register a scene; print its id, what was understood, and a warning for each thing that was not."""
     from cli.house import open_bakes, open_settings
     from relume.light.environment import read_environment
-    from relume.scene.gltf import import_gltf
+    from relume.scene.importer import import_scene as read_scene
     from worker.scenes import get_scene, register_scene
 
     light = None if environment is None else read_environment(environment, environment.stem)
-    scene = import_gltf(file, name or file.stem, light)
+    scene = read_scene(file, name or file.stem, light)
     service = open_bakes(open_settings(data))
     try:
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))

@@ -91,13 +91,13 @@ def main() -> int:
 
 def _import(order: Order) -> str:
     from relume.light.environment import read_environment
-    from relume.scene.gltf import import_gltf
+    from relume.scene.importer import import_scene, read_file
     from worker.database import open_database
     from worker.ledger import Ledger
     from worker.scenes import register_scene
 
     environment = None if order.environment is None else read_environment(order.environment, "Environment")
-    scene = import_gltf(order.scene, order.name, environment)
+    scene = import_scene(read_file(order.scene), order.name, environment)  # bytes: what lies beside it is not its own
     return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
 
 

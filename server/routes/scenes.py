@@ -24,7 +24,9 @@ from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
 COPY_BYTES = 1 << 20
-SceneFile = Annotated[UploadFile, File(description="binary glTF, .glb")]
+SceneFile = Annotated[
+    UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
+]
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]
 
@@ -48,7 +50,7 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
         order = Order(
             data=str(settings.data.resolve()),
             database=settings.database_url,
-            scene=str(_keep(scene, Path(folder) / "scene.glb")),
+            scene=str(_keep(scene, Path(folder) / "scene")),
             environment=None if environment is None else _keep_environment(environment, Path(folder)),
             name=name.strip() or _plain_stem(scene.filename),
             seconds=settings.import_seconds,

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from relume.errors import SceneError
-from relume.scene.gltf import import_gltf
+from relume.scene.importer import import_scene
 from relume.scene.model import Scene
 
 
@@ -70,5 +70,5 @@ def test_refused_messages_show_no_path(tmp_path: Path) -> None:
     broken = tmp_path / "broken.glb"
     broken.write_bytes(json.dumps({"asset": 1}).encode())
     with pytest.raises(SceneError) as problem:
-        import_gltf(broken, "test", LIGHT)
+        import_scene(broken, "test", LIGHT)
     assert str(tmp_path) not in str(problem.value)

@@ -1,6 +1,6 @@
-"""From bytes to a checked document and its buffers: .glb, or .gltf whose buffers are data URIs.
+"""From bytes to a checked document and its buffers: .glb, or .gltf with data URIs or files beside it.
 
-glTF 2.0 specification, section 4. Nothing outside the file is ever opened.
+glTF 2.0 specification, section 4. Nothing is opened but what the scene's companions hold.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from urllib.parse import unquote_to_bytes
 from pydantic import ValidationError
 
 from relume.errors import SceneError
+from relume.scene.companions import Companions
 from relume.scene.gltf.document import Buffer, Document
 from relume.scene.gltf.layers import UNDERSTOOD
 from relume.scene.gltf.names import UNREADABLE
 
-MAX_FILE_BYTES = 512 << 20
 MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
@@ -46,16 +46,19 @@ class Container:
 
     document: Document
     buffers: tuple[memoryview, ...]
+    companions: Companions
+
+    def resolve(self, uri: str, what: str) -> bytes:
+        """The content of a data URI, or of a file beside this one. Raises SceneError."""
+        return _resolve(uri, self.companions, what)
 
 
-def read_container(data: bytes) -> Container:
+def read_container(data: bytes, companions: Companions) -> Container:
     """Splits and checks a file.
 
     Raises:
-        SceneError: too large, truncated, not glTF 2, refers to other files, or requires an extension that packs data.
+        SceneError: truncated, not glTF 2, names files that are not beside it, or requires an extension that packs data.
     """
-    if len(data) > MAX_FILE_BYTES:
-        raise SceneError(f"the scene file has {len(data) >> 20} MB, {MAX_FILE_BYTES >> 20} MB are allowed; simplify it")
     if data[:4] == b"glTF":
         json_bytes, binary = _split_glb(data)
     elif data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
@@ -64,8 +67,8 @@ def read_container(data: bytes) -> Container:
         raise SceneError("the scene file is neither .glb nor .gltf; export it as binary glTF 2.0 (.glb)")
     document = parse_document(json_bytes)
     _check_extensions(document)
-    buffers = [_buffer(i, buffer, binary) for i, buffer in enumerate(document.buffers)]
-    return Container(document, tuple(buffers))
+    buffers = [_buffer(i, buffer, binary, companions) for i, buffer in enumerate(document.buffers)]
+    return Container(document, tuple(buffers), companions)
 
 
 def parse_document(json_bytes: bytes) -> Document:
@@ -88,15 +91,17 @@ def parse_document(json_bytes: bytes) -> Document:
         raise SceneError("the scene's JSON is nested too deeply; export it again") from None
 
 
-def data_uri(uri: str, what: str) -> bytes:
-    """The content of a data URI.
-
-    Raises:
-        SceneError: the URI points outside the file (nothing is opened) or is damaged.
-    """
-    if uri[:5].lower() != "data:":
+def _resolve(uri: str, companions: Companions, what: str) -> bytes:
+    if uri[:5].lower() == "data:":
+        return _data_uri(uri, what)
+    content = companions.read(uri, what)
+    if content is None:
         shown = uri[:60].encode("ascii", "replace").decode()
-        raise SceneError(f"{what} lies outside the file ({shown!r}); {PACK}")
+        raise SceneError(f"{what} lies outside the file ({shown!r}) and is not beside it; {PACK}")
+    return content
+
+
+def _data_uri(uri: str, what: str) -> bytes:
     head, comma, body = uri.partition(",")
     try:
         if head.lower().endswith(";base64"):
@@ -130,9 +135,9 @@ def _split_glb(data: bytes) -> tuple[bytes, memoryview | None]:
     return bytes(chunks[0][1]), binary
 
 
-def _buffer(i: int, buffer: Buffer, binary: memoryview | None) -> memoryview:
+def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Companions) -> memoryview:
     if buffer.uri is not None:
-        content = memoryview(data_uri(buffer.uri, f"buffer {i}"))
+        content = memoryview(_resolve(buffer.uri, companions, f"buffer {i}"))
     elif i == 0 and binary is not None:
         content = binary
     else:

@@ -59,9 +59,9 @@ def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warn
             raise SceneError(f"{what} has indices beyond its {len(positions):,} vertices; export the scene again")
     faces = _unroll(corners, primitive.mode)
     used, faces = _compact(faces)
-    if not _usable(positions[used]):
+    if not usable(positions[used]):
         raise SceneError(f"{what} has positions that are not finite; repair the mesh and export it again")
-    faces = _without_degenerate(positions[used], faces, what, warnings)
+    faces = faces[without_degenerate(positions[used], faces, what, warnings)]
     if len(faces) == 0:
         warnings.append(f"{what} has no triangles; it is left out")
         return None
@@ -83,7 +83,7 @@ def _with_attributes(
         values = reader.floats(primitive.attributes[name], (width,), f"{name} of {what}")
         if len(values) != len(positions):
             raise SceneError(f"{name} of {what} are not as many as its positions; export the scene again")
-        if not _usable(values[used]):
+        if not usable(values[used]):
             warnings.append(f"{name} of {what} are not all finite; they are not used")
             return None
         return values[used]
@@ -125,19 +125,22 @@ def _compact(faces: I64) -> tuple[I64, I64]:
     return used, places.reshape(-1, 3)
 
 
-def _usable(values: F32) -> bool:
+def usable(values: NDArray[np.floating]) -> bool:
+    """Whether all values are finite and of a size that leaves room to calculate."""
     return bool(np.isfinite(values).all()) and bool((np.abs(values) <= MAX_COORDINATE).all())
 
 
-def _without_degenerate(positions: F32, faces: I64, what: str, warnings: list[str]) -> I64:
-    """Drops triangles without area, measured against their longest edge."""
+def without_degenerate(
+    positions: NDArray[np.floating], faces: I64, what: str, warnings: list[str]
+) -> NDArray[np.bool_]:
+    """Which triangles have area, measured against their longest edge. (num_faces,)"""
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
     edge = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)])
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    solid = (area > 1e-10 * edge) & (edge > 0)
+    solid = np.asarray((area > 1e-10 * edge) & (edge > 0))
     if not solid.all():
         warnings.append(f"{int((~solid).sum()):,} triangles of {what} have no area; they are left out")
-    return np.asarray(faces[solid])
+    return solid
 
 
 def _smooth_normals(points: F32, faces: I64) -> F32:

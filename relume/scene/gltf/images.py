@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.gltf.accessors import view_bytes
-from relume.scene.gltf.container import Container, data_uri
+from relume.scene.gltf.container import Container
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
@@ -32,13 +32,46 @@ def to_linear(pixels: U8) -> F32:
     return SRGB_TO_LINEAR[pixels]
 
 
+class Decoder:
+    """Decodes images within one budget for all of them."""
+
+    def __init__(self) -> None:
+        self._texels_left = MAX_TEXELS
+
+    def decode(self, data: bytes, what: str) -> U8:
+        """The texels as bytes, RGBA. (height, width, 4)
+
+        Raises:
+            SceneError: the image is too large, damaged, or of another format than PNG, JPEG and WebP.
+        """
+        if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
+            raise SceneError(f"{what} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
+        try:
+            with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                self._check_size(*image.size, what)
+                return _rgba(image)
+        except SceneError:
+            raise
+        except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
+            raise SceneError(f"{what} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
+        except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
+            raise SceneError(f"{what} is damaged or neither PNG, JPEG nor WebP; export the scene again") from None
+
+    def _check_size(self, width: int, height: int, what: str) -> None:
+        if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+            raise SceneError(f"{what} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down")
+        self._texels_left -= width * height
+        if self._texels_left < 0:
+            raise SceneError(f"the scene's images have more than {MAX_TEXELS:,} texels together; scale them down")
+
+
 class ImageReader:
     """Decodes the images of one file, each once."""
 
     def __init__(self, container: Container) -> None:
         self._container = container
         self._decoded: dict[int, U8] = {}
-        self._texels_left = MAX_TEXELS
+        self._decoder = Decoder()
 
     def texture(self, index: int, what: str) -> tuple[U8, tuple[str, str]]:
         """The bytes (height, width, 4), RGBA, of a texture and how it wraps along u and v.
@@ -76,32 +109,11 @@ class ImageReader:
             if image.bufferView is not None:
                 data = bytes(view_bytes(self._container, image.bufferView, what))
             elif image.uri is not None:
-                data = data_uri(image.uri, what)
+                data = self._container.resolve(image.uri, what)
             else:
                 raise SceneError(f"{what} has no data; export the scene again")
-            self._decoded[index] = self._decode(data, what)
+            self._decoded[index] = self._decoder.decode(data, what)
         return self._decoded[index]
-
-    def _decode(self, data: bytes, what: str) -> U8:
-        if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
-            raise SceneError(f"{what} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
-        try:
-            with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
-                self._check_size(*image.size, what)
-                return _rgba(image)
-        except SceneError:
-            raise
-        except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
-            raise SceneError(f"{what} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
-        except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
-            raise SceneError(f"{what} is damaged or neither PNG, JPEG nor WebP; export the scene again") from None
-
-    def _check_size(self, width: int, height: int, what: str) -> None:
-        if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-            raise SceneError(f"{what} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down")
-        self._texels_left -= width * height
-        if self._texels_left < 0:
-            raise SceneError(f"the scene's images have more than {MAX_TEXELS:,} texels together; scale them down")
 
 
 def _rgba(image: PIL.Image.Image) -> U8:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
-from relume.scene.archive import make_scene
 from relume.scene.checks import MAX_TRIANGLES
+from relume.scene.companions import Alone, Companions
 from relume.scene.demo.studio import studio
+from relume.scene.finish import finished_scene
 from relume.scene.gltf.accessors import AccessorReader
 from relume.scene.gltf.cameras import framing_camera, rigid, slug
-from relume.scene.gltf.container import MAX_FILE_BYTES, READ_EXTENSIONS, Container, read_container
+from relume.scene.gltf.container import READ_EXTENSIONS, Container, read_container
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import Node, Primitive
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
@@ -28,18 +28,20 @@ from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_
 from relume.scene.model import Camera, Environment, Mesh, Scene
 
 F64 = NDArray[np.float64]
-MAX_WARNINGS = 200
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
 MAX_PLACED = 20_000  # primitives times the nodes that show them
 
 
-def import_gltf(source: str | Path | bytes, name: str, environment: Environment | None = None) -> Scene:
-    """Reads a .glb file, or a .gltf file that holds its data in itself.
+def import_gltf(
+    data: bytes, name: str, environment: Environment | None = None, companions: Companions | None = None
+) -> Scene:
+    """Reads a .glb file, or a .gltf file.
 
     Args:
-        source: a path or the file's bytes.
+        data: the file's bytes.
         name: what people call the scene.
         environment: the light; the studio of the built-in scene where None.
+        companions: the files that it may name; none where None.
 
     Returns:
         The scene, nodes applied: one mesh per primitive and node, cameras or one view "front".
@@ -47,24 +49,10 @@ def import_gltf(source: str | Path | bytes, name: str, environment: Environment 
     Raises:
         SceneError: the file cannot be used; the message says why and what to do.
     """
-    reading = _Reading(read_container(_read_bytes(source)))
-    environment = studio() if environment is None else environment
-    warnings = [*environment.warnings, *reading.warnings]
-    if len(warnings) > MAX_WARNINGS:
-        warnings = [*warnings[:MAX_WARNINGS], f"and {len(warnings) - MAX_WARNINGS:,} more of the kind"]
+    reading = _Reading(read_container(data, companions or Alone()))
     materials = [understood.material for understood in reading.materials]
-    return make_scene(name, reading.meshes, materials, reading.cameras, environment, warnings, reading.variants)
-
-
-def _read_bytes(source: str | Path | bytes) -> bytes:
-    if isinstance(source, bytes):
-        return source
-    try:
-        if Path(source).stat().st_size > MAX_FILE_BYTES:
-            raise SceneError(f"{Path(source).name!r} is larger than {MAX_FILE_BYTES >> 20} MB; simplify the scene")
-        return Path(source).read_bytes()
-    except OSError as problem:
-        raise SceneError(f"{Path(source).name!r} cannot be read ({problem.strerror}); check the path") from None
+    parts = (name, reading.meshes, materials, reading.cameras, environment or studio())
+    return finished_scene(*parts, reading.warnings, reading.variants)
 
 
 class _Reading:

@@ -1,0 +1,101 @@
+"""The files that a scene file names: beside it in its folder, in the same archive, or nowhere."""
+
+from __future__ import annotations
+
+import posixpath
+import zipfile
+from pathlib import Path
+from typing import Protocol
+from urllib.parse import unquote
+
+from relume.errors import SceneError
+
+MAX_BYTES = 512 << 20  # of all companions of a scene together
+
+
+class Companions(Protocol):
+    """Reads the files that a scene file names."""
+
+    def read(self, name: str, what: str) -> bytes | None:
+        """The content of a companion; None where there is no such file.
+
+        Raises:
+            SceneError: the name points out of the folder or the archive, or the file cannot be read or is too large.
+        """
+
+
+def inside(name: str, what: str) -> str:
+    """The name as a plain relative path with forward slashes.
+
+    Raises:
+        SceneError: it is absolute, a URL, or climbs out of its folder.
+    """
+    plain = posixpath.normpath(name.replace("\\", "/"))
+    if plain.startswith(("/", "../")) or plain in ("..", ".") or ":" in plain or not plain.isprintable():
+        shown = name[:60].encode("ascii", "replace").decode()
+        raise SceneError(f"{what} lies outside the folder of the scene ({shown!r}); put it beside the scene file")
+    return plain
+
+
+class Alone:
+    """A scene file without companions, such as a single upload."""
+
+    def read(self, name: str, what: str) -> bytes | None:
+        """Nothing, whatever the name; one that points elsewhere is refused all the same."""
+        inside(unquote(name), what)
+        return None
+
+
+class Folder:
+    """The folder of a scene file, and the folders in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder.resolve()
+        self._bytes_left = MAX_BYTES
+
+    def read(self, name: str, what: str) -> bytes | None:
+        """As `Companions.read`; links are followed only where they stay in the folder."""
+        for spelling in dict.fromkeys((unquote(name), name)):
+            plain = inside(spelling, what)
+            try:
+                path = (self._folder / plain).resolve()
+                if not path.is_relative_to(self._folder):
+                    raise SceneError(f"{what} is a link out of the folder of the scene; put the file there")
+                if not path.is_file():
+                    continue
+                self._bytes_left -= path.stat().st_size
+                if self._bytes_left < 0:
+                    raise SceneError(f"the files beside the scene have over {MAX_BYTES >> 20} MB; scale them down")
+                return path.read_bytes()
+            except (OSError, ValueError) as problem:
+                if isinstance(problem, SceneError):
+                    raise
+                raise SceneError(f"{what} cannot be read; check the file beside the scene") from None
+        return None
+
+
+class Archive:
+    """The other entries of a .zip file, read in memory; nothing is ever unpacked to the disk."""
+
+    def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
+        self._archive = archive
+        self._folder = folder
+        self._entries = {posixpath.normpath(info.filename).lower(): info for info in archive.infolist()}
+
+    def read(self, name: str, what: str) -> bytes | None:
+        """As `Companions.read`; upper and lower case are the same."""
+        for spelling in dict.fromkeys((unquote(name), name)):
+            plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
+            entry = self._entries.get(inside(plain, what).lower())
+            if entry is not None:
+                return read_entry(self._archive, entry)
+        return None
+
+
+def read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+    """One entry, never longer than it claims. Raises SceneError where it is damaged."""
+    try:
+        with archive.open(entry) as file:
+            return file.read(entry.file_size)
+    except Exception:  # zipfile and zlib raise many kinds for damaged data
+        raise SceneError("an entry of the .zip file is damaged; pack it again") from None

@@ -1,0 +1,78 @@
+"""OBJ and PLY to Scene: +Y up and metres, as everywhere; one mesh per object and material."""
+
+from __future__ import annotations
+
+from relume.errors import SceneError
+from relume.scene.companions import Alone, Companions
+from relume.scene.demo.studio import studio
+from relume.scene.finish import finished_scene
+from relume.scene.gltf.cameras import framing_camera
+from relume.scene.gltf.names import unique_name
+from relume.scene.mesh_files.corners import make_mesh
+from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
+from relume.scene.mesh_files.obj import Obj, read_obj
+from relume.scene.mesh_files.ply import read_ply
+from relume.scene.model import Environment, Material, Mesh, Scene
+
+MAX_LIBRARIES = 100
+
+
+def import_obj(data: bytes, name: str, environment: Environment | None, companions: Companions) -> Scene:
+    """Reads a Wavefront .obj file and the .mtl files and images that it names. Raises SceneError."""
+    warnings: list[str] = []
+    obj = read_obj(data)
+    library = _library(obj, companions, warnings)
+    warnings.extend(f"lines of kind {kind!r} are not used; only faces are" for kind in sorted(obj.left_out))
+    maker = MaterialMaker(companions, warnings)
+    numbers: dict[str, int] = {}
+    materials: list[Material] = []
+    meshes: list[Mesh] = []
+    taken: dict[str, int] = {}
+    for (thing, material), corners in obj.corners().items():
+        if material not in numbers:
+            numbers[material] = len(materials)
+            if material and obj.libraries and material not in library:
+                warnings.append(f"material {material[:80]!r} is not described; it is grey")
+            materials.append(maker.make(material, library.get(material)))
+        own_name = unique_name(thing or material or "mesh", taken)
+        number = numbers[material]
+        mesh = make_mesh(corners, own_name, number, materials[number], f"mesh {own_name!r}", warnings)
+        meshes.extend([] if mesh is None else [mesh])
+    return _scene(name, meshes, materials, environment, warnings)
+
+
+def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
+    """Reads a Stanford .ply file, text or binary. Raises SceneError."""
+    warnings: list[str] = []
+    corners, color = read_ply(data)
+    described = Described()
+    if color is not None:
+        warnings.append("vertex colours are replaced by their mean")
+        described.numbers = {"Kd": [round(float(value), 6) for value in color], "Pr": [0.5]}
+    material = MaterialMaker(Alone(), warnings).make("material", described if color is not None else None)
+    mesh = make_mesh(corners, "mesh", 0, material, "the mesh", warnings)
+    return _scene(name, [] if mesh is None else [mesh], [material], environment, warnings)
+
+
+def _library(obj: Obj, companions: Companions, warnings: list[str]) -> dict[str, Described]:
+    """All materials of all libraries; the first of a name wins."""
+    if len(obj.libraries) > MAX_LIBRARIES:
+        raise SceneError(f"the .obj file names more than {MAX_LIBRARIES} material files; join them")
+    library: dict[str, Described] = {}
+    for name in dict.fromkeys(obj.libraries):
+        data = companions.read(name, "the material file")
+        if data is None:
+            shown = name[:60].encode("ascii", "replace").decode()
+            warnings.append(f"the material file {shown!r} is not beside the scene; pack both into a .zip file")
+        else:
+            library = read_library(data) | library
+    return library
+
+
+def _scene(
+    name: str, meshes: list[Mesh], materials: list[Material], environment: Environment | None, warnings: list[str]
+) -> Scene:
+    if not meshes:
+        raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+    cameras = [framing_camera(meshes, "front")]
+    return finished_scene(name, meshes, materials, cameras, environment or studio(), warnings)

@@ -1,0 +1,155 @@
+"""Material libraries of OBJ files: Kd as lambert, Ks and Ns as blinn_phong, Pr and Pm as ggx.
+
+Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), and the common PBR extension of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from relume.brdf.registry import TERMS
+from relume.errors import SceneError
+from relume.scene.companions import Companions
+from relume.scene.gltf.images import Decoder, to_linear
+from relume.scene.gltf.names import unique_name
+from relume.scene.gltf.terms import Over, Surface, make_terms
+from relume.scene.model import Material, Texture
+
+MAX_LIBRARY_BYTES = 8 << 20
+MAX_MATERIALS = 1_000
+GREY = [0.6, 0.6, 0.6]
+NUMBERS = {"Kd": 3, "Ks": 3, "Ke": 3, "Ns": 1, "Pr": 1, "Pm": 1, "d": 1, "Tr": 1}
+OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
+OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
+
+
+@dataclass
+class Described:
+    """One `newmtl`: its numbers, and the names of its images by keyword."""
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    maps: dict[str, str] = field(default_factory=dict)
+
+
+def read_library(data: bytes) -> dict[str, Described]:
+    """The materials of a library by name.
+
+    Raises:
+        SceneError: too large, too many, or a line is not what its first word says.
+    """
+    if len(data) > MAX_LIBRARY_BYTES:
+        raise SceneError(f"the material file is larger than {MAX_LIBRARY_BYTES >> 20} MB; export it again")
+    materials: dict[str, Described] = {}
+    material = Described()
+    for line in data.decode("utf-8", "replace").splitlines():
+        word, _, rest = line.strip().partition(" ")
+        if word == "newmtl":
+            material = materials[rest.strip()[:1_000]] = Described()
+            if len(materials) > MAX_MATERIALS:
+                raise SceneError(f"the material file has more than {MAX_MATERIALS:,} materials; remove some")
+        elif word in NUMBERS:
+            material.numbers[word] = _numbers(rest.split(), NUMBERS[word], word)
+        elif word.startswith("map_") or word in ("bump", "norm", "disp", "refl"):
+            material.maps[word] = _image_name(rest.split())
+    return materials
+
+
+def _numbers(words: list[str], count: int, keyword: str) -> list[float]:
+    """`count` numbers; one stands for three."""
+    try:
+        values = [float(word) for word in words[:count]]
+    except ValueError:
+        raise SceneError(f"{keyword} of the material file is not made of numbers; export it again") from None
+    if len(values) == 1:
+        values *= count
+    if len(values) != count or not np.isfinite(values).all() or not 0 <= min(values) <= max(values) <= 1e6:
+        raise SceneError(f"{keyword} of the material file is out of range; export it again")
+    return values
+
+
+def _image_name(words: list[str]) -> str:
+    """The file name after the options; it may have spaces in it."""
+    while words and words[0] in OPTIONS:
+        words = words[1 + OPTIONS[words[0]] :]
+    return " ".join(words)[:1_000]
+
+
+class MaterialMaker:
+    """Turns described materials into relume's, each image decoded once."""
+
+    def __init__(self, companions: Companions, warnings: list[str]) -> None:
+        self._companions = companions
+        self._warnings = warnings
+        self._decoder = Decoder()
+        self._names: dict[str, int] = {}
+        self._pixels: dict[str, Any] = {}
+
+    def make(self, name: str, described: Described | None) -> Material:
+        """One material under a name of its own; grey where nothing is known of it. Raises SceneError."""
+        own_name = unique_name(name or "material", self._names)
+        what = f"material {own_name!r}"
+        if described is None:
+            return Material(own_name, make_terms(Surface(np.array(GREY), np.full(3, 0.04), 1.0, 0.5), Over()))
+        textures = self._textures(described, what)
+        self._warn_of_the_rest(described, what)
+        normal_map = self._image(described.maps.get("norm"), f"the normal map of {what}", _normals)
+        return Material(own_name, _terms(described, textures), textures, normal_map)
+
+    def _textures(self, described: Described, what: str) -> dict[str, Texture]:
+        textures = {}
+        for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular")):
+            texture = self._image(described.maps.get(keyword), f"{keyword} of {what}", to_linear)
+            if texture is not None:
+                textures[channel] = texture
+        return textures
+
+    def _image(self, name: str | None, what: str, convert: Callable[[Any], Any]) -> Texture | None:
+        if not name:
+            return None
+        if name not in self._pixels:
+            data = self._companions.read(name, what)
+            self._pixels[name] = None if data is None else self._decoder.decode(data, what)[..., :3]
+        if self._pixels[name] is None:
+            shown = name[:60].encode("ascii", "replace").decode()
+            self._warnings.append(f"{what} ({shown!r}) is not beside the scene; it is left out")
+            return None
+        return Texture(np.ascontiguousarray(convert(self._pixels[name]), np.float32))
+
+    def _warn_of_the_rest(self, described: Described, what: str) -> None:
+        numbers = described.numbers
+        if any(numbers.get("Ke", ())):
+            self._warnings.append(f"{what} glows; its emission is not used")
+        if numbers.get("d", [1.0])[0] < 1 or numbers.get("Tr", [0.0])[0] > 0:
+            self._warnings.append(f"{what} is see-through; it is opaque here")
+        unused = sorted(described.maps.keys() - {"map_Kd", "map_Ks", "norm"})
+        self._warnings.extend(f"{keyword[:40]} of {what} is not used" for keyword in unused)
+
+
+def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str, Any], ...]:
+    numbers = described.numbers
+    base = numbers.get("Kd", GREY)
+    if "diffuse" in textures and not any(base):
+        base = [1.0, 1.0, 1.0]  # exporters write zeros where they mean the image
+    if "Pr" in numbers or "Pm" in numbers:
+        metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
+        f0 = 0.04 + (np.array(base) - 0.04) * metallic
+        surface = Surface(np.array(base) * (1 - metallic), f0, 1.0, numbers.get("Pr", [0.5])[0], textures)
+        return make_terms(surface, Over())
+    diffuse = {"model": "lambert", "color": base, "texture": "diffuse" if "diffuse" in textures else None}
+    tint = numbers.get("Ks", [0.0, 0.0, 0.0])
+    if not any(tint):
+        return (diffuse,)
+    exponent = TERMS["blinn_phong"].parameter("exponent")
+    held = float(np.clip(numbers.get("Ns", [exponent.default])[0], exponent.minimum, exponent.maximum))
+    gloss = {"model": "blinn_phong", "color": np.clip(tint, 0, 1).tolist(), "params": {"exponent": held}}
+    return (diffuse, gloss | {"texture": "specular" if "specular" in textures else None})
+
+
+def _normals(pixels: Any) -> Any:
+    normals = pixels.astype(np.float32) / np.float32(127.5) - np.float32(1)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.where(length > 1e-3, normals / np.maximum(length, 1e-3), (0, 0, 1))

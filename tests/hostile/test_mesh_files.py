@@ -1,0 +1,234 @@
+"""OBJ, MTL, PLY and ZIP that are broken, absurd or malicious: one clear SceneError, nothing else, no hang."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ply_builder import binary, header, text
+
+from relume.errors import SceneError
+from relume.scene.importer import import_scene
+from relume.scene.model import Environment, Scene
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+OBJ = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 3/1/1\nf -1//-1 -2 -3\n"
+MTL = b"newmtl a\nKd 0.5 0.5 0.5\nKs 0.1 0.1 0.1\nNs 50\nmap_Kd wood.png\n"
+
+
+def refused(data: bytes) -> str:
+    with pytest.raises(SceneError) as problem:
+        import_scene(data, "test", LIGHT)
+    message = str(problem.value)
+    assert message.isprintable()
+    assert len(message) < 400
+    return message
+
+
+def packed(entries: dict[str, bytes], kind: int = zipfile.ZIP_DEFLATED) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", kind) as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"v 1 2",
+        b"v a b c",
+        b"f 1 2",
+        b"f 0 1 2",
+        b"f 1 2 99",
+        b"f 1 2 -99",
+        b"f 1 2 99999999999999999999999999",
+        b"f 1/2/3/4 2 3",
+        b"f 1 2 x",
+        b"f 1/1/1 2/7/1 3/1/1",
+        b"f //1 //1 //1",
+        b"v " + b"9" * 5_000 + b" x",
+        b"vt",
+        b"v nan 0 0\nf 1 2 4",
+        b"v 1e300 0 0\nf 1 2 4",
+        b"f " + b"1 " * 600_000,
+    ],
+)
+def test_obj_lines_that_are_wrong_are_refused(line: bytes) -> None:
+    refused(OBJ + line + b"\n")
+
+
+def test_obj_without_faces_and_objects_without_end_are_refused() -> None:
+    assert "no triangles" in refused(b"v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    many = b"".join(b"o %d\nf 1 2 3\n" % i for i in range(10_001))
+    assert "objects" in refused(OBJ + many)
+
+
+def test_obj_of_degenerate_faces_only_is_refused() -> None:
+    assert "no triangles" in refused(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n")
+
+
+def test_numbers_that_are_not_finite_where_nothing_hangs_on_them_are_a_warning() -> None:
+    scene = import_scene(OBJ.replace(b"vt 0 0", b"vt nan 0").replace(b"vn 0 0 1", b"vn inf 0 1"), "test", LIGHT)
+    assert np.isfinite(scene.meshes[0].normals).all()
+    assert len([warning for warning in scene.warnings if "not all finite" in warning]) == 2
+
+
+ESCAPES = [
+    "../secret.mtl",
+    "/etc/passwd",
+    "..\\secret.mtl",
+    "C:\\secret.mtl",
+    "http://127.0.0.1/m.mtl",
+    "a/../../m.mtl",
+]
+
+
+@pytest.mark.parametrize("name", ESCAPES)
+def test_no_name_leads_out_of_the_folder(name: str, tmp_path: Path) -> None:
+    (tmp_path / "secret.mtl").write_bytes(MTL)
+    (tmp_path / "in").mkdir()
+    library, image = f"mtllib {name}\n".encode() + OBJ[13:], f"newmtl a\nmap_Kd {name}\n".encode()
+    path = tmp_path / "in" / "scene.obj"
+    for content in (library, OBJ):
+        path.write_bytes(content)
+        (tmp_path / "in" / "m.mtl").write_bytes(image)
+        with pytest.raises(SceneError, match="outside the folder"):
+            import_scene(path, "test", LIGHT)
+    assert "outside the folder" in refused(packed({"scene.obj": library}))
+    assert "outside the folder" in refused(packed({"scene.obj": OBJ, "m.mtl": image}))
+    assert "outside the folder" in refused(library)
+
+
+def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "secret.mtl").write_bytes(MTL)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "m.mtl").symlink_to(tmp_path / "secret.mtl")
+    (tmp_path / "in" / "scene.obj").write_bytes(OBJ)
+    with pytest.raises(SceneError, match="link"):
+        import_scene(tmp_path / "in" / "scene.obj", "test", LIGHT)
+
+
+@pytest.mark.parametrize("line", [b"Kd nan 0 0", b"Kd 1 2", b"Ns -1", b"Ns many", b"Kd 1e300", b"Pr inf"])
+def test_material_numbers_that_are_wrong_are_refused(line: bytes) -> None:
+    assert "material file" in refused(packed({"a.obj": OBJ, "m.mtl": MTL + line}))
+
+
+def test_material_files_without_end_are_refused() -> None:
+    assert "1,000 materials" in refused(
+        packed({"a.obj": OBJ, "m.mtl": b"".join(b"newmtl %d\n" % i for i in range(1_001))})
+    )
+    assert "larger than" in refused(packed({"a.obj": OBJ, "m.mtl": b" " * (9 << 20)}))
+
+
+def test_huge_images_are_refused_before_decoding() -> None:
+    ihdr = b"IHDR" + struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
+    png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + ihdr + bytes(4)
+    refused(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": png}))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"ply",
+        b"ply\n",
+        b"ply\nend_header\n",
+        b"ply\nformat ascii 1.0\nend_header\n",
+        b"ply\nformat utf8 1.0\nend_header\n",
+        b"ply\nformat ascii 1.0\nproperty float x\nend_header\n",
+        b"ply\nformat ascii 1.0\n" + b"comment x\n" * 10_000 + b"end_header\n",
+        b"ply\nformat ascii 1.0\nelement vertex 1\n" + b"property char x\n" * 300 + b"end_header\n",
+        b"ply\nformat ascii 1.0\nelement vertex 3\nelement vertex 3\nend_header\n",
+        header("ascii", 1, 2_000_000_000).encode() + b"0 0 0\n",
+        header("binary_little_endian", 1, 999_999_999_999).encode() + bytes(100),
+        header("binary_little_endian", 2_000_000_000).encode() + bytes(200),
+        header("ascii", 1, -1).encode(),
+        header("ascii", 1, 10**30).encode(),
+        text()[:-4],
+        text()[:-8] + b"1 2 9\n",
+        text()[:-8] + b"1 2 -1\n",
+        text()[:-8] + b"1 2 1e99\n",
+        text()[:-8] + b"1 2 x\n",
+        text().replace(b"4 0 1", b"-4 0 1"),
+        text().replace(b"4 0 1", b"nan 0 1"),
+        text().replace(b"1.0 1.0 0.0", b"nan 1.0 0.0"),
+        binary("<")[:-1],
+        binary(">")[:-20],
+        binary("<").replace(b"list uchar int", b"list float int"),
+        binary("<").replace(b"list uchar int", b"list int int"),
+        binary("<").replace(b"property double z", b"property double w"),
+        b"ply\nformat ascii 1.0\nelement vertex 3\nproperty list uchar int x\nend_header\n1 2\n",
+    ],
+)
+def test_ply_files_that_are_wrong_are_refused(data: bytes) -> None:
+    refused(data)
+
+
+def test_archives_that_are_wrong_are_refused() -> None:
+    good = packed({"a.obj": OBJ})
+    for length in (2, 10, len(good) // 2, len(good) - 1):
+        refused(good[:length])
+    assert "0 scene files" in refused(packed({"a.txt": OBJ}))
+    assert "2 scene files" in refused(packed({"a.obj": OBJ, "b.ply": text()}))
+    assert "entries" in refused(packed({f"{i}.txt": b"" for i in range(1_001)}))
+    assert "unusual way" in refused(packed({"a.obj": OBJ}, zipfile.ZIP_LZMA))
+    encrypted = bytearray(good)
+    encrypted[good.index(b"PK\1\2") + 8] |= 1
+    assert "password" in refused(bytes(encrypted))
+    damaged = bytearray(good)
+    damaged[45] ^= 0xFF
+    assert "damaged" in refused(bytes(damaged))
+
+
+def test_bombs_are_refused_before_they_are_unpacked() -> None:
+    data = bytearray(packed({"a.obj": b"\n" * 1_000_000}))
+    place = data.index(b"PK\1\2")
+    struct.pack_into("<I", data, place + 24, 1 << 30)  # what it claims to unpack to
+    assert "unpacks to more" in refused(bytes(data))
+    many = bytearray(packed({"a.obj": OBJ}))
+    struct.pack_into("<H", many, many.index(b"PK\5\6") + 10, 60_000)
+    assert "entries" in refused(bytes(many))
+
+
+def test_an_archive_in_an_archive_is_not_opened() -> None:
+    assert "none of" in refused(packed({"a.obj": packed({"a.obj": OBJ})}))
+
+
+FUZZED = {"obj": OBJ, "text": text(True), "little": binary("<", True), "zip": packed({"a.obj": OBJ, "m.mtl": MTL})}
+
+
+@pytest.mark.parametrize("kind", FUZZED)
+def test_fuzzed_files_are_good_to_begin_with(kind: str) -> None:
+    assert len(import_scene(FUZZED[kind], "test", LIGHT).meshes) == 1
+
+
+@pytest.mark.parametrize("kind", FUZZED)
+@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=8), cut=st.floats(0, 1)
+)
+def test_any_changed_bytes_are_imported_or_refused(kind: str, changes: list[tuple[float, int]], cut: float) -> None:
+    data = bytearray(FUZZED[kind])
+    for place, value in changes:
+        data[int(place * len(data))] = value
+    if cut < 0.3:
+        data = data[: int(cut / 0.3 * len(data))]
+    with contextlib.suppress(SceneError):
+        assert isinstance(import_scene(bytes(data), "test", LIGHT), Scene)
+
+
+def test_real_broken_files_are_imported_or_refused(shared_data: Path) -> None:
+    files = [
+        p for p in sorted((shared_data / "bad-inputs" / "trimesh").rglob("*")) if p.suffix in (".obj", ".ply", ".stl")
+    ]
+    assert len(files) > 15
+    for path in files:
+        with contextlib.suppress(SceneError):
+            assert import_scene(path, "test", LIGHT).meshes

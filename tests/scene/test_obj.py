@@ -1,0 +1,154 @@
+"""OBJ and MTL: faces, normals, materials, and the files beside them."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import PIL.Image
+import pytest
+
+from relume.errors import SceneError
+from relume.scene.importer import import_scene
+from relume.scene.mesh_files.corners import creased_normals
+from relume.scene.model import Environment, Mesh, Scene
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+COORDINATES = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+
+
+def imported(text: str) -> Scene:
+    return import_scene(text.encode(), "test", LIGHT)
+
+
+def only_mesh(text: str) -> Mesh:
+    (mesh,) = imported(text).meshes
+    return mesh
+
+
+def png(*color: int) -> bytes:
+    encoded = io.BytesIO()
+    PIL.Image.new("RGB", (2, 2), color).save(encoded, "PNG")
+    return encoded.getvalue()
+
+
+def test_polygons_become_fans_that_face_the_same_way() -> None:
+    mesh = only_mesh(SQUARE + "f 1 2 3 4\n")
+    np.testing.assert_array_equal(
+        mesh.positions[mesh.faces][:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]
+    )
+    np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * 6, atol=1e-6)
+
+
+def test_coordinates_run_from_the_top_and_normals_are_the_files() -> None:
+    mesh = only_mesh(SQUARE + COORDINATES + "vn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/2\n")
+    np.testing.assert_array_equal(mesh.uvs, [[0, 1], [1, 1], [1, 0]])
+    np.testing.assert_allclose(mesh.normals, [[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8]], atol=1e-6)
+
+
+def test_numbers_below_zero_count_back_from_their_line() -> None:
+    first = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
+    second = "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1\n"
+    mesh = only_mesh(first + second)
+    np.testing.assert_array_equal(mesh.positions[:, 0], [0, 1, 0, 5, 6, 5])
+
+
+def test_lines_may_go_on_and_come_from_anywhere() -> None:
+    mesh = only_mesh("# made by hand\r\n" + SQUARE + "s off\r\nf 1 2 \\\r\n 3 4\r\n")
+    assert len(mesh.faces) == 2
+
+
+def test_a_cube_is_flat_and_a_fine_ball_is_round() -> None:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1], [0, 2, 6], [0, 6, 4]])
+    normals = creased_normals(corners[faces], faces).reshape(-1, 3, 3)
+    cross = np.cross(corners[faces][:, 1] - corners[faces][:, 0], corners[faces][:, 2] - corners[faces][:, 0])
+    np.testing.assert_allclose(normals, np.repeat(cross[:, None], 3, axis=1), atol=1e-12)
+    points, ball = _ball(24)
+    normals = creased_normals(points[ball], ball)
+    # facets of 15 by 7.5 degrees: the mean of what meets at a corner lies within half a facet of the radius
+    assert (normals * points[ball].reshape(-1, 3)).sum(1).min() > np.cos(np.radians(7.5))
+
+
+def _ball(steps: int) -> tuple[np.ndarray, np.ndarray]:
+    theta, phi = np.linspace(0.05, np.pi - 0.05, steps), np.arange(steps) * 2 * np.pi / steps
+    sin, cos = np.sin(theta)[:, None], np.cos(theta)[:, None]
+    points = np.stack([sin * np.cos(phi), np.broadcast_to(cos, (steps, steps)), sin * np.sin(phi)], -1).reshape(-1, 3)
+    i, j = (a.reshape(-1) for a in np.meshgrid(np.arange(steps - 1), np.arange(steps), indexing="ij"))
+    a, b, c, d = i * steps + j, i * steps + (j + 1) % steps, (i + 1) * steps + j, (i + 1) * steps + (j + 1) % steps
+    return points, np.concatenate([np.stack([a, b, c], -1), np.stack([b, d, c], -1)])
+
+
+def test_objects_and_materials_are_meshes_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "m.mtl").write_text("newmtl red\nKd 1 0 0\nKs 0.2\nNs 90\n\nnewmtl metal\nKd .9 .8 .7\nPm 1\nPr .3\n")
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + "mtllib m.mtl\no Box\nusemtl red\nf 1 2 3\nusemtl metal\nf 1 3 4\no Lid\nf 2 3 4\n")
+    scene = import_scene(path, "thing", LIGHT)
+    assert [mesh.name for mesh in scene.meshes] == ["Box", "Box 2", "Lid"]
+    assert [mesh.material for mesh in scene.meshes] == [0, 1, 1]
+    red, metal = scene.materials
+    assert [term["model"] for term in red.terms] == ["lambert", "blinn_phong"]
+    assert red.terms[1]["color"] == [0.2, 0.2, 0.2]
+    assert red.terms[1]["params"] == {"exponent": 90.0}
+    assert metal.terms[0]["color"] == [0, 0, 0]
+    assert metal.terms[1]["params"] == {"roughness": 0.3, "f0": [0.9, 0.8, 0.7]}
+    assert scene.warnings == ()
+
+
+def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "old wood.png").write_bytes(png(255, 0, 0))
+    (tmp_path / "m.mtl").write_text(
+        "newmtl a\nKd 0 0 0\nmap_Kd -s 2 2 1 maps\\old wood.png\nmap_d holes.png\nd 0.5\nKe 1\n"
+    )
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\nusemtl a\nf 1/1 2/2 3/3\n")
+    scene = import_scene(path, "thing", LIGHT)
+    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0])
+    assert scene.materials[0].terms[0] == {"model": "lambert", "color": [1.0, 1.0, 1.0], "texture": "diffuse"}
+    assert len(scene.warnings) == 3
+
+
+def test_what_is_not_there_is_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + "mtllib none.mtl\nusemtl a\nf 1 2 3\nl 1 2\n")
+    words = ["none.mtl", "kind 'l'", "not described"]
+    warnings = import_scene(path, "thing", LIGHT).warnings
+    assert all(any(word in warning for warning in warnings) for word in words)
+    assert len(warnings) == len(words)
+
+
+def test_an_archive_holds_the_scene_with_its_files() -> None:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("__MACOSX/._thing.obj", b"litter")
+        archive.writestr("model/thing.obj", SQUARE + COORDINATES + "mtllib M.MTL\nusemtl a\nf 1/1 2/2 3/3\n")
+        archive.writestr("model/m.mtl", "newmtl a\nmap_Kd ../maps/Wood.png\n")
+        archive.writestr("maps/wood.png", png(0, 255, 0))
+    scene = import_scene(packed.getvalue(), "test", LIGHT)
+    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [0, 1, 0])
+    assert scene.warnings == ()
+
+
+def test_real_objects_are_imported(shared_data: Path) -> None:
+    files = sorted((shared_data / "scenes").rglob("*.obj"))
+    assert len(files) > 5
+    for path in files:
+        scene = import_scene(path, path.stem, LIGHT)
+        np.testing.assert_allclose(np.linalg.norm(scene.meshes[0].normals, axis=1), 1, atol=1e-4)
+
+
+def test_a_gltf_file_may_name_files_beside_it(tmp_path: Path) -> None:
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    (tmp_path / "a mesh.bin").write_bytes(positions.tobytes())
+    text = """{"asset":{"version":"2.0"},"buffers":[{"uri":"a%20mesh.bin","byteLength":36}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}]}"""
+    (tmp_path / "scene.gltf").write_text(text)
+    np.testing.assert_array_equal(import_scene(tmp_path / "scene.gltf", "test", LIGHT).meshes[0].positions, positions)
+    with pytest.raises(SceneError, match="outside the file"):
+        import_scene(text.encode(), "test", LIGHT)

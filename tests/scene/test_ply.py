@@ -1,0 +1,52 @@
+"""PLY, text and binary, against arrays that are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ply_builder import POINTS, binary, text
+
+from relume.scene.importer import import_scene
+from relume.scene.model import Environment, Scene
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+
+
+def imported(data: bytes) -> Scene:
+    return import_scene(data, "test", LIGHT)
+
+
+@pytest.mark.parametrize("data", [text(), binary("<"), binary(">")], ids=["text", "little", "big"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_all_formats_say_the_same(data: bytes, mixed: bool) -> None:
+    if mixed:  # a triangle after the quad: rows of different lengths
+        data = {b"asc": text(True), b"bin": binary("<", True)}[data.split()[2][:3]]
+    (mesh,) = imported(data).meshes
+    expected = POINTS[[0, 1, 2, 0, 2, 3, *([0, 1, 3] if mixed else [])]]
+    np.testing.assert_array_equal(mesh.positions, expected.astype(np.float32))
+    np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * len(expected), atol=1e-6)
+
+
+def test_normals_coordinates_and_colours_are_understood() -> None:
+    header = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(
+        f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz", "s", "t")
+    )
+    header += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    header += "element face 1\nproperty uchar flags\nproperty list uchar uint vertex_index\nend_header\n"
+    rows = "0 0 0 0 3 4 0 0 255 0 128\n1 0 0 0 3 4 1 0 255 0 128\n0 1 0 0 3 4 0 1 255 0 128\n7 3 0 1 2\n"
+    scene = imported((header + rows).encode())
+    mesh = scene.meshes[0]
+    np.testing.assert_allclose(mesh.normals, [[0, 0.6, 0.8]] * 3, atol=1e-6)
+    np.testing.assert_array_equal(mesh.uvs, [[0, 1], [1, 1], [0, 0]])
+    np.testing.assert_allclose(scene.materials[0].terms[0]["color"], [1, 0, 0.2158605], atol=1e-6)
+    assert scene.warnings == ("vertex colours are replaced by their mean",)
+
+
+def test_real_files_are_imported(shared_data: Path) -> None:
+    files = sorted((shared_data / "scenes" / "meshes").glob("*.ply"))
+    assert len(files) > 3
+    for path in files:
+        (mesh,) = import_scene(path, path.stem, LIGHT).meshes
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-4)
