@@ -276,6 +276,7 @@ export interface SceneBody {
   views: SceneView[];
   materials: SceneMaterial[];
   lights: string[];
+  variants: SceneVariant[];
   warnings: string[];
   triangles: number;
   thumbnail: string | null;
@@ -286,6 +287,12 @@ export interface SceneBody {
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
+}
+
+/** A look that came with the scene's file; partial, in look-document form. */
+export interface SceneVariant {
+  name: string;
+  look: Record<string, unknown>;
 }
 
 /** A camera; `aspect` is width ÷ height. */

@@ -38,6 +38,19 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
     raise TimeoutError(url)
 
 
+def test_scenes_of_other_formats_are_told_apart_by_content(client: TestClient) -> None:
+    obj = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    created = client.post("/api/scenes", files={"scene": ("Leaf.obj", obj)})
+    assert created.status_code == 201, created.text
+    body = created.json()
+    assert body["name"] == "Leaf"
+    assert body["variants"] == []
+    assert ["m.mtl" in warning for warning in body["warnings"]] == [True]
+    refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"m.mtl", b"../environment.hdr"))})
+    assert refused.status_code == 422
+    assert "outside the folder" in refused.json()["detail"]
+
+
 def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: bytes) -> None:
     created = client.post("/api/scenes", files={"scene": ("Box on table.glb", glb)})
     assert created.status_code == 201, created.text

@@ -85,6 +85,53 @@ function SavedTile({ saved }: { saved: SavedLook }) {
   );
 }
 
+/** A look that came with the scene's file: to show, to compare with, not to change. */
+function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
+  const whole = completed(partial);
+  const shown = JSON.stringify(whole) === JSON.stringify(look.value);
+  return (
+    <li class={`tile ${shown ? "shown" : ""}`}>
+      <button
+        class="tile-picture"
+        aria-label={`Show ${name}`}
+        aria-pressed={shown}
+        onClick={() => commit(`Show ${name}`, whole)}
+      >
+        <Picture image={null} text={name} />
+        {sideA.value?.label === name && <span class="mark">A</span>}
+      </button>
+      <span class="tile-actions">
+        <button
+          class="icon"
+          title={`Compare with ${name}: keep it as A`}
+          aria-label={`Keep ${name} as A`}
+          onClick={() => void markLook(whole, name)}
+        >
+          A
+        </button>
+      </span>
+      <span class="tile-name" title={`${name}, a variant of the scene's file`}>
+        {name}
+      </span>
+    </li>
+  );
+}
+
+function Variants() {
+  const variants = scene.value?.variants ?? [];
+  if (variants.length === 0) return null;
+  return (
+    <>
+      <h2>Variants</h2>
+      <ul class="tiles saved" aria-label="Variants of the scene">
+        {variants.map(({ name, look: partial }) => (
+          <VariantTile key={name} name={name} partial={partial as Partial<Look>} />
+        ))}
+      </ul>
+    </>
+  );
+}
+
 function StepTile({ count, label, of }: { count: number; label: string; of: Look | undefined }) {
   const current = history.cursor.value === count;
   const undone = count > history.cursor.value;
@@ -150,6 +197,7 @@ export function Filmstrip() {
           ))}
         </ul>
       )}
+      {defaultLook.value !== null && <Variants />}
       <h2>History</h2>
       <Steps />
     </section>

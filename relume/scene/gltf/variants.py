@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.errors import SceneError
+from relume.look.terms import complete_term
 from relume.scene.gltf.document import Document, Index, Name, Primitive
 from relume.scene.gltf.materials import Understood
 from relume.scene.gltf.names import unique_name
@@ -82,7 +83,7 @@ def variant_looks(
     wardrobe: Mapping[int, Understood],
     warnings: list[str],
 ) -> dict[str, dict[str, Any]]:
-    """A partial look for each variant.
+    """A partial look for each variant, the terms in it complete.
 
     Args:
         worn: the scene's materials, and what each is exchanged for.
@@ -107,7 +108,7 @@ def _dressed(own: Understood, other: Understood, variant: str, warnings: list[st
     for term in other.material.terms:
         channel = term.get("texture")
         if channel is None:
-            terms.append(dict(term))
+            terms.append(term)
             continue
         image = other.material.textures[channel]
         kept, tint = _kept_channel(own, other, image)
@@ -115,7 +116,8 @@ def _dressed(own: Understood, other: Understood, variant: str, warnings: list[st
             warnings.append(f"{what} has a texture of its own; its mean colour stands for it")
         color = np.array(term["color"]) * tint
         terms.append(term | {"color": [round(float(value), 6) for value in color], "texture": kept})
-    return terms
+    pointer = ("materials", own.material.name, "terms")
+    return [complete_term((*pointer, number), term, None) for number, term in enumerate(terms)]
 
 
 def _kept_channel(own: Understood, other: Understood, image: Texture) -> tuple[str | None, F32]:
