@@ -13,7 +13,7 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. */
+/** What to bake. A preset gives size and lights; what is named beside it wins. `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
   method?: string;
@@ -21,6 +21,7 @@ export interface BakeRequest {
   preset?: "preview" | "good" | "final" | null;
   size?: [number, number] | null;
   lights?: number | null;
+  relightable?: boolean;
   dry_run?: boolean;
 }
 
@@ -252,6 +253,7 @@ export interface RecipeBody {
   views: string[];
   size: [number, number];
   lights: number;
+  relightable: boolean;
 }
 
 /** A batch; `done` of `total` frames are finished. */
