@@ -1,7 +1,9 @@
-"""One pool of threads for every kernel of this process.
+"""The threads for every kernel of this process: a pool for long work, and one for what a frame waits for.
 
 Kernels release the interpreter lock and work on ranges; they are split here and nowhere else, so that two layers of
-threads never fight over the same cores. `RELUME_THREADS` bounds the pool; worker processes set it to 1.
+threads never fight over the same cores. A freeze hands out hundreds of ranges at once, which a frame's few must not
+queue behind: they have threads of their own, and the system shares the cores between the two.
+`RELUME_THREADS` bounds each pool; worker processes set it to 1.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 _SHARES_A_THREAD = 2
 
 _lock = threading.Lock()
-_pool: ThreadPoolExecutor | None = None
+_pools: dict[str, ThreadPoolExecutor] = {}
 
 
 def num_threads() -> int:
@@ -25,12 +27,23 @@ def num_threads() -> int:
     return max(1, min(int(asked), 256)) if asked.isdigit() else available
 
 
-def _shared_pool() -> ThreadPoolExecutor:
-    global _pool
+def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
-        if _pool is None:
-            _pool = ThreadPoolExecutor(num_threads(), thread_name_prefix="relume-kernel")
-        return _pool
+        if name not in _pools:
+            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}")
+        return _pools[name]
+
+
+def _run(kernel: Callable[[int, int], object], count: int, grain: int, pool: str) -> None:
+    ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
+    if num_threads() == 1 or len(ranges) == 1:
+        for start, stop in ranges:
+            kernel(start, stop)
+        return
+    futures = [_pool(pool).submit(kernel, start, stop) for start, stop in ranges]
+    errors = [error for future in futures if (error := future.exception()) is not None]
+    if errors:
+        raise errors[0]
 
 
 def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
@@ -38,15 +51,7 @@ def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> 
 
     Ranges must not depend on each other. The first exception is raised here after all ranges have ended.
     """
-    ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
-    if num_threads() == 1 or len(ranges) == 1:
-        for start, stop in ranges:
-            kernel(start, stop)
-        return
-    futures = [_shared_pool().submit(kernel, start, stop) for start, stop in ranges]
-    errors = [error for future in futures if (error := future.exception()) is not None]
-    if errors:
-        raise errors[0]
+    _run(kernel, count, grain, "kernel")
 
 
 def for_shares(kernel: Callable[[int, int], object], count: int) -> None:
@@ -54,4 +59,5 @@ def for_shares(kernel: Callable[[int, int], object], count: int) -> None:
 
     For work of a few milliseconds, where handing out a range costs as much as doing it.
     """
-    for_ranges(kernel, count, max(1, -(-count // (_SHARES_A_THREAD * num_threads()))))
+    grain = max(1, -(-count // (_SHARES_A_THREAD * num_threads())))
+    _run(kernel, count, grain, "frame")

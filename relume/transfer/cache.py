@@ -47,16 +47,20 @@ class FrozenCache:
             found = self._entries.get(key)
             return found if isinstance(found, kind) else None
 
+    def check(self, num_bytes: int) -> None:
+        """Raises MemoryBudgetError where an entry of so many bytes is larger than the budget."""
+        if num_bytes > self.budget_bytes:
+            raise MemoryBudgetError(
+                "freezing this curve", num_bytes, self.budget_bytes, "bake a smaller picture or raise the cache budget"
+            )
+
     def get(self, key: Hashable, kind: type[Entry], num_bytes: int, make: Callable[[], Entry]) -> Entry:
         """The entry; made by `make` where there is none, room for its `num_bytes` being made first.
 
         Raises:
             MemoryBudgetError: it alone is larger than the budget.
         """
-        if num_bytes > self.budget_bytes:
-            raise MemoryBudgetError(
-                "freezing this curve", num_bytes, self.budget_bytes, "bake a smaller picture or raise the cache budget"
-            )
+        self.check(num_bytes)
         with self._lock:
             making = self._making.setdefault(key, threading.Lock())
         with making:

@@ -31,7 +31,7 @@ class TermImage:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
         active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
-        term: the declaration of the term's model, fixed parameters put in.
+        term: the declaration of the term's model, fixed parameters put in. kind: what tells it from others.
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
@@ -43,26 +43,26 @@ class TermImage:
         self.active: str | None = None
         self.shown: F64 | None = None
         self.is_composed = False
-        self._kind: tuple[str, tuple[float, ...]] | None = None
+        self.kind: tuple[str, tuple[float, ...]] | None = None
         self.set_document(document)
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
         model: str = document["model"]
         kind = (model, TERMS[model].fixed_values(document))
-        if kind != self._kind:
+        if kind != self.kind:
             self.effective = self.active = self.shown = None
-        self._kind = kind
+        self.kind = kind
         self.document = document
         self.term = TERMS[model].settled(document)
         self.target = {curve.name: curve_bands(document, curve) for curve in self.term.curves if not curve.outgoing}
         self.outgoing = self._outgoing()
         self.is_composed = False
 
-    def show(self, shaded: Shaded) -> None:
-        """Go on from an image of the target curves."""
+    def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
+        """Go on from an image of these curves, which may have been the target some time ago."""
         self.image[:] = shaded.image
-        self.effective = dict(self.target)
+        self.effective = dict(bands)
         self.active = self.shown = None
         self.is_composed = False
 
@@ -87,7 +87,7 @@ class TermImage:
         """What a frozen operator, or an image where no curve is active, depends on besides view and material."""
         bands = self.target if of_target or self.effective is None else self.effective
         return (
-            self._kind,
+            self.kind,
             active,
             *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name != active),
         )

@@ -1,11 +1,11 @@
-"""The part of a frame that runs in a thread: bring the picture on, encode what the client lacks, pack the message."""
+"""What runs in a thread for a frame: bring the picture on, encode what the client lacks, pack the message."""
 
 from __future__ import annotations
 
 import io
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.imageio import to_bytes, tone_map
-from server.live.ports import Picture, Tile
+from server.live.ports import Need, Picture, Tile
 from server.protocol import FrameHeader, FrameTimes
 
 Format = Literal["rgb9e5", "jpeg"]
@@ -25,7 +25,7 @@ class Target:
 
     Attributes:
         look: validated. document: the same as JSON.
-        received_s: when the edit came in; None for the first look and after a change of view.
+        received_s: when the edit came in; None for a look that no edit asked for.
     """
 
     look: Any
@@ -36,24 +36,28 @@ class Target:
 
 @dataclass(frozen=True)
 class Order:
-    """What a turn of the frame loop asks of the picture.
+    """What a turn of the frame loop asks of a picture.
 
     Attributes:
-        target: a new look, or None to refine the one it has.
-        shown: the look that the frame will show.
+        target: the look that the frame will show.
+        accepting: pictures that have not got that look yet; all take it, or none.
         lacking: tiles that the client has not got in HDR, besides those that this step changes.
         only_exact: send nothing unless the step makes the picture exact.
-        partial: show what is there even where something must be frozen or shaded first: the picture is just opening.
+        is_due: there is something to send even where this step changes nothing.
+        is_told: the client knows that what it has is exact.
+        received_s: when the edit came in that no frame has answered yet, if there is one.
     """
 
-    target: Target | None
-    shown: Target
+    target: Target
+    accepting: Sequence[Picture]
     max_coefficients: int | None
     lacking: frozenset[Tile]
     form: Format
     quality: int
     only_exact: bool
-    partial: bool
+    is_due: bool
+    is_told: bool
+    received_s: float | None
     frame: int
     view: str
     size: tuple[int, int]
@@ -64,55 +68,75 @@ class Painted:
     """What came of an order.
 
     Attributes:
-        waiting: what must be frozen before the picture can show its look, or None.
+        need: what must be made before the picture can go on to where it should, or None.
         tiles: what the step changed.
         message: the packed frame, or None where none is to be sent.
     """
 
-    waiting: str | None
-    tiles: Sequence[Tile] = ()
-    exact: bool = False
-    message: bytes | None = None
-    update_ms: float = 0.0
+    need: Need | None
+    tiles: Sequence[Tile]
+    exact: bool
+    message: bytes | None
+    update_ms: float
     encode_ms: float = 0.0
 
 
+def accept(pictures: Iterable[Picture], target: Target) -> None:
+    """Give pictures a look. Raises what they say where they cannot follow it."""
+    for picture in pictures:
+        picture.set_look(target.look)
+        picture.waiting()
+
+
+def touch(pictures: Iterable[Picture], pointer: str) -> list[Need | None]:
+    """Tell pictures which curve the user has opened; what each of them needs now."""
+    found = list(pictures)
+    for picture in found:
+        picture.touch(pointer)
+    return [picture.waiting() for picture in found]
+
+
+def adopt(picture: Picture, need: Need, made: Any) -> Need | None:
+    """Hand over what was made; what the picture needs next."""
+    picture.adopt(need, made)
+    return picture.waiting()
+
+
 def paint(picture: Picture, order: Order) -> Painted:
-    """Give the picture its target, advance it, and pack the frame."""
+    """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
     start_s = time.perf_counter()
-    if order.target is not None:
-        picture.set_look(order.target.look)
-    waiting = picture.waiting()
-    if waiting is not None and not order.partial:
-        return Painted(waiting)
+    accept(order.accepting, order.target)
     advance = picture.advance(order.max_coefficients)
+    need = picture.waiting()
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
-    if order.only_exact and not advance.exact:
-        return Painted(waiting, advance.tiles, False, None, update_ms)
-    width, height = order.size
-    if order.form == "jpeg":
-        tiles: list[Tile] = [(0, 0, width, height)]
-        payload = _jpeg(picture, order.quality, order.shown.look.display)
-    else:
-        tiles = sorted(order.lacking.union(advance.tiles), key=lambda tile: (tile[1], tile[0]))
-        payload = picture.encode(tiles, "rgb9e5")
+    has_news = bool(advance.tiles) or order.is_due
+    is_sent = (has_news or not order.is_told) if advance.exact else (has_news and not order.only_exact)
+    if not is_sent:
+        return Painted(need, advance.tiles, advance.exact, None, update_ms)
+    tiles, payload = _payload(picture, order, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    received_s = order.target.received_s if order.target is not None else None
-    wait_ms = 0.0 if received_s is None else (start_s - received_s) * 1e3
+    wait_ms = 0.0 if order.received_s is None else (start_s - order.received_s) * 1e3
     header = FrameHeader(
         frame=order.frame,
-        revision=order.shown.revision,
+        revision=order.target.revision,
         view=order.view,
-        width=width,
-        height=height,
+        width=order.size[0],
+        height=order.size[1],
         tiles=tiles,
         format=order.form,
         exact=advance.exact,
         kind="picture",
         ms=times(wait_ms, update_ms, encode_ms),
     )
-    return Painted(waiting, advance.tiles, advance.exact, pack(header, payload), update_ms, encode_ms)
+    return Painted(need, advance.tiles, advance.exact, pack(header, payload), update_ms, encode_ms)
+
+
+def _payload(picture: Picture, order: Order, changed: Sequence[Tile]) -> tuple[list[Tile], bytes]:
+    if order.form == "jpeg":
+        return [(0, 0, *order.size)], _jpeg(picture, order.quality, order.target.look.display)
+    tiles = sorted(order.lacking.union(changed), key=lambda tile: (tile[1], tile[0]))
+    return tiles, picture.encode(tiles, "rgb9e5")
 
 
 def _jpeg(picture: Picture, quality: int, display: Any) -> bytes:

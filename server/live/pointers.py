@@ -1,20 +1,16 @@
-"""Pointers into a look: which curve is meant, and which curves an edit concerns."""
+"""Pointers into a look: which curve is meant."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve
 from relume.errors import ParameterError
-from server.protocol import PatchOperation
 
 CURVE = re.compile(r"^/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9]\d{0,2})/curves/(?P<curve>[a-z_]+)$")
-PART = re.compile(
-    r"^(?P<term>/materials/(?P<material>[^/]+)/terms/(?P<index>0|[1-9]\d{0,2}))/(?P<kind>params|curves)/(?P<name>[a-z_]+)"
-)
 
 
 def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any], Curve]:
@@ -29,21 +25,6 @@ def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any
     if match is None or term is None or match["curve"] not in curves:
         raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
     return term, curves[match["curve"]]
-
-
-def focus_of(patch: Iterable[PatchOperation], document: Mapping[str, Any]) -> frozenset[str]:
-    """Pointers of the curves whose shape the patch edits; empty where it edits something else."""
-    focus: set[str] = set()
-    for operation in patch:
-        match = PART.match(operation.path)
-        term = _term(document, match["material"], int(match["index"])) if match else None
-        if match is None or term is None:
-            continue
-        curves = TERMS[term["model"]].curves
-        is_parameter = match["kind"] == "params"
-        names = [c.name for c in curves if match["name"] in (c.parameters if is_parameter else (c.name,))]
-        focus.update(f"{match['term']}/curves/{name}" for name in names)
-    return frozenset(focus)
 
 
 def _term(document: Mapping[str, Any], escaped_material: str, index: int) -> dict[str, Any] | None:

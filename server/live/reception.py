@@ -13,7 +13,7 @@ from server import protocol
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.edits import LookDesk
 from server.live.frame_loop import FrameLoop
-from server.live.pointers import find_curve, focus_of
+from server.live.pointers import find_curve
 from server.live.ports import Transfer
 from server.live.window import Window
 from server.live.wire import Wire
@@ -84,7 +84,6 @@ class Reception:
             case protocol.ViewMessage():
                 self._check_view(message.name)
                 self._wishes.view = message.name
-                self._frame_loop.leave_view()
             case protocol.StreamMessage():
                 self._wishes.form, self._wishes.quality = message.format, message.quality
             case protocol.ProbeMessage():
@@ -97,7 +96,6 @@ class Reception:
             case protocol.TouchMessage():
                 find_curve(message.curve, self._desk.document)
                 self._wishes.touch = message.curve
-                self._focus(frozenset({message.curve}))
 
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
@@ -106,12 +104,6 @@ class Reception:
             self._metrics.edits.labels("refused").inc()
             raise
         self._metrics.edits.labels("applied").inc()
-        self._focus(focus_of(message.patch, self._desk.document))
-
-    def _focus(self, curves: frozenset[str]) -> None:
-        if curves:
-            self._wishes.focus = curves
-        self._frame_loop.moved_on_to(curves)
 
     def _check_view(self, name: str) -> None:
         if name not in self._transfer.views:

@@ -85,7 +85,7 @@ async def _serve_parts(
     house: House, websocket: WebSocket, wire: Wire, bake: str, transfer: Transfer, desk: LookDesk
 ) -> None:
     """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
-    wishes, window = Wishes(), Window(house.ack_seconds)
+    wishes, window = Wishes(desk.target()), Window(house.ack_seconds)
     frame_loop = FrameLoop(
         wire=wire,
         wishes=wishes,

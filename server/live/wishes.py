@@ -15,23 +15,17 @@ class Wishes:
     """Filled by the receiving side, emptied by the frame loop; both on the event loop.
 
     Attributes:
-        focus: the curves that the user edited or opened last.
+        target: the newest look; it stays, each view is painted with it once.
     """
 
-    target: Target | None = None
+    target: Target
     view: str | None = None
     touch: str | None = None
     probe: ProbeMessage | None = None
     brush: BrushMessage | None = None
     form: Literal["hdr", "jpeg", "auto"] = "auto"
     quality: int = 80
-    focus: frozenset[str] = frozenset()
     news: asyncio.Event = field(default_factory=asyncio.Event)
-
-    def take_target(self) -> Target | None:
-        """Empty the look's slot."""
-        taken, self.target = self.target, None
-        return taken
 
     def take_view(self) -> str | None:
         """Empty the view's slot."""

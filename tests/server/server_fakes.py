@@ -17,6 +17,7 @@ from relume.store import open_store
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from server.live.ports import Library
 
+THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
 SIZE = (160, 96)
 NUM_COEFFICIENTS = 16
@@ -87,17 +88,40 @@ class FakeTransfer:
     material_names: list[str] = field(default_factory=lambda: ["Paper"])
 
 
+@dataclass(frozen=True)
+class FakeNeed:
+    """One curve; made when `control.may_freeze` says so."""
+
+    control: "Control"
+    key: str
+    state: str = "freezing"
+
+    @property
+    def what(self) -> str:
+        return f"Paper, {self.key.rsplit('/', 1)[-1]}"
+
+    def make(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> str:
+        self.control.freezing.set()
+        progress(0.5)
+        while not self.control.may_freeze.wait(0.01):
+            if cancelled():
+                self.control.num_cancelled += 1
+                raise CancelledError("stopped")
+        return self.key
+
+
 @dataclass
 class FakePicture:
-    """Radiance = lambert colour + sigma, everywhere; reached in steps; one curve is frozen at a time."""
+    """Radiance = lambert colour + sigma, everywhere; reached in steps. ior needs θd, which is not frozen at first."""
 
     transfer: FakeTransfer
     view: FakeView
     control: "Control"
     look: Any = None
     spent: int = 0
-    frozen: str = "/materials/Paper/terms/1/curves/theta_h"
-    wanted: str = "/materials/Paper/terms/1/curves/theta_h"
+    frozen: set[str] = field(default_factory=lambda: {THETA_H})
+    wanted: str = THETA_H
+    ior: float = 1.5
 
     def __post_init__(self) -> None:
         self.pixels = np.zeros((self.view.height, self.view.width, 3), np.float32)
@@ -105,34 +129,36 @@ class FakePicture:
     def set_look(self, look: Any) -> None:
         if look.environment.rotation != 0.0:
             raise EditNotSupportedError("direct", "the environment's rotation")
-        if look != self.look:
-            self.look, self.spent = look, 0
+        if self.look is None or colour_and_sigma(look) != colour_and_sigma(self.look):
+            self.spent = 0
+        self.look = look
         self.control.num_looks += 1
 
     def touch(self, pointer: str) -> None:
         self.wanted = pointer
 
-    def waiting(self) -> str | None:
-        return None if self.wanted == self.frozen else f"Paper, {self.wanted.rsplit('/', 1)[-1]}"
+    def waiting(self) -> FakeNeed | None:
+        lacking = [THETA_D] if self._lacks_theta_d() else []
+        needed = [curve for curve in (*lacking, self.wanted) if curve not in self.frozen]
+        return FakeNeed(self.control, needed[0]) if needed else None
 
-    def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
-        wanted = self.wanted
-        self.control.freezing.set()
-        progress(0.5)
-        while not self.control.may_freeze.wait(0.01):
-            if cancelled():
-                self.control.num_cancelled += 1
-                raise CancelledError("stopped")
-        self.frozen = wanted
+    def adopt(self, need: FakeNeed, made: str) -> None:
+        self.frozen.add(made)
+
+    def _lacks_theta_d(self) -> bool:
+        return self.look is not None and ior_of(self.look) != self.ior
 
     def advance(self, max_coefficients: int | None) -> Any:
+        if self._lacks_theta_d() and THETA_D in self.frozen:
+            self.ior, self.spent = ior_of(self.look), 0
+        exact = not self._lacks_theta_d()
         if self.spent >= NUM_COEFFICIENTS:
-            return SimpleNamespace(tiles=[], exact=True, changed=False)
+            return SimpleNamespace(tiles=[], exact=exact, changed=False)
         budget = NUM_COEFFICIENTS if max_coefficients is None else min(max_coefficients, self.control.max_step)
         self.spent = min(NUM_COEFFICIENTS, self.spent + budget)
-        target = exact_pixel(self.look)
+        target = colour_and_sigma(self.look) + (self.ior - 1.5)
         self.pixels += (target - self.pixels) * np.float32(self.spent / NUM_COEFFICIENTS)
-        return SimpleNamespace(tiles=self.all_tiles()[:1], exact=self.spent == NUM_COEFFICIENTS, changed=True)
+        return SimpleNamespace(tiles=self.all_tiles()[:1], exact=exact and self.spent == NUM_COEFFICIENTS, changed=True)
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:
         width, height = self.view.width, self.view.height
@@ -156,7 +182,7 @@ class FakePicture:
             "material": "Paper",
             "radiance": [float(c) for c in self.pixels[y, x]],
             "bands": np.ones((3, 4)),
-            "curve": self.frozen,
+            "curve": self.wanted,
         }
 
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> np.ndarray:
@@ -215,7 +241,15 @@ class Control:
         return (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
 
 
-def exact_pixel(look: Any) -> float:
-    """What `FakePicture` shows everywhere when it is exact."""
+def colour_and_sigma(look: Any) -> float:
     terms = look.materials["Paper"].terms
     return float(terms[0]["color"][0]) + float(terms[1]["params"]["sigma"])
+
+
+def ior_of(look: Any) -> float:
+    return float(look.materials["Paper"].terms[1]["params"]["ior"])
+
+
+def exact_pixel(look: Any) -> float:
+    """What `FakePicture` shows everywhere when it is exact."""
+    return colour_and_sigma(look) + ior_of(look) - 1.5

@@ -10,6 +10,7 @@ from typing import Any
 from fastapi.testclient import TestClient
 
 SIGMA = "/materials/Paper/terms/1/params/sigma"
+IOR = "/materials/Paper/terms/1/params/ior"
 THETA_H = "/materials/Paper/terms/1/curves/theta_h"
 THETA_D = "/materials/Paper/terms/1/curves/theta_d"
 

@@ -10,11 +10,10 @@ import pytest
 from relume.errors import ParameterError, ProtocolError, StoreError
 from server.live.edits import LookDesk
 from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
-from server.live.pointers import find_curve, focus_of
+from server.live.pointers import find_curve
 from server.live.resume import MAX_KEPT, ResumeStore
 from server.live.transfers import MAX_IDLE, TransferPool
 from server.live.window import Window
-from server.protocol import PatchOperation
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
@@ -118,23 +117,6 @@ def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
     assert kept.revision == 3
     store.close(token, 1.0)
     assert store.take(token, "bake", 2.0) is None
-
-
-@pytest.mark.parametrize(
-    ("path", "curves"),
-    [
-        (f"{TERM}/1/params/sigma", {f"{TERM}/1/curves/theta_h"}),
-        (f"{TERM}/1/params/ior", {f"{TERM}/1/curves/theta_d"}),
-        (f"{TERM}/1/curves/theta_d/points/3/1", {f"{TERM}/1/curves/theta_d"}),
-        (f"{TERM}/1/color", set()),
-        (f"{TERM}/7/params/sigma", set()),
-        ("/materials/none/terms/1/params/sigma", set()),
-        ("/environment/scale", set()),
-        ("", set()),
-    ],
-)
-def test_focus_is_the_curves_that_an_edit_shapes(path: str, curves: set[str]) -> None:
-    assert focus_of([PatchOperation(op="replace", path=path, value=1)], DOCUMENT) == curves
 
 
 def test_curve_pointers_are_resolved_or_refused() -> None:

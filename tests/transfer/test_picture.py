@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from itertools import pairwise
 
 import numpy as np
@@ -133,7 +134,7 @@ def test_picture_whose_curve_is_not_frozen_yet_waits_and_is_not_exact(transfer):
     picture = opened(transfer)
     before = picture.image()
     picture.set_look(look_of(transfer, sigma(0.07)))
-    assert "Ball" in picture.waiting()
+    assert "Ball" in picture.waiting().what
     advance = picture.advance(None)
     assert not advance.exact
     np.testing.assert_array_equal(picture.image(), before)
@@ -193,11 +194,11 @@ def test_cancelled_freeze_leaves_picture_and_cache_as_they_were(transfer):
     before, used = picture.image(), cache.used_bytes
     look = look_of(transfer, sigma(0.07))
     picture.set_look(look)
-    waiting = picture.waiting()
+    waiting = picture.waiting().key
     with pytest.raises(CancelledError):
         picture.freeze(quiet, lambda: True)
     assert cache.used_bytes == used
-    assert picture.waiting() == waiting
+    assert picture.waiting().key == waiting
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
     assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
@@ -207,10 +208,75 @@ def test_operator_larger_than_the_cache_is_refused_and_the_picture_stands(transf
     cache = FrozenCache(400_000)
     picture = opened(transfer, cache=cache)
     before = picture.image()
-    picture.touch(BALL + "theta_h")
     with pytest.raises(MemoryBudgetError):
-        picture.freeze(quiet, lambda: False)
+        picture.touch(BALL + "theta_h")
+    assert picture.waiting() is None
+    picture.set_look(look_of(transfer, sigma(0.07)))
+    with pytest.raises(MemoryBudgetError):
+        picture.waiting()
+    picture.set_look(look_of(transfer))
+    assert picture.advance(None).exact
     np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(transfer):
+    """What a need makes does not depend on what is done to its picture meanwhile."""
+    picture = opened(transfer, BALL + "theta_h")
+    picture.touch(WALL + "alpha")
+    need = picture.waiting()
+    assert "Wall" in need.what
+    made = []
+    thread = threading.Thread(target=lambda: made.append(need.make(quiet, lambda: False)))
+    thread.start()
+    for value in (0.1, 0.4, 0.15):
+        look = look_of(transfer, sigma(value))
+        picture.set_look(look)
+        assert picture.advance(None).exact
+        assert picture.waiting().key == need.key
+        assert relative_rmse(picture.image(), twins.full_evaluation(transfer, "front", look)) < 1e-5
+    thread.join()
+    before = picture.image()
+    picture.adopt(need, made[0])
+    assert picture.waiting() is None
+    np.testing.assert_array_equal(picture.image(), before)
+    picture.brush(WALL + "alpha", 0, 10)  # it is open now
+
+
+def test_operator_of_dormant_curves_that_changed_meanwhile_is_not_adopted(transfer):
+    picture = opened(transfer, BALL + "theta_d")
+    picture.touch(BALL + "theta_h")
+    need = picture.waiting()
+    look = look_of(transfer, sigma(0.2, ior=3.0))
+    picture.set_look(look)
+    assert picture.advance(None).exact  # θd, which is dormant in what is made
+    picture.adopt(need, need.make(quiet, lambda: False))
+    assert picture.waiting().key != need.key
+    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
+    """Else a hand that does not rest would never see the material."""
+    picture = Picture(transfer, "front", FrozenCache(BUDGET))
+    while (need := picture.waiting()).term.model != "cook_torrance":
+        picture.adopt(need, need.make(quiet, lambda: False))
+    look = look_of(transfer, sigma(0.1))
+    picture.set_look(look)
+    picture.adopt(need, need.make(quiet, lambda: False))
+    advance = picture.advance(None)
+    assert advance.changed
+    assert not advance.exact
+    assert picture.waiting().active == "theta_h"
+    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):
+    picture = opened(transfer)
+    picture.touch(BALL + "theta_h")
+    need = picture.waiting()
+    look = look_of(transfer, ball_alone)
+    picture.set_look(look)
+    picture.adopt(need, need.make(quiet, lambda: False))
+    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def test_probe_shares_sum_to_the_terms_radiance(transfer):

@@ -67,6 +67,7 @@ function welcome(of: Session, message: HelloMessage): void {
   store.defaultLook.value ??= message.look as unknown as Look;
   if (store.look.peek() === null) store.look.value = message.look as unknown as Look;
   of.want(store.look.peek() as Look, performance.now());
+  if (of === session) store.freezing.value = null;
   if (of === session) showViews(of, message.views, name);
   else pendingViews = message.views;
   const view = message.views.find((v) => v.name === name);
@@ -92,7 +93,6 @@ async function takeFrame(from: Session, frame: Frame): Promise<void> {
   await stage.show(frame).catch(showError);
   if (frame.header.kind === "brush" || from !== session) return;
   store.exact.value = frame.header.exact && frame.header.revision >= from.revision;
-  store.freezing.value = null;
   if (!store.exact.value) return;
   for (const done of exactWaiters.splice(0)) done();
 }
@@ -102,6 +102,7 @@ function swap(to: Session): void {
   session = to;
   incoming = null;
   old?.close();
+  store.freezing.value = null;
   forgetWaiting();
   showViews(to, pendingViews, store.viewName.peek());
   store.coming.value = null;

@@ -1,0 +1,62 @@
+"""The live images of all materials in one view, and the frozen operators that they follow."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from relume.errors import ParameterError
+from relume.look import Look, validate
+from relume.transfer.cache import FrozenCache
+from relume.transfer.frozen import Frozen
+from relume.transfer.material_image import MaterialImage
+from relume.transfer.opened import Transfer
+from relume.transfer.pointer import CurvePointer
+from relume.transfer.term_image import TermImage
+
+
+class ViewImages:
+    """Found by name, by pointer, and by what the cache knows them as.
+
+    Attributes:
+        default: the scene's own look. by_name: the materials in the scene's order.
+    """
+
+    def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
+        self.transfer, self.cache = transfer, cache
+        self.view = transfer.views[view_name]
+        self.default = validate(transfer.default_look, transfer.default_look)
+        self.by_name = {
+            name: MaterialImage(self.view, index, self.default.materials[name].terms)
+            for index, name in enumerate(transfer.material_names)
+        }
+
+    def set_look(self, look: Look) -> None:
+        """A new target for every term."""
+        for name, material in self.by_name.items():
+            material.set_documents(look.materials[name].terms)
+
+    def find(self, pointer: CurvePointer) -> tuple[MaterialImage, TermImage, str]:
+        """What a pointer means in the look as it is now.
+
+        Raises:
+            ParameterError: there is no such curve.
+        """
+        material = self.by_name.get(pointer.material)
+        if material is None or not pointer.term < len(material.terms):
+            raise ParameterError(str(pointer), pointer.material, "a material and term of this look")
+        term = material.terms[pointer.term]
+        if pointer.curve not in {curve.name for curve in term.term.curves}:
+            raise ParameterError(str(pointer), pointer.curve, ", ".join(curve.name for curve in term.term.curves))
+        return material, term, pointer.curve
+
+    def key(
+        self, material: MaterialImage, term: TermImage, active: str | None, *, of_target: bool
+    ) -> tuple[Hashable, ...]:
+        """Name of an operator, or of an image where no curve is active, in the cache; the store comes first."""
+        return self.transfer.key, self.view.name, material.index, term.dormant_key(active, of_target=of_target)
+
+    def operator(self, material: MaterialImage, term: TermImage) -> Frozen | None:
+        """The operator that the term's image follows now, unless the cache has dropped it."""
+        if term.active is None or term.effective is None:
+            return None
+        return self.cache.find(self.key(material, term, term.active, of_target=False), Frozen)

@@ -1,0 +1,102 @@
+"""What the client asks besides frames: the open curve, a pixel, the pixels of a stretch of a curve."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from relume.brdf.curves import curve_bands, generated_bands
+from relume.errors import ParameterError, RelumeError
+from server.live.painter import Target, encode_brush, pack, rounded, times
+from server.live.pointers import find_curve
+from server.live.threads import OneAtATime
+from server.live.viewport import Viewport
+from server.live.window import Window
+from server.live.wire import Wire
+from server.live.wishes import Wishes
+from server.protocol import BrushMessage, CurveMessage, FrameHeader, ProbeAnswer, ProbeMessage
+
+
+class Answers:
+    """Gives them from the frame loop, between frames.
+
+    Attributes:
+        touched: pointer of the curve that the user has opened.
+    """
+
+    def __init__(self, wire: Wire, work: OneAtATime) -> None:
+        self._wire, self._work = wire, work
+        self.touched: str | None = None
+        self._curve_sent_for: dict[str, Any] | None = None
+
+    async def send_curve(self, target: Target) -> None:
+        """The touched curve in this look, where its term has changed since it was last sent."""
+        if self.touched is None:
+            return
+        try:
+            term, curve = find_curve(self.touched, target.document)
+        except ParameterError:  # an edit removed it
+            self.touched = None
+            return
+        key = {"pointer": self.touched, "term": term}
+        if key == self._curve_sent_for:
+            return
+        displayed, generated = await self._work.quick(
+            lambda: (rounded(curve_bands(term, curve)), rounded(generated_bands(term, curve)))
+        )
+        await self._wire.send(
+            CurveMessage(curve=self.touched, revision=target.revision, bands=displayed, generated=generated)
+        )
+        self._curve_sent_for = key
+
+    async def give(self, wishes: Wishes, viewport: Viewport, window: Window) -> bytes | None:
+        """Answer the newest probe; the frame for the newest brush, where there is one and room for it."""
+        try:
+            if (probe := wishes.take_probe()) is not None:
+                await self._probe(viewport, probe)
+            if wishes.brush is not None and window.is_open and (brush := wishes.take_brush()) is not None:
+                return await self._brush(viewport, brush, window.next_frame)
+        except RelumeError as error:
+            await self._wire.refuse(error)
+        return None
+
+    async def _probe(self, viewport: Viewport, probe: ProbeMessage) -> None:
+        width, height = viewport.size
+        if probe.x >= width or probe.y >= height:
+            raise ParameterError("pixel", [probe.x, probe.y], f"x below {width} and y below {height}")
+        found = await self._work.quick(viewport.picture.probe, probe.x, probe.y)
+        bands = found["bands"]
+        await self._wire.send(
+            ProbeAnswer(
+                view=viewport.name,
+                x=probe.x,
+                y=probe.y,
+                material=found["material"],
+                radiance=tuple(float(c) for c in found["radiance"]),
+                curve=found["curve"],
+                bands=None if bands is None else rounded(bands),
+            )
+        )
+
+    async def _brush(self, viewport: Viewport, brush: BrushMessage, frame: int) -> bytes | None:
+        if viewport.target is None:
+            return None
+        find_curve(brush.curve, viewport.target.document)
+        start_s = time.perf_counter()
+        payload = await self._work.quick(
+            encode_brush, viewport.picture, brush.curve, brush.from_degrees, brush.to_degrees
+        )
+        width, height = viewport.size
+        header = FrameHeader(
+            frame=frame,
+            revision=viewport.target.revision,
+            view=viewport.name,
+            width=width,
+            height=height,
+            tiles=[(0, 0, width, height)],
+            format="r8",
+            exact=viewport.is_exact,
+            kind="brush",
+            ms=times(0.0, 0.0, (time.perf_counter() - start_s) * 1e3),
+        )
+        return pack(header, payload)
