@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.transfer.frozen import Frozen, freeze, frozen_bytes
 from relume.transfer.material_image import MaterialImage
+from relume.transfer.projector import contract
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
@@ -80,10 +81,12 @@ class Need:
 def next_need(images: ViewImages, touched: Candidate | None) -> Need | None:
     """The most urgent need: first what the look lacks, then the curve that the user has opened.
 
+    The touched material goes first, and what is cheap: a picture that opens soon shows something, and then sharpens.
+
     Raises:
         MemoryBudgetError: something that the look lacks is larger than the cache may be.
     """
-    lacking = list(_lacking(images, touched))
+    lacking = sorted(_lacking(images, touched), key=lambda candidate: _cost(candidate, touched))
     for candidate in lacking:
         images.cache.check(_num_bytes(candidate))
     if lacking:
@@ -119,6 +122,13 @@ def _lacking(images: ViewImages, touched: Candidate | None) -> Iterator[Candidat
             opened = touched[2] if touched is not None and touched[1] is image else None
             otherwise = None if image.effective is None else differing[0]
             yield material, image, opened if opened in differing else otherwise
+
+
+def _cost(candidate: Candidate, touched: Candidate | None) -> tuple[bool, bool, int]:
+    """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
+    material, image, curve = candidate
+    is_flat = curve is None and contract(image.term, image.target, None).kinds.size == 0
+    return touched is None or material is not touched[0], not is_flat, material.num_samples
 
 
 def _num_bytes(candidate: Candidate) -> int:

@@ -269,6 +269,32 @@ def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
     assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
+def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
+    def lambert_and_glossy(document):
+        for material in document["materials"].values():
+            material["terms"] = [{"model": "cook_torrance"}, {"model": "lambert"}]
+
+    def order(*touched):
+        picture = Picture(transfer, "front", FrozenCache(BUDGET))
+        picture.set_look(look_of(transfer, lambert_and_glossy))
+        for pointer in touched:
+            picture.touch(pointer)
+        made = []
+        while (need := picture.waiting()) is not None and need.active is None:
+            made.append((transfer.material_names[need.material.index], need.term.model))
+            picture.adopt(need, need.make(quiet, lambda: False))
+        return made, need
+
+    shaded, _ = order()
+    num_materials = len({name for name, _ in shaded})
+    assert [model for _, model in shaded] == ["lambert"] * num_materials + ["cook_torrance"] * num_materials
+    sizes = {name: np.diff(transfer.views["front"].bounds)[k] for k, name in enumerate(transfer.material_names)}
+    assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
+    shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
+    assert shaded == [("Wall", "lambert")]
+    assert need.active == "theta_d"  # its operator gives the image as well
+
+
 def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):
     picture = opened(transfer)
     picture.touch(BALL + "theta_h")
