@@ -138,10 +138,11 @@ class HelloMessage(Message):
 
 
 class StatusMessage(Message):
-    """server → client: something takes time; `progress` 0…1. "ready": frames go on."""
+    """server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded
+    because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile."""
 
     type: Literal["status"] = "status"
-    state: Literal["freezing", "ready"]
+    state: Literal["freezing", "shading", "ready"]
     what: str
     progress: float
 

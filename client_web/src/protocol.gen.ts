@@ -303,10 +303,10 @@ export interface SceneView {
   aspect: number;
 }
 
-/** server → client: something takes time; `progress` 0…1. "ready": frames go on. */
+/** server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */
 export interface StatusMessage {
   type: "status";
-  state: "freezing" | "ready";
+  state: "freezing" | "shading" | "ready";
   what: string;
   progress: number;
 }

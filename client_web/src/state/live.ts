@@ -122,7 +122,8 @@ function handlersOf(self: () => Session): SessionHandlers {
     frame: (frame) => takeFrame(self(), frame),
     status(message) {
       if (!current()) return;
-      store.freezing.value = message.state === "freezing" ? { what: message.what, progress: message.progress } : null;
+      const { state, what, progress } = message;
+      store.freezing.value = state === "ready" ? null : { state, what, progress };
     },
     problem(message, lastGood) {
       showError(`${problemText(message.problem)} The look is as it was before.`);

@@ -58,7 +58,8 @@ export const probe = signal<{ x: number; y: number; answer: ProbeAnswer | null }
 
 export const connection = signal<Connection>("connecting");
 export const retryInMs = signal(0);
-export const freezing = signal<{ what: string; progress: number } | null>(null);
+/** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
+export const freezing = signal<{ state: "freezing" | "shading"; what: string; progress: number } | null>(null);
 export const exact = signal(false);
 export const latencyMs = signal<number | null>(null);
 /** Counts up with every frame that is drawn. */

@@ -24,6 +24,7 @@ function connectionWords(): string {
 }
 
 function pictureWords(): string {
+  if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
   return exact.value ? "exact ✓" : "refining…";

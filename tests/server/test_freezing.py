@@ -1,0 +1,107 @@
+"""The one freeze of a session: told, handed over, cancelled, and nothing of it left behind."""
+
+import asyncio
+import gc
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from server_fakes import Control, FakeNeed
+
+from relume.errors import StoreError
+from server.live.freezing import Freezer
+from server.live.threads import Threads
+from server.metrics import Metrics
+
+
+class Told:
+    """Stands for the wire: keeps what was said."""
+
+    def __init__(self) -> None:
+        self.states: list[str] = []
+
+    async def send(self, message: Any) -> None:
+        self.states.append(message.state)
+
+
+class Broken(FakeNeed):
+    """Cannot be made."""
+
+    def make(self, progress: Any, cancelled: Any) -> str:
+        raise StoreError("damaged; bake again")
+
+
+def run(scenario: Any) -> tuple[list[str], list[str]]:
+    """Run a scenario (freezer, control, news) in a loop of its own; what was told, and what nobody retrieved."""
+    complaints: list[str] = []
+    told = Told()
+
+    async def main() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context["message"]))
+        threads, news = Threads(), asyncio.Event()
+        try:
+            await scenario(Freezer(told, threads, Metrics(), news), Control(), news)  # type: ignore[arg-type]
+        finally:
+            threads.close()
+        gc.collect()
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, main()).result(timeout=120)
+    return told.states, complaints
+
+
+@pytest.mark.parametrize("state", ["freezing", "shading"])
+def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = object()
+        freezer.start(view, FakeNeed(control, "/curves/theta_d", state))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freezing.wait, 60)
+        assert not freezer.is_done
+        control.may_freeze.set()
+        await asyncio.wait_for(news.wait(), 60)
+        assert freezer.is_done
+        taken = await freezer.take()
+        assert taken is not None
+        assert (taken[0], taken[2]) == (view, "/curves/theta_d")
+        assert freezer.running is None
+
+    told, complaints = run(scenario)
+    assert set(told[:-1]) == {state}
+    assert told[-1] == "ready"
+    assert complaints == []
+
+
+def test_cancelled_freeze_gives_nothing() -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = object()
+        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freezing.wait, 60)
+        freezer.cancel()
+        await asyncio.wait_for(news.wait(), 60)
+        assert await freezer.take() is None
+
+    assert run(scenario)[1] == []
+
+
+def test_freeze_that_fails_says_why() -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = object()
+        freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        await asyncio.wait_for(news.wait(), 60)
+        with pytest.raises(StoreError):
+            await freezer.take()
+
+    assert run(scenario)[1] == []
+
+
+def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = object()
+        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freezing.wait, 60)
+        await freezer.end()
+        assert control.num_cancelled == 1
+
+    assert run(scenario)[1] == []
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("relume-long")]
