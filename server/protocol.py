@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 SUBPROTOCOL = "relume.v1"
 MAX_MESSAGE_BYTES = 64 * 1024
 MAX_FRAMES_IN_FLIGHT = 2
+MAX_VIEWS_SHOWN = 4
 
 Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
 Name = Annotated[str, Field(min_length=1, max_length=256)]
@@ -46,11 +47,25 @@ class EditMessage(Message):
 
 
 class ViewMessage(Message):
-    """client → server: show this view. `size` is the space the client has; frames come in the baked size."""
+    """client → server: show this view alone. `size` is the space the client has; frames come in the baked size."""
 
     type: Literal["view"]
     name: Name
     size: tuple[Pixel, Pixel] | None = None
+
+
+class ViewsMessage(Message):
+    """client → server: show these views side by side; every edit changes all of them."""
+
+    type: Literal["views"]
+    names: Annotated[list[Name], Field(min_length=1, max_length=MAX_VIEWS_SHOWN)]
+
+
+class FocusMessage(Message):
+    """client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first."""
+
+    type: Literal["focus"]
+    view: Name
 
 
 class AckMessage(Message):
@@ -69,7 +84,7 @@ class StreamMessage(Message):
 
 
 class ProbeMessage(Message):
-    """client → server: what makes up this pixel? Answered by `ProbeAnswer`."""
+    """client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`."""
 
     type: Literal["probe"]
     view: Name | None = None
@@ -78,7 +93,7 @@ class ProbeMessage(Message):
 
 
 class BrushMessage(Message):
-    """client → server: which pixels does this stretch of a curve light? Answered by a frame of kind "brush"."""
+    """client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush"."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
 
@@ -96,7 +111,15 @@ class TouchMessage(Message):
 
 
 ClientMessage = Annotated[
-    EditMessage | ViewMessage | AckMessage | StreamMessage | ProbeMessage | BrushMessage | TouchMessage,
+    EditMessage
+    | ViewMessage
+    | ViewsMessage
+    | FocusMessage
+    | AckMessage
+    | StreamMessage
+    | ProbeMessage
+    | BrushMessage
+    | TouchMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -122,7 +145,10 @@ class ViewInfo(Message):
 
 
 class HelloMessage(Message):
-    """server → client: first message. `revision` is the last one of a resumed session, else 0."""
+    """server → client: first message. `revision` is the last one of a resumed session, else 0.
+
+    `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked.
+    """
 
     type: Literal["hello"] = "hello"
     session: str
@@ -132,6 +158,7 @@ class HelloMessage(Message):
     revision: int
     resumed: bool
     view: str
+    shown: list[str]
     views: list[ViewInfo]
     materials: list[str]
     resume: str
@@ -143,6 +170,7 @@ class StatusMessage(Message):
 
     type: Literal["status"] = "status"
     state: Literal["freezing", "shading", "ready"]
+    view: str
     what: str
     progress: float
 

@@ -19,6 +19,8 @@ HEAD = "// Written by `python -m server.typescript` from the server's models. Do
 CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.EditMessage,
     protocol.ViewMessage,
+    protocol.ViewsMessage,
+    protocol.FocusMessage,
     protocol.AckMessage,
     protocol.StreamMessage,
     protocol.ProbeMessage,
@@ -58,7 +60,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 def generate() -> str:
     """The whole TypeScript file; the same models give the same text."""
     parts = [HEAD]
-    for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT"):
+    for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN"):
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {_literal(value)};")
     for mode, models in (("validation", INPUTS), ("serialization", OUTPUTS)):

@@ -7,6 +7,8 @@ export const MAX_MESSAGE_BYTES = 65536;
 
 export const MAX_FRAMES_IN_FLIGHT = 2;
 
+export const MAX_VIEWS_SHOWN = 4;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";
@@ -25,7 +27,7 @@ export interface BakeRequest {
   dry_run?: boolean;
 }
 
-/** client → server: which pixels does this stretch of a curve light? Answered by a frame of kind "brush". */
+/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush". */
 export interface BrushMessage {
   type: "brush";
   curve: string;
@@ -40,6 +42,12 @@ export interface EditMessage {
   patch: PatchOperation[];
 }
 
+/** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
+export interface FocusMessage {
+  type: "focus";
+  view: string;
+}
+
 /** One operation of a JSON Patch (RFC 6902) on the look. */
 export interface PatchOperation {
   op: "replace" | "add" | "remove" | "test";
@@ -47,7 +55,7 @@ export interface PatchOperation {
   value?: unknown;
 }
 
-/** client → server: what makes up this pixel? Answered by `ProbeAnswer`. */
+/** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`. */
 export interface ProbeMessage {
   type: "probe";
   view?: string | null;
@@ -85,11 +93,17 @@ export interface TruthRequest {
   passes?: number;
 }
 
-/** client → server: show this view. `size` is the space the client has; frames come in the baked size. */
+/** client → server: show this view alone. `size` is the space the client has; frames come in the baked size. */
 export interface ViewMessage {
   type: "view";
   name: string;
   size?: [number, number] | null;
+}
+
+/** client → server: show these views side by side; every edit changes all of them. */
+export interface ViewsMessage {
+  type: "views";
+  names: string[];
 }
 
 /** A bake; `progress` 0…1, `problem` one sentence where it failed. */
@@ -164,7 +178,7 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` is the last one of a resumed session, else 0. */
+/** server → client: first message. `revision` is the last one of a resumed session, else 0. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. */
 export interface HelloMessage {
   type: "hello";
   session: string;
@@ -174,6 +188,7 @@ export interface HelloMessage {
   revision: number;
   resumed: boolean;
   view: string;
+  shown: string[];
   views: ViewInfo[];
   materials: string[];
   resume: string;
@@ -307,6 +322,7 @@ export interface SceneView {
 export interface StatusMessage {
   type: "status";
   state: "freezing" | "shading" | "ready";
+  view: string;
   what: string;
   progress: number;
 }
@@ -342,6 +358,8 @@ export interface ViewInfo {
 export type ClientMessage =
   | EditMessage
   | ViewMessage
+  | ViewsMessage
+  | FocusMessage
   | AckMessage
   | StreamMessage
   | ProbeMessage

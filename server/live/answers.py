@@ -11,9 +11,7 @@ from server.live.painter import Target, encode_brush, pack, rounded, times
 from server.live.pointers import find_curve
 from server.live.threads import OneAtATime
 from server.live.viewport import Viewport
-from server.live.window import Window
 from server.live.wire import Wire
-from server.live.wishes import Wishes
 from server.protocol import BrushMessage, CurveMessage, FrameHeader, ProbeAnswer, ProbeMessage
 
 
@@ -49,16 +47,22 @@ class Answers:
         )
         self._curve_sent_for = key
 
-    async def give(self, wishes: Wishes, viewport: Viewport, window: Window) -> bytes | None:
-        """Answer the newest probe; the frame for the newest brush, where there is one and room for it."""
+    async def answer_probe(self, viewport: Viewport, probe: ProbeMessage) -> None:
+        """What makes up a pixel."""
         try:
-            if (probe := wishes.take_probe()) is not None:
-                await self._probe(viewport, probe)
-            if wishes.brush is not None and window.is_open and (brush := wishes.take_brush()) is not None:
-                return await self._brush(viewport, brush, window.next_frame)
+            await self._probe(viewport, probe)
         except RelumeError as error:
             await self._wire.refuse(error)
-        return None
+
+    async def answer_brush(self, viewport: Viewport, frame: int, is_focused: bool) -> bytes | None:
+        """The frame for a view's brush; only the focused one says why there is none."""
+        brush, viewport.brush = viewport.brush, None
+        try:
+            return None if brush is None else await self._brush(viewport, brush, frame)
+        except RelumeError as error:
+            if is_focused:
+                await self._wire.refuse(error)
+            return None
 
     async def _probe(self, viewport: Viewport, probe: ProbeMessage) -> None:
         width, height = viewport.size

@@ -1,8 +1,8 @@
 """The sending half of a session: one task that turns the newest wish into the next frame.
 
-A turn does one thing: switch the view, note a touched curve, adopt what was frozen, paint, or answer. Work runs in
-threads, one hop a frame; a picture is never used by two at once because only this task uses it. A freeze works on what
-does not change, so it runs beside the turns.
+A turn does one thing: open a view, note a touched curve, adopt what was frozen, paint, or answer. Of several views the
+one under the pointer goes first. Work runs in threads, one hop a frame; a picture is never used by two at once because
+only this task uses it. A freeze works on what does not change, so it runs beside the turns.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from server.live.answers import Answers
 from server.live.edits import LookDesk
 from server.live.freezing import Freezer
 from server.live.painter import Order, Painted, Target
-from server.live.ports import Library, Need, Transfer
+from server.live.ports import Library, Need, Picture, Transfer
+from server.live.shown import Shown
 from server.live.threads import OneAtATime, Threads
 from server.live.viewport import Viewport
 from server.live.window import Window
@@ -29,35 +30,33 @@ CHECK_S = 1.0
 
 
 class FrameLoop:
-    """One picture on its way to one client."""
+    """The shown pictures on their way to one client."""
 
     def __init__(
         self,
         *,
         wire: Wire,
         wishes: Wishes,
+        shown: Shown,
         window: Window,
         desk: LookDesk,
         library: Library,
         transfer: Transfer,
         threads: Threads,
         metrics: Metrics,
-        view: str,
     ) -> None:
-        self._wire, self._wishes, self._window, self._desk = wire, wishes, window, desk
+        self._wire, self._wishes, self._shown, self._window, self._desk = wire, wishes, shown, window, desk
         self._library, self._transfer, self._metrics = library, transfer, metrics
         self._work = OneAtATime(threads)
         self._freezer = Freezer(wire, threads, metrics, wishes.news)
         self._answers = Answers(wire, self._work)
         self._accepted: Target | None = None
-        self.view = view
-        self._viewport: Viewport
+        self._viewports: dict[str, Viewport] = {}
         self._rest_until_s = 0.0
 
     async def run(self) -> None:
         """Serve until cancelled or until the client is lost."""
         try:
-            await self._open_view(self.view)
             while True:
                 self._wishes.news.clear()
                 if not await self._turn():
@@ -68,25 +67,48 @@ class FrameLoop:
 
     async def _turn(self) -> bool:
         """Do the most urgent thing; whether there was one."""
-        wishes, viewport = self._wishes, self._viewport
-        if (view := wishes.take_view()) is not None:
-            await self._open_view(view)
-            return True
-        if (pointer := wishes.take_touch()) is not None:
+        self._follow_shown()
+        if self._shown.focus not in self._viewports:
+            await self._open_view(self._shown.focus)
+        elif (pointer := self._wishes.take_touch()) is not None:
             await self._touch(pointer)
-            return True
-        if self._freezer.is_done:
+        elif self._freezer.is_done:
             await self._adopt()
-            return True
-        is_due = self._window.is_open and self._due_s(viewport) <= time.perf_counter()
-        if is_due:
+        else:
+            return await self._serve_views()
+        return True
+
+    async def _serve_views(self) -> bool:
+        """Paint the view that is due, answer questions, open a view that is still missing; whether there was any."""
+        viewport = self._most_urgent()
+        if viewport is not None:
             await self._paint(viewport)
-        is_asked = wishes.probe is not None or (wishes.brush is not None and self._window.is_open)
-        if is_asked:
-            frame = await self._answers.give(wishes, viewport, self._window)
-            if frame is not None:
-                await self._send_frame(frame, "brush", "r8")
-        return is_due or is_asked
+        has_answered = await self._answer()
+        missing = [name for name in self._shown.names if name not in self._viewports]
+        if viewport is None and not has_answered and missing:
+            await self._open_view(missing[0])
+            return True
+        return viewport is not None or has_answered
+
+    def _follow_shown(self) -> None:
+        """Forget views that are not shown any more; those that were asked for again are sent whole."""
+        again, self._shown.again = self._shown.again, set()
+        self._viewports = {name: v for name, v in self._viewports.items() if name in self._shown.names}
+        for name in again.intersection(self._viewports):
+            self._viewports[name].show_again()
+        self._freeze_next()
+
+    def _by_urgency(self) -> list[Viewport]:
+        """The view under the pointer, then the others, longest waiting first."""
+        focus = self._shown.focus
+        return sorted(self._viewports.values(), key=lambda viewport: (viewport.name != focus, viewport.served_s))
+
+    def _most_urgent(self) -> Viewport | None:
+        now_s = time.perf_counter()
+        return next((v for v in self._by_urgency() if self._has_room(v) and self._due_s(v) <= now_s), None)
+
+    def _has_room(self, viewport: Viewport) -> bool:
+        return self._window.has_room(viewport.name, self._shown)
 
     def _due_s(self, viewport: Viewport) -> float:
         """When a view is to be painted: at once with a new look, refined when the hand rests."""
@@ -98,25 +120,31 @@ class FrameLoop:
         """Wait for news, for the hand to have rested, or for the time to look after acknowledgements."""
         now_s = time.perf_counter()
         self._window.check(now_s)
-        seconds = CHECK_S
-        if self._window.is_open:
-            seconds = min(seconds, max(0.0, self._due_s(self._viewport) - now_s))
+        due_s = min((self._due_s(v) for v in self._viewports.values() if self._has_room(v)), default=float("inf"))
         try:
-            async with asyncio.timeout(seconds):
+            async with asyncio.timeout(min(CHECK_S, max(0.0, due_s - now_s))):
                 await self._wishes.news.wait()
         except TimeoutError:
             return
 
     async def _open_view(self, name: str) -> None:
-        """Show a view from the beginning; the look stays."""
+        """Show a view from the beginning; the look stays. One of several that cannot be shown is left out."""
         picture = await self._work.long(self._library.make_picture, self._transfer, name)
-        self._viewport = Viewport(self._transfer.views[name], picture)
-        self.view = name
-        if self._accepted is not None:
-            await self._work.quick(painter.accept, [picture], self._accepted)
-        if self._answers.touched is not None:
-            self._wishes.touch = self._wishes.touch or self._answers.touched
-        self._freeze_next()
+        try:
+            if self._accepted is not None:
+                await self._work.quick(painter.accept, [picture], self._accepted)
+            if self._answers.touched is not None:
+                await self._work.quick(painter.touch, [picture], self._answers.touched)
+        except RelumeError as error:
+            if not self._viewports:
+                raise
+            await self._wire.refuse(error)
+            self._shown.hide(name)
+            return
+        self._viewports[name] = Viewport(self._transfer.views[name], picture)
+
+    def _pictures(self) -> list[Picture]:
+        return [viewport.picture for viewport in self._viewports.values()]
 
     async def _touch(self, pointer: str) -> None:
         """Prepare the curve that the user opened, in the newest look there is."""
@@ -125,64 +153,86 @@ class FrameLoop:
         await self._answers.send_curve(target)
         if self._answers.touched is None:
             return
-        try:
-            if target is not self._accepted:
-                await self._work.quick(painter.accept, [self._viewport.picture], target)
+        if target is not self._accepted:
+            try:
+                await self._work.quick(painter.accept, self._pictures(), target)
                 self._accepted = target
-        except RelumeError as error:
-            await self._take_back(target, error)
+            except RelumeError as error:
+                await self._take_back(target, error)
         try:
-            (self._viewport.need,) = await self._work.quick(painter.touch, [self._viewport.picture], pointer)
+            needs = await self._work.quick(painter.touch, self._pictures(), pointer)
         except RelumeError as error:  # the look is another one now, or freezing it takes more memory than there is
             self._answers.touched = None
             await self._wire.refuse(error)
-        self._freeze_next()
+            return
+        for viewport, need in zip(self._viewports.values(), needs, strict=True):
+            viewport.need = need
 
     async def _adopt(self) -> None:
         """Hand over what was made, where its view is still shown."""
         made = await self._freezer.take()
-        if made is not None and made[0] is self._viewport:
+        if made is not None and made[0] in self._viewports.values():
             viewport, need, result = made
             viewport.adopted(await self._work.quick(painter.adopt, viewport.picture, need, result))
             self._rest_until_s = 0.0
-        self._freeze_next()
 
     def _freeze_next(self) -> None:
         """Start what is needed most; what runs for nothing is ended."""
         running = self._freezer.running
-        if running is None:
-            if self._viewport.need is not None:
-                self._freezer.start(self._viewport, self._viewport.need)
-        elif self._is_stale(*running):
-            self._freezer.cancel()
+        if running is not None:
+            if self._is_stale(*running):
+                self._freezer.cancel()
+            return
+        for viewport in self._by_urgency():
+            if viewport.need is not None:
+                self._freezer.start(viewport, viewport.need)
+                return
 
     def _is_stale(self, viewport: Viewport, need: Need) -> bool:
         """Whether the user has moved on; an image of an older look is still worth showing where there is none."""
-        if viewport is not self._viewport:
+        if viewport not in self._viewports.values():
             return True
         return need.state == "freezing" and (viewport.need is None or viewport.need.key != need.key)
+
+    async def _answer(self) -> bool:
+        """The newest probe, and a brush's frame of one view; whether anything was asked."""
+        wishes, has_answered = self._wishes, False
+        asked = wishes.probe.view or self._shown.focus if wishes.probe is not None else None
+        if asked in self._viewports and (probe := wishes.take_probe()) is not None:
+            await self._answers.answer_probe(self._viewports[asked], probe)
+            has_answered = True
+        if (brush := wishes.take_brush()) is not None:
+            for viewport in self._viewports.values():
+                viewport.brush = brush
+        for viewport in self._by_urgency():
+            if viewport.brush is not None and self._has_room(viewport):
+                is_focused = viewport.name == self._shown.focus
+                frame = await self._answers.answer_brush(viewport, self._window.next_frame, is_focused)
+                if frame is not None:
+                    await self._send_frame(viewport, frame, "brush", "r8")
+                return True
+        return has_answered
 
     async def _paint(self, viewport: Viewport) -> None:
         """Paint the newest look, or go on with it; a look that the bake cannot follow is taken back."""
         target = self._wishes.target
-        accepting = [viewport.picture] if target is not self._accepted else []
+        accepting = self._pictures() if target is not self._accepted else []
         order = viewport.order(target, self._wishes, self._window, accepting)
         try:
             painted = await self._work.quick(painter.paint, viewport.picture, order)
         except RelumeError as error:
             await self._take_back(target, error)
             return
-        self._accepted = target
+        self._accepted, viewport.served_s = target, time.perf_counter()
         if viewport.is_behind(target) and target.received_s is not None:
             self._rest_until_s = time.perf_counter() + REST_S
         viewport.painted(order, painted, self._wishes)
         if painted.message is not None:
             await self._deliver(viewport, order, painted, painted.message)
         await self._answers.send_curve(target)
-        self._freeze_next()
 
     async def _deliver(self, viewport: Viewport, order: Order, painted: Painted, message: bytes) -> None:
-        await self._send_frame(message, "picture", order.form)
+        await self._send_frame(viewport, message, "picture", order.form)
         now_s = time.perf_counter()
         viewport.sent(now_s)
         self._metrics.update.observe(painted.update_ms / 1e3)
@@ -190,8 +240,8 @@ class FrameLoop:
         if order.received_s is not None:
             self._metrics.edit_to_socket.observe(now_s - order.received_s)
 
-    async def _send_frame(self, frame: bytes, kind: str, form: str) -> None:
-        self._window.sent(len(frame), time.perf_counter())
+    async def _send_frame(self, viewport: Viewport, frame: bytes, kind: str, form: str) -> None:
+        self._window.sent(viewport.name, len(frame), time.perf_counter())
         await self._wire.send_frame(frame)
         self._metrics.frames.labels(kind, form).inc()
         self._metrics.frame_bytes.inc(len(frame))
@@ -205,4 +255,4 @@ class FrameLoop:
         if self._wishes.target is target:  # a newer one stands on this and is refused itself
             self._wishes.target = before
             self._desk.revert(before)
-        await self._work.quick(painter.accept, [self._viewport.picture], before)
+        await self._work.quick(painter.accept, self._pictures(), before)

@@ -55,7 +55,7 @@ class Freezer:
         future = asyncio.wrap_future(
             self._threads.long.submit(need.make, lambda share: progress.__setitem__(0, share), cancel.is_set)
         )
-        telling = asyncio.create_task(self._tell(future, need, progress))
+        telling = asyncio.create_task(self._tell(future, viewport.name, need, progress))
         telling.add_done_callback(lambda _: self._news.set())
         self._running = _Running(viewport, need, future, telling, time.perf_counter())
 
@@ -89,13 +89,13 @@ class Freezer:
             if not part.cancelled():
                 part.exception()
 
-    async def _tell(self, future: asyncio.Future[Any], need: Need, progress: list[float]) -> None:
+    async def _tell(self, future: asyncio.Future[Any], view: str, need: Need, progress: list[float]) -> None:
         """Say how far it is, each per cent once."""
         told = -1.0
         while not future.done():
             shown = round(min(1.0, max(0.0, progress[0])), 2)
             if shown != told:
                 told = shown
-                await self._wire.send(StatusMessage(state=need.state, what=need.what, progress=shown))
+                await self._wire.send(StatusMessage(state=need.state, view=view, what=need.what, progress=shown))
             await asyncio.wait({future}, timeout=STATUS_S)
-        await self._wire.send(StatusMessage(state="ready", what=need.what, progress=progress[0]))
+        await self._wire.send(StatusMessage(state="ready", view=view, what=need.what, progress=progress[0]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -12,9 +13,9 @@ from relume.errors import ParameterError, ProtocolError, RelumeError
 from server import protocol
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.edits import LookDesk
-from server.live.frame_loop import FrameLoop
 from server.live.pointers import find_curve
 from server.live.ports import Transfer
+from server.live.shown import Shown
 from server.live.window import Window
 from server.live.wire import Wire
 from server.live.wishes import Wishes
@@ -34,12 +35,12 @@ class Reception:
         wishes: Wishes,
         window: Window,
         desk: LookDesk,
-        frame_loop: FrameLoop,
+        shown: Shown,
         transfer: Transfer,
         metrics: Metrics,
     ) -> None:
         self._websocket, self._wire, self._wishes, self._window = websocket, wire, wishes, window
-        self._desk, self._frame_loop, self._transfer, self._metrics = desk, frame_loop, transfer, metrics
+        self._desk, self._shown, self._transfer, self._metrics = desk, shown, transfer, metrics
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -82,13 +83,15 @@ class Reception:
             case protocol.AckMessage():
                 self._window.acknowledged(message.frame, received_s)
             case protocol.ViewMessage():
-                self._check_view(message.name)
-                self._wishes.view = message.name
+                self._show([message.name])
+            case protocol.ViewsMessage():
+                self._show(message.names)
+            case protocol.FocusMessage():
+                self._shown.work_in(message.view)
             case protocol.StreamMessage():
                 self._wishes.form, self._wishes.quality = message.format, message.quality
             case protocol.ProbeMessage():
-                if message.view not in (None, self._frame_loop.view):
-                    raise ParameterError("view", message.view, f"{self._frame_loop.view!r}, the view that is shown")
+                self._shown.check(message.view or self._shown.focus)
                 self._wishes.probe = message
             case protocol.BrushMessage():
                 find_curve(message.curve, self._desk.document)
@@ -105,9 +108,11 @@ class Reception:
             raise
         self._metrics.edits.labels("applied").inc()
 
-    def _check_view(self, name: str) -> None:
-        if name not in self._transfer.views:
-            raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+    def _show(self, names: Sequence[str]) -> None:
+        for name in names:
+            if name not in self._transfer.views:
+                raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+        self._shown.show(names)
 
 
 def _text_of(message: Any) -> str | None:

@@ -1,4 +1,4 @@
-"""Looks of sessions that were lost, kept for a while under a token that only their client knows.
+"""Looks and shown views of sessions that were lost, kept for a while under a token that only their client knows.
 
 A client often notices a broken connection long before the server does, so live sessions can be resumed as well.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from server.live.edits import LookDesk
+from server.live.shown import Shown
 
 MAX_KEPT = 256
 
@@ -22,7 +23,13 @@ class Kept:
     bake: str
     document: dict[str, Any]
     revision: int
+    views: tuple[str, ...]
+    focus: str
     until_s: float
+
+
+def _kept(bake: str, desk: LookDesk, shown: Shown, until_s: float) -> Kept:
+    return Kept(bake, desk.document, desk.revision, shown.names, shown.focus, until_s)
 
 
 class ResumeStore:
@@ -30,29 +37,27 @@ class ResumeStore:
 
     def __init__(self, resume_seconds: float) -> None:
         self._resume_seconds = resume_seconds
-        self._live: dict[str, tuple[str, LookDesk]] = {}
+        self._live: dict[str, tuple[str, LookDesk, Shown]] = {}
         self._kept: OrderedDict[str, Kept] = OrderedDict()
 
-    def open(self, bake: str, desk: LookDesk) -> str:
+    def open(self, bake: str, desk: LookDesk, shown: Shown) -> str:
         """A session begins; returns its token, which cannot be guessed."""
         token = secrets.token_urlsafe(24)
-        self._live[token] = bake, desk
+        self._live[token] = bake, desk, shown
         return token
 
     def close(self, token: str, now_s: float) -> None:
         """A session ends: keep its look, unless it was resumed already."""
         if token not in self._live:
             return
-        bake, desk = self._live.pop(token)
-        self._kept[token] = Kept(bake, desk.document, desk.revision, now_s + self._resume_seconds)
+        self._kept[token] = _kept(*self._live.pop(token), now_s + self._resume_seconds)
         while len(self._kept) > MAX_KEPT or next(iter(self._kept.values())).until_s < now_s:
             self._kept.popitem(last=False)
 
     def take(self, token: str, bake: str, now_s: float) -> Kept | None:
         """The session of that token on that bake, once; None where there is none (any more)."""
         if token in self._live and self._live[token][0] == bake:
-            _, desk = self._live.pop(token)
-            return Kept(bake, desk.document, desk.revision, now_s)
+            return _kept(*self._live.pop(token), now_s)
         kept = self._kept.get(token)
         if kept is None or kept.bake != bake:
             return None

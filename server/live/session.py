@@ -20,6 +20,7 @@ from server.live.frame_loop import FrameLoop
 from server.live.ports import Library, Transfer
 from server.live.reception import Reception
 from server.live.resume import ResumeStore
+from server.live.shown import Shown
 from server.live.threads import Threads
 from server.live.window import Window
 from server.live.wire import Wire
@@ -47,12 +48,14 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
     kept = house.resumes.take(resume, bake, time.monotonic()) if resume else None
     default: dict[str, Any] = transfer.default_look
     desk = LookDesk(default, kept.document if kept else default, kept.revision if kept else 0)
+    first = next(iter(transfer.views))
+    shown = Shown(kept.views, kept.focus) if kept else Shown([first], first)
     wire = Wire(websocket, house.ack_seconds)
-    token = house.resumes.open(bake, desk)
+    token = house.resumes.open(bake, desk, shown)
     house.metrics.sessions.inc()
     try:
-        await wire.send(_hello(bake, transfer, desk, token, kept is not None))
-        await _serve_parts(house, websocket, wire, bake, transfer, desk)
+        await wire.send(_hello(bake, transfer, desk, shown, token, kept is not None))
+        await _serve_parts(house, websocket, wire, bake, transfer, desk, shown)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
     except RelumeError as error:
@@ -65,7 +68,7 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
         house.resumes.close(token, time.monotonic())
 
 
-def _hello(bake: str, transfer: Transfer, desk: LookDesk, token: str, resumed: bool) -> HelloMessage:
+def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: str, resumed: bool) -> HelloMessage:
     views = [ViewInfo(name=view.name, width=view.width, height=view.height) for view in transfer.views.values()]
     return HelloMessage(
         session=secrets.token_hex(8),
@@ -74,7 +77,8 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, token: str, resumed: b
         look=desk.document,
         revision=desk.revision,
         resumed=resumed,
-        view=views[0].name,
+        view=shown.focus,
+        shown=list(shown.names),
         views=views,
         materials=list(transfer.material_names),
         resume=token,
@@ -82,7 +86,7 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, token: str, resumed: b
 
 
 async def _serve_parts(
-    house: House, websocket: WebSocket, wire: Wire, bake: str, transfer: Transfer, desk: LookDesk
+    house: House, websocket: WebSocket, wire: Wire, bake: str, transfer: Transfer, desk: LookDesk, shown: Shown
 ) -> None:
     """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
     wishes, window = Wishes(desk.target()), Window(house.ack_seconds)
@@ -95,7 +99,7 @@ async def _serve_parts(
         transfer=transfer,
         threads=house.threads,
         metrics=house.metrics,
-        view=next(iter(transfer.views)),
+        shown=shown,
     )
     reception = Reception(
         websocket=websocket,
@@ -103,7 +107,7 @@ async def _serve_parts(
         wishes=wishes,
         window=window,
         desk=desk,
-        frame_loop=frame_loop,
+        shown=shown,
         transfer=transfer,
         metrics=house.metrics,
     )

@@ -10,6 +10,7 @@ from server.live.painter import Format, Order, Painted, Target
 from server.live.ports import Need, Picture, View
 from server.live.window import Window
 from server.live.wishes import Wishes
+from server.protocol import BrushMessage
 
 REFINE_SEND_S = 0.100
 
@@ -23,7 +24,7 @@ class Viewport:
         is_settled: painting again would show nothing new.
         is_exact: the client's picture of it is exact.
         not_before_s: no refined frame goes out earlier.
-        last_turn: number of the turn in which it was painted.
+        brush: a stretch of a curve whose pixels are to be sent. served_s: when it had its last turn.
     """
 
     def __init__(self, view: View, picture: Picture) -> None:
@@ -32,7 +33,8 @@ class Viewport:
         self.need: Need | None = None
         self.is_settled = self.is_exact = False
         self.not_before_s = 0.0
-        self.last_turn = 0
+        self.brush: BrushMessage | None = None
+        self.served_s = 0.0
         self._all_tiles = self._lacking = frozenset(picture.all_tiles())
         self._is_blank = True  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False

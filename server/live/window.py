@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from relume.errors import ProtocolError
 from server.errors import CLOSE_NO_ACKNOWLEDGEMENT
+from server.live.shown import Shown
 from server.protocol import MAX_FRAMES_IN_FLIGHT
 
 MEASURED_BYTES = 16 * 1024
@@ -14,6 +15,7 @@ SLOW_S, QUICK_S = 0.066, 0.040
 
 @dataclass(frozen=True)
 class _Sent:
+    view: str
     sent_s: float
     num_bytes: int
 
@@ -30,20 +32,26 @@ class Window:
         self._bytes_per_s: float | None = None
         self._is_slow = False
 
-    @property
-    def is_open(self) -> bool:
-        """Whether another frame may be sent."""
-        return len(self._in_flight) < MAX_FRAMES_IN_FLIGHT
+    def has_room(self, view: str, shown: Shown) -> bool:
+        """Whether another frame of a view may be sent: one alone has all slots; of several, the focused one has a slot
+        of its own, and the others share the rest."""
+        if len(self._in_flight) >= MAX_FRAMES_IN_FLIGHT:
+            return False
+        if len(shown.names) == 1:
+            return True
+        is_focused = view == shown.focus
+        num_alike = sum((sent.view == shown.focus) == is_focused for sent in self._in_flight.values())
+        return num_alike < (1 if is_focused else MAX_FRAMES_IN_FLIGHT - 1)
 
     @property
     def next_frame(self) -> int:
         """Id of the frame to be sent next."""
         return self._last_frame + 1
 
-    def sent(self, num_bytes: int, now_s: float) -> None:
-        """A frame goes out."""
+    def sent(self, view: str, num_bytes: int, now_s: float) -> None:
+        """A frame of a view goes out."""
         self._last_frame += 1
-        self._in_flight[self._last_frame] = _Sent(now_s, num_bytes)
+        self._in_flight[self._last_frame] = _Sent(view, now_s, num_bytes)
 
     def acknowledged(self, frame: int, now_s: float) -> None:
         """The client has this frame and so all before it.

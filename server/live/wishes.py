@@ -19,18 +19,12 @@ class Wishes:
     """
 
     target: Target
-    view: str | None = None
     touch: str | None = None
     probe: ProbeMessage | None = None
     brush: BrushMessage | None = None
     form: Literal["hdr", "jpeg", "auto"] = "auto"
     quality: int = 80
     news: asyncio.Event = field(default_factory=asyncio.Event)
-
-    def take_view(self) -> str | None:
-        """Empty the view's slot."""
-        taken, self.view = self.view, None
-        return taken
 
     def take_touch(self) -> str | None:
         """Empty the touched curve's slot."""

@@ -11,9 +11,13 @@ import pytest
 import trimesh
 from fastapi.testclient import TestClient
 from session_client import Frame, open_session
+from tiny_scenes import still_life
 
+from relume.transfer.base import Recipe
 from server.app import create_app
 from server.settings import Settings
+from worker.scenes import register_scene
+from worker.service import BakeService
 
 WIDTH, HEIGHT = 80, 60
 
@@ -30,6 +34,23 @@ def decode_rgb9e5(payload: bytes) -> np.ndarray:
     words = np.frombuffer(payload, "<u4")
     mantissas = np.stack([(words >> shift) & 0x1FF for shift in (0, 9, 18)], -1).astype(np.float64)
     return mantissas * np.exp2((words >> 27).astype(np.float64) - 15 - 9)[:, None]
+
+
+def rendered_by(client: TestClient, request: dict[str, Any], folder: Path) -> np.ndarray:
+    """What a batch render gives. (height, width, 3) float32"""
+    url = client.post("/api/renders", json={**request, "format": "exr"}).headers["location"]
+    assert wait_until_done(client, url)["state"] == "ready"
+    file = folder / f"{request['view']}.exr"
+    file.write_bytes(client.get(f"{url}/frames/0").content)
+    pixels: np.ndarray = OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)
+    return pixels
+
+
+def assert_same(picture: np.ndarray, rendered: np.ndarray) -> None:
+    """Equal but for nine bits of mantissa, shared by the channels."""
+    tolerance = rendered.max(axis=-1, keepdims=True) / 256 + 1e-4
+    assert rendered.max() > 0.01
+    assert np.all(np.abs(picture - rendered) <= tolerance)
 
 
 def put(picture: np.ndarray, frame: Frame) -> None:
@@ -77,16 +98,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
 
     terms[1]["params"] = {"sigma": 0.2}
     looks = [{"materials": {name: {"terms": terms}}}]
-    render = {"bake": bake["id"], "view": "front", "looks": looks, "format": "exr"}
-    url = real.post("/api/renders", json=render).headers["location"]
-    assert wait_until_done(real, url)["state"] == "ready"
-    file = tmp_path / "frame.exr"
-    file.write_bytes(real.get(f"{url}/frames/0").content)
-    rendered = OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)
-    # nine bits of mantissa, shared by the channels
-    tolerance = rendered.max(axis=-1, keepdims=True) / 256 + 1e-4
-    assert rendered.max() > 0.01
-    assert np.all(np.abs(picture - rendered) <= tolerance)
+    assert_same(picture, rendered_by(real, {"bake": bake["id"], "view": "front", "looks": looks}, tmp_path))
     assert real.get(real.get(f"/api/scenes/{scene['id']}").json()["thumbnail"]).status_code == 200
     assert probe["material"] == name
     assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
@@ -103,3 +115,35 @@ def test_frame_is_true(real: TestClient) -> None:
     assert truth["state"] == "ready", truth["problem"]
     assert truth["found"]["noise"] > 0
     assert truth["found"]["error"] < 0.03
+
+
+def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_path: Path) -> None:
+    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+    scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
+    bake = bakes.submit(scene, Recipe("direct", ("front", "left"), (64, 48), 100))
+    with bakes.subscribe(bake) as changes:
+        assert list(changes)[-1].state == "ready"
+
+    pictures = {name: np.zeros((48, 64, 3)) for name in ("front", "left")}
+    last, frames = 6, []
+    with open_session(real, bake) as session:
+        session.send(type="views", names=["front", "left"])
+        session.send(type="focus", view="left")
+        session.send(type="touch", curve="/materials/Ball/terms/1/curves/theta_h")
+        for revision in range(1, last + 1):
+            session.edit(revision, "/materials/Ball/terms/1/params/sigma", 0.1 + revision / 20)
+        while {f.header["view"] for f in frames if f.header["exact"] and f.header["revision"] == last} != set(pictures):
+            frame = session.frame()
+            put(pictures[frame.header["view"]], frame)
+            frames.append(frame)
+        session.edit(last + 1, "/environment/scale", 2.0)  # nothing is to be frozen: the focused view comes first
+        followed = [session.exact(last + 1) for _ in range(2)]
+    assert [frame.header["view"] for frame in followed] == ["left", "front"]
+
+    params = {"sigma": 0.1 + last / 20}
+    document = real.get(f"/api/scenes/{scene}").json()["materials"]
+    terms = next(material["terms"] for material in document if material["name"] == "Ball")
+    terms[1] = {**terms[1], "params": {**terms[1]["params"], **params}}
+    for view, picture in pictures.items():
+        request = {"bake": bake, "view": view, "looks": [{"materials": {"Ball": {"terms": terms}}}]}
+        assert_same(picture, rendered_by(real, request, tmp_path))

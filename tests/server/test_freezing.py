@@ -4,6 +4,7 @@ import asyncio
 import gc
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -54,7 +55,7 @@ def run(scenario: Any) -> tuple[list[str], list[str]]:
 @pytest.mark.parametrize("state", ["freezing", "shading"])
 def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
-        view: Any = object()
+        view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeNeed(control, "/curves/theta_d", state))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         assert not freezer.is_done
@@ -74,7 +75,7 @@ def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
 
 def test_cancelled_freeze_gives_nothing() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
-        view: Any = object()
+        view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         freezer.cancel()
@@ -86,7 +87,7 @@ def test_cancelled_freeze_gives_nothing() -> None:
 
 def test_freeze_that_fails_says_why() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
-        view: Any = object()
+        view: Any = SimpleNamespace(name="front")
         freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
         await asyncio.wait_for(news.wait(), 60)
         with pytest.raises(StoreError):
@@ -97,7 +98,7 @@ def test_freeze_that_fails_says_why() -> None:
 
 def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
-        view: Any = object()
+        view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         await freezer.end()

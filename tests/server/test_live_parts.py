@@ -12,30 +12,54 @@ from server.live.edits import LookDesk
 from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
 from server.live.pointers import find_curve
 from server.live.resume import MAX_KEPT, ResumeStore
+from server.live.shown import Shown
 from server.live.transfers import MAX_IDLE, TransferPool
 from server.live.window import Window
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
 }
+ALONE = Shown(["front"], "front")
 TERM = "/materials/a~1b/terms"
 
 
 def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -> None:
     window = Window(ack_seconds=10)
     for _ in range(2):
-        assert window.is_open
-        window.sent(100, now_s=1.0)
-    assert not window.is_open
+        assert window.has_room("front", ALONE)
+        window.sent("front", 100, now_s=1.0)
+    assert not window.has_room("front", ALONE)
     window.acknowledged(2, now_s=1.1)
-    window.sent(100, now_s=1.2)
-    assert window.is_open
+    window.sent("front", 100, now_s=1.2)
+    assert window.has_room("front", ALONE)
     assert window.next_frame == 4
+
+
+def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one() -> None:
+    window, shown = Window(ack_seconds=10), Shown(["front", "left", "top"], "left")
+    assert all(window.has_room(name, shown) for name in shown.names)
+    window.sent("top", 100, now_s=1.0)
+    assert [window.has_room(name, shown) for name in shown.names] == [False, True, False]
+    window.sent("left", 100, now_s=1.0)
+    assert not any(window.has_room(name, shown) for name in shown.names)
+    window.acknowledged(1, now_s=1.1)
+    assert [window.has_room(name, shown) for name in shown.names] == [True, False, True]
+
+
+def test_shown_views_keep_the_focus_where_they_can() -> None:
+    shown = Shown(["front"], "front")
+    shown.show(["left", "front", "left"])
+    assert (shown.names, shown.focus) == (("left", "front"), "front")
+    shown.work_in("left")
+    with pytest.raises(ParameterError, match="which are shown"):
+        shown.work_in("top")
+    shown.hide("left")
+    assert (shown.names, shown.focus) == (("front",), "front")
 
 
 def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
     window = Window(ack_seconds=10)
-    window.sent(100, now_s=1.0)
+    window.sent("front", 100, now_s=1.0)
     with pytest.raises(ProtocolError, match="never sent"):
         window.acknowledged(2, now_s=1.0)
     window.check(10.9)
@@ -49,7 +73,7 @@ def stream(window: Window, num_frames: int, num_bytes: int, bytes_per_s: float, 
     now_s = start_s
     for _ in range(num_frames):
         frame = window.next_frame
-        window.sent(num_bytes, now_s)
+        window.sent("front", num_bytes, now_s)
         now_s += 0.010 + num_bytes / bytes_per_s
         window.acknowledged(frame, now_s)
     return now_s
@@ -96,7 +120,7 @@ def test_pace_is_bounded() -> None:
 
 def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
     store = ResumeStore(resume_seconds=600)
-    tokens = [store.open("bake", LookDesk({}, {"k": k}, k)) for k in range(MAX_KEPT + 5)]
+    tokens = [store.open("bake", LookDesk({}, {"k": k}, k), ALONE) for k in range(MAX_KEPT + 5)]
     assert len(set(tokens)) == len(tokens)
     for token in tokens:
         store.close(token, now_s=0.0)
@@ -111,7 +135,7 @@ def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
 
 def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
     store = ResumeStore(resume_seconds=600)
-    token = store.open("bake", LookDesk({}, {"k": 1}, 3))
+    token = store.open("bake", LookDesk({}, {"k": 1}, 3), ALONE)
     kept = store.take(token, "bake", 0.0)
     assert kept is not None
     assert kept.revision == 3

@@ -1,0 +1,141 @@
+"""Several views of one bake side by side: every edit changes all, the one under the pointer goes first."""
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import Control
+from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, Session, open_session
+
+
+def exact_of_all(session: Session, revision: int, num_views: int = 2) -> list[Frame]:
+    """Read until every view has an exact frame of a revision; those frames in the order of their coming."""
+    found: dict[str, Frame] = {}
+    while len(found) < num_views:
+        frame = session.exact(revision)
+        found[frame.header["view"]] = frame
+    return list(found.values())
+
+
+def show_both(session: Session, focus: str = "left") -> None:
+    session.exact(0)
+    session.send(type="views", names=["front", "left"])
+    session.send(type="focus", view=focus)
+    exact_of_all(session, 0)
+
+
+@pytest.mark.parametrize("focus", ["front", "left"])
+def test_every_edit_changes_all_views_the_focused_one_first(client: TestClient, baked: Baked, focus: str) -> None:
+    with open_session(client, baked.bake) as session:
+        show_both(session, focus)
+        for revision in range(1, 4):
+            session.edit(revision, SIGMA, 0.2 + revision / 10)
+            frames = exact_of_all(session, revision)
+            assert frames[0].header["view"] == focus
+            for frame in frames:
+                assert np.frombuffer(frame.payload, "<u4")[0] == 700 + 100 * revision
+
+
+def test_client_that_does_not_acknowledge_gets_one_frame_of_the_focus_and_one_of_the_rest(
+    client: TestClient, baked: Baked
+) -> None:
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        session.send(type="ack", frame=session.frame().header["frame"])
+        session.send(type="views", names=["front", "left"])
+        shown = [session.frame().header["view"] for _ in range(2)]
+        assert sorted(shown) == ["front", "left"]
+        session.edit(1, SIGMA, 0.5)
+        with pytest.raises(ConnectionError) as closed:
+            session.frame()
+        assert closed.value.args[0] == 4408
+
+
+def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        show_both(session)
+        session.edit(1, IOR, 2.0)
+        statuses = [session.text("status")]
+        control.may_freeze.set()
+        while sum(status["state"] == "ready" for status in statuses) < 2:
+            statuses.append(session.text("status"))
+        ready = [status["view"] for status in statuses if status["state"] == "ready"]
+        assert (statuses[0]["view"], ready) == ("left", ["left", "front"])
+        session.edit(2, IOR, 2.5)
+        exact_of_all(session, 2)
+
+
+def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        show_both(session)
+        session.send(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        frames = [session.frame() for _ in range(2)]
+        assert [frame.header["kind"] for frame in frames] == ["brush", "brush"]
+        assert [frame.header["view"] for frame in frames] == ["left", "front"]
+
+
+def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        show_both(session)
+        session.send(type="probe", x=1, y=1)
+        assert session.text("probe")["view"] == "left"
+        session.send(type="probe", view="front", x=1, y=1)
+        assert session.text("probe")["view"] == "front"
+
+
+def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        show_both(session)
+        session.send(type="view", name="front")
+        assert session.exact(0).header["view"] == "front"
+        for revision in (1, 2, 3):
+            session.edit(revision, SIGMA, 0.2 + revision / 10)
+            assert session.exact(revision).header["view"] == "front"
+        session.send(type="focus", view="left")
+        assert session.text("problem")["problem"]["parameter"] == "view"
+
+
+def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        hello = session.text("hello")
+        assert (hello["shown"], hello["view"]) == (["front"], "front")
+        show_both(session)
+        session.edit(1, SIGMA, 0.4)
+        exact_of_all(session, 1)
+    with open_session(client, baked.bake, query=f"?resume={hello['resume']}") as session:
+        hello = session.text("hello")
+        assert (hello["shown"], hello["view"]) == (["front", "left"], "left")
+        assert exact_of_all(session, 1)[0].header["view"] == "left"
+
+
+def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    control.may_freeze.set()
+    with open_session(client, baked.bake) as session:
+        show_both(session)
+        session.edit(1, "/environment/rotation", 30.0)
+        assert session.text("problem")["revision"] == 1
+        session.send(type="touch", curve=THETA_D)
+        session.edit(2, SIGMA, 0.4)
+        for frame in exact_of_all(session, 2):
+            assert np.frombuffer(frame.payload, "<u4")[0] == 900
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "views", "names": []},
+        {"type": "views", "names": ["front"] * 5},
+        {"type": "views", "names": ["front", "nowhere"]},
+        {"type": "views", "names": "front"},
+        {"type": "views", "names": ["front", "x" * 257]},
+        {"type": "focus", "view": "left"},
+        {"type": "focus"},
+    ],
+)
+def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked, message: dict[str, object]) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(**message)
+        assert session.text("problem")["problem"]["status"] in (400, 422)
+        session.edit(1, SIGMA, 0.3)
+        assert session.exact(1).header["view"] == "front"
