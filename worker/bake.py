@@ -57,7 +57,7 @@ class BakeRunner:
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
-        with LeaseKeeper(self.ledger, self.job.bake_id, self.owner):
+        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner):
             self._run()
         self.changed()
 

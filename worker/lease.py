@@ -12,12 +12,9 @@ import os
 import socket
 import threading
 import uuid
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from sqlalchemy.exc import SQLAlchemyError
-
-if TYPE_CHECKING:
-    from worker.ledger import Ledger
 
 log = logging.getLogger(__name__)
 
@@ -56,12 +53,15 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
 
 
 class LeaseKeeper:
-    """Renews the lease of a bake while it runs, also through long steps such as the check before publishing."""
+    """Calls `renew` for the lease of a bake while it runs, also through long steps such as the check before publishing.
 
-    def __init__(self, ledger: Ledger, bake_id: str, owner: str) -> None:
-        self._ledger, self._bake_id, self._owner = ledger, bake_id, owner
+    The bake and its owner are those that the ledger knows.
+    """
+
+    def __init__(self, renew: Callable[[str, str], None], bake_id: str, owner: str) -> None:
+        self._renew, self._bake_id, self._owner = renew, bake_id, owner
         self._done = threading.Event()
-        self._thread = threading.Thread(target=self._renew, name="relume-lease", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="relume-lease", daemon=True)
 
     def __enter__(self) -> LeaseKeeper:
         self._thread.start()
@@ -71,9 +71,9 @@ class LeaseKeeper:
         self._done.set()
         self._thread.join()
 
-    def _renew(self) -> None:
+    def _run(self) -> None:
         while not self._done.wait(HEARTBEAT_S):
             try:
-                self._ledger.keep_lease(self._bake_id, self._owner)
+                self._renew(self._bake_id, self._owner)
             except SQLAlchemyError as error:  # a database that is away for some seconds costs no lease
                 log.warning("the lease of bake %s was not renewed: %s", self._bake_id, error)
