@@ -1,0 +1,174 @@
+"""What clients of the REST calls send that mean harm or know no better: a clear refusal, and nothing lost."""
+
+import json
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from problems import problem_of
+from session_client import Baked
+
+IDS = "0123456789abcdef"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"glTF", b"glTF\x02\x00\x00\x00\xff\xff\xff\x7f", b"\x00" * 1000, b"glTF\x02\x00\x00\x00\x0c\x00\x00\x00"],
+)
+def test_file_that_is_no_scene_is_refused(client: TestClient, data: bytes) -> None:
+    response = client.post("/api/scenes", files={"scene": ("../../x.glb", data)})
+    assert problem_of(response)["type"] == "urn:relume:problem:scene"
+    assert client.get("/api/scenes").json() == []
+
+
+def test_import_that_takes_too_much_is_stopped(client: TestClient, settings: Any) -> None:
+    settings.import_bytes = 64 * 1024**2  # less than an interpreter with NumPy needs
+    response = client.post("/api/scenes", files={"scene": ("x.glb", b"glTF")})
+    assert problem_of(response)["status"] == 422
+    assert list(settings.data.glob("upload-*")) == []
+
+
+def test_upload_beyond_the_limit_is_413(client: TestClient) -> None:
+    response = client.post("/api/scenes", files={"scene": ("x.glb", b"\x00" * (4 * 1024**2 + 1))})
+    assert problem_of(response)["status"] == 413
+
+
+def test_upload_of_unknown_length_is_cut_at_the_limit(client: TestClient) -> None:
+    num_chunks = 0
+
+    def chunks() -> Any:
+        nonlocal num_chunks
+        yield b'--b\r\nContent-Disposition: form-data; name="scene"; filename="x.glb"\r\n\r\n'
+        for num_chunks in range(8):  # noqa: B007
+            yield b"\x00" * 1024**2
+
+    headers = {"Content-Type": "multipart/form-data; boundary=b"}
+    response = client.post("/api/scenes", content=chunks(), headers=headers)
+    assert problem_of(response)["status"] == 413
+
+
+def test_body_of_another_call_beyond_the_limit_is_413(client: TestClient) -> None:
+    assert problem_of(client.post("/api/bakes", content=b" " * (2 * 1024**2 + 1)))["status"] == 413
+    headers = {"Content-Length": "9" * 5000}
+    assert problem_of(client.post("/api/bakes", content=b"{}", headers=headers))["status"] == 413
+
+
+@pytest.mark.parametrize(
+    "name", ["%00", "a%0Ab", "%20a", "..", "%2e%2e%2fetc%2fpasswd", "..%5c..", "x" * 81, "%E2%80%AE", "%7F"]
+)
+def test_look_name_that_is_none_is_refused(client: TestClient, name: str) -> None:
+    response = client.put(f"/api/looks/{name}", json={})
+    assert problem_of(response)["status"] in (404, 405, 422)
+    assert client.get("/api/looks").json() == []
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"[]",
+        b"7",
+        b'{"materials": NaN}',
+        b'{"materials": []}',
+        b'{"surprise": {}}',
+        b'{"display": {"exposure": 1e999}}',
+        b"\xff\xfe",
+        b'{"materials":' + b"[" * 100_000,
+    ],
+)
+def test_look_that_is_none_is_refused(client: TestClient, body: bytes) -> None:
+    assert problem_of(client.put("/api/looks/a", content=body))["status"] == 422
+
+
+def test_look_beyond_its_size_is_413(client: TestClient) -> None:
+    body = json.dumps({"materials": {"a": {"x": "y" * 262_144}}})
+    assert problem_of(client.put("/api/looks/a", content=body))["status"] == 413
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bake": IDS},
+        {"view": "nowhere"},
+        {"looks": []},
+        {"looks": [{}] * 1001},
+        {"looks": [{"materials": {"Nothing": {}}}]},
+        {"looks": [{"environment": {"scale": -1}}]},
+        {"format": "exe"},
+        {"size": [0, 1]},
+        {"size": [161, 96]},
+        {"size": [16384, 16384]},
+        {"size": [10**12, 1]},
+        {"surprise": 1},
+    ],
+)
+def test_render_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
+    request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"} | change
+    assert problem_of(client.post("/api/renders", json=request))["status"] in (404, 422)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"scene": IDS},
+        {"scene": "../../etc/passwd"},
+        {"method": "magic"},
+        {"views": ["nowhere"]},
+        {"views": []},
+        {"size": [-1, 5]},
+        {"size": [99999, 99999]},
+        {"lights": 0},
+        {"lights": 10**9},
+        {"preset": "ultra"},
+    ],
+)
+def test_bake_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
+    response = client.post("/api/bakes", json={"scene": baked.scene, "size": [8, 8], "lights": 9} | change)
+    assert problem_of(response)["status"] in (404, 422)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../../etc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "/..%2f..%2fsecret.txt",
+        "/..%2fsecret.txt",
+        "/%00.js",
+        "//etc/passwd.txt",
+        "/a\\..\\..\\secret.txt",
+    ],
+)
+def test_no_path_leaves_the_editors_folder(client: TestClient, settings: Any, path: str) -> None:
+    settings.client.mkdir()
+    (settings.client / "index.html").write_text("page")
+    (settings.client.parent / "secret.txt").write_text("secret")
+    response = client.get(path)
+    assert response.status_code in (200, 404)
+    assert "secret" not in response.text
+    assert "root:" not in response.text
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/api/nothing", 404),
+        ("POST", "/api/nothing", 404),
+        ("PATCH", "/api/bakes", 405),
+        ("POST", "/", 405),
+        ("GET", f"/api/bakes/{IDS}", 404),
+        ("GET", "/api/bakes/short", 422),
+        ("GET", f"/api/renders/{IDS}/frames/-1", 422),
+        ("GET", f"/api/renders/{IDS}/frames/99999999999999999999", 422),
+        ("GET", f"/api/scenes/{IDS}/thumbnail.webp", 404),
+    ],
+)
+def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, status: int) -> None:
+    assert problem_of(client.request(method, path))["status"] == status
+
+
+def test_missing_data_directory_is_a_problem_not_a_trace(client: TestClient, settings: Any) -> None:
+    settings.data = settings.data / "gone"
+    problem = problem_of(client.get("/readyz"))
+    assert problem["status"] == 507
+    assert str(settings.data) not in json.dumps(problem)

@@ -1,0 +1,239 @@
+"""What clients of sessions send that mean harm or know no better: a clear refusal, and the session goes on."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from problems import problem_of
+from server_fakes import Control
+from session_client import SIGMA, THETA_H, Baked, Session, open_session
+from starlette.testclient import WebSocketDenialResponse
+from starlette.websockets import WebSocketDisconnect
+
+from server.live.reception import MAX_BAD_MESSAGES
+from server.protocol import MAX_MESSAGE_BYTES
+
+IDS = "0123456789abcdef"
+
+
+def is_alive(session: Session, revision: int) -> bool:
+    """Whether the session still takes an edit and shows it."""
+    session.edit(revision, SIGMA, 0.25)
+    return session.exact(revision).header["revision"] == revision
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "no json",
+        "[]",
+        "null",
+        '{"type": "edit"',
+        '{"type": "explode"}',
+        '{"revision": 1, "patch": []}',
+        '{"type": "ack", "frame": -1}',
+        '{"type": "ack", "frame": 1e400}',
+        '{"type": "ack", "frame": "1x"}',
+        '{"type": "ack", "frame": 1, "more": 1}',
+        '{"type": "edit", "revision": 1, "patch": []}',
+        '{"type": "edit", "revision": 1, "patch": [{"op": "move", "from": "/a", "path": "/b"}]}',
+        '{"type": "brush", "curve": "/x", "from": NaN, "to": 3}',
+        '{"type": "stream", "format": "gif"}',
+        "[" * 60_000,
+        '{"type": "edit", "revision": 1, "patch": ' + "[" * 30_000 + "]" * 30_000 + "}",
+    ],
+)
+def test_malformed_message_is_a_problem_and_the_session_goes_on(client: TestClient, baked: Baked, text: str) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.websocket.send_text(text)
+        problem = session.text("problem")["problem"]
+        assert problem["status"] == 400
+        assert is_alive(session, 1)
+
+
+def test_binary_message_is_a_problem(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.websocket.send_bytes(b"\x00\x01")
+        assert session.text("problem")["problem"]["type"] == "urn:relume:problem:protocol"
+        assert is_alive(session, 1)
+
+
+def test_too_many_malformed_messages_end_the_session(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        for _ in range(MAX_BAD_MESSAGES + 1):
+            session.websocket.send_text("no json")
+        with pytest.raises(ConnectionError) as closed:
+            session.text("never")
+    assert closed.value.args[0] == 1008
+
+
+@pytest.mark.parametrize("text", ["x" * (MAX_MESSAGE_BYTES + 1), "é" * (MAX_MESSAGE_BYTES // 2 + 1)])
+def test_message_beyond_the_limit_closes_1009(client: TestClient, baked: Baked, text: str) -> None:
+    with open_session(client, baked.bake) as session:
+        session.websocket.send_text(text)
+        with pytest.raises(ConnectionError) as closed:
+            session.text("never")
+    assert closed.value.args[0] == 1009
+
+
+def test_message_at_the_limit_is_read(client: TestClient, baked: Baked) -> None:
+    message = json.dumps({"type": "edit", "revision": 1, "patch": [{"op": "replace", "path": SIGMA, "value": 0.5}]})
+    with open_session(client, baked.bake) as session:
+        session.websocket.send_text(message + " " * (MAX_MESSAGE_BYTES - len(message)))
+        session.exact(1)
+
+
+@pytest.mark.parametrize("revision", [0, 4, 5])
+def test_old_revision_is_refused(client: TestClient, baked: Baked, revision: int) -> None:
+    with open_session(client, baked.bake) as session:
+        session.edit(5, SIGMA, 0.4)
+        session.exact(5)
+        session.edit(revision, SIGMA, 0.1)
+        problem = session.text("problem")
+        assert problem["revision"] == revision
+        assert "old revision" in problem["problem"]["detail"]
+        assert is_alive(session, 6)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("/materials/Nothing/terms/0/color", [1, 1, 1]),
+        ("/materials/Paper/terms/1/model", "unobtainium"),
+        ("/materials/Paper/terms/1/params/shininess", 1.0),
+        (SIGMA, 1e9),
+        (SIGMA, "0.3"),
+        (SIGMA, None),
+        (SIGMA, math.nan),
+        ("/materials/Paper/terms/0/color", [1, 1, math.inf]),
+        ("/materials/Paper/terms/1/curves", {"theta_h": {"points": [[0, math.nan], [90, 0]]}}),
+        ("/materials/Paper/terms/1/curves", {"theta_h": {"points": [[9, 1], [3, 0]]}}),
+        ("/materials/Paper/terms/1/curves", {"theta_x": {"points": [[0, 1], [90, 0]]}}),
+        ("/materials/Paper/terms/1/curves", {"theta_h": {"points": [[k / 100, 1] for k in range(4097)]}}),
+        ("/materials/Paper/terms/99/color", [1, 1, 1]),
+        ("/environment/scale", -1),
+        ("/environment/color", [1, 1]),
+        ("/__class__/__init__", 1),
+        ("no pointer", 1),
+        ("", {"materials": {"Nothing": {}}}),
+    ],
+)
+def test_invalid_edit_is_a_problem_and_the_look_stays(client: TestClient, baked: Baked, path: str, value: Any) -> None:
+    with open_session(client, baked.bake) as session:
+        session.edit(1, SIGMA, 0.4)
+        session.exact(1)
+        session.edit(2, path, value)
+        problem = session.text("problem")
+        assert problem["revision"] == 2
+        assert problem["problem"]["status"] in (400, 422)
+        assert len(json.dumps(problem)) < 4000
+        session.edit(3, SIGMA, 0.4, op="test")
+        session.exact(3)
+
+
+def test_curve_of_a_million_points_is_too_big_a_message(client: TestClient, baked: Baked) -> None:
+    points = [[90 * k / 1e6, 1.0] for k in range(1_000_000)]
+    with open_session(client, baked.bake) as session:
+        session.edit(1, "/materials/Paper/terms/1/curves", {"theta_h": {"points": points}})
+        with pytest.raises(ConnectionError) as closed:
+            session.text("never")
+    assert closed.value.args[0] == 1009
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "view", "name": "../../etc"},
+        {"type": "probe", "x": 160, "y": 0},
+        {"type": "probe", "view": "left", "x": 0, "y": 0},
+        {"type": "touch", "curve": "/materials/Paper/terms/1/curves/theta_x"},
+        {"type": "touch", "curve": "/materials/../terms/1/curves/theta_h"},
+        {"type": "touch", "curve": "/materials/Paper/terms/999/curves/theta_h"},
+        {"type": "brush", "curve": "/materials/Paper/terms/0/curves/theta_h", "from": 0, "to": 9},
+        {"type": "ack", "frame": 999},
+    ],
+)
+def test_impossible_wish_is_a_problem(client: TestClient, baked: Baked, message: dict[str, Any]) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(**message)
+        assert session.text("problem")["problem"]["status"] in (400, 422)
+        assert is_alive(session, 1)
+
+
+def test_flood_of_edits_and_brushes_keeps_one_of_each(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        session.frame()
+        for revision in range(1, 500):
+            session.edit(revision, SIGMA, 0.2 + revision / 1000)
+            session.send(type="brush", curve=THETA_H, **{"from": 0.0, "to": 9.0})
+        with pytest.raises(ConnectionError) as closed:
+            session.text("never")
+    assert closed.value.args[0] == 4408
+    assert control.num_looks < 10
+
+
+@pytest.mark.parametrize("subprotocols", [[], ["relume.v2"], ["RELUME.V1"]])
+def test_other_subprotocol_closes_1002(client: TestClient, baked: Baked, subprotocols: list[str]) -> None:
+    with open_session(client, baked.bake, subprotocols=subprotocols) as session:
+        with pytest.raises(ConnectionError) as closed:
+            session.receive()
+        assert closed.value.args[0] == 1002
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "https://evil.example"},
+        {"origin": "null"},
+        {"origin": "http://testserver.evil.example"},
+        {"origin": "http://testserver:9999"},
+        {"origin": "http://[broken"},
+        {"host": "evil.example", "origin": "http://evil.example"},
+    ],
+)
+def test_page_of_another_site_gets_no_session_and_changes_nothing(
+    client: TestClient, baked: Baked, headers: dict[str, str]
+) -> None:
+    with (
+        pytest.raises((WebSocketDenialResponse, WebSocketDisconnect)),
+        open_session(client, baked.bake, headers=headers),
+    ):
+        pass
+    assert problem_of(client.delete(f"/api/scenes/{baked.scene}", headers=headers))["status"] == 403
+    assert client.get(f"/api/scenes/{baked.scene}").status_code == 200
+
+
+def test_own_page_gets_a_session(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, headers={"origin": "http://testserver"}) as session:
+        assert session.text("hello")["bake"] == baked.bake
+
+
+@pytest.mark.parametrize("bake", [IDS, "x", "0" * 5000])
+def test_session_on_no_bake_closes_4404(client: TestClient, bake: str) -> None:
+    with open_session(client, bake) as session, pytest.raises(ConnectionError) as closed:
+        session.receive()
+    assert closed.value.args[0] == 4404
+
+
+def test_session_on_a_path_that_is_none_is_refused(client: TestClient) -> None:
+    with pytest.raises((WebSocketDenialResponse, WebSocketDisconnect)), open_session(client, "..%2f..%2fetc"):
+        pass
+
+
+def test_session_on_damaged_store_says_so(client: TestClient, baked: Baked) -> None:
+    store = client.app.state.services.bakes.store_path(baked.bake)  # type: ignore[attr-defined]
+    (store / "zarr.json").write_bytes(b"{")
+    with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as closed:
+        session.receive()
+    assert closed.value.args[0] == 4410
+
+
+@pytest.mark.parametrize("token", ["", "x", "../..", "%00", "a" * 3000])
+def test_unknown_resume_token_is_a_new_session(client: TestClient, baked: Baked, token: str) -> None:
+    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+        assert not session.text("hello")["resumed"]

@@ -1,0 +1,12 @@
+"""What every refusal of the server looks like."""
+
+from typing import Any
+
+
+def problem_of(response: Any) -> dict[str, Any]:
+    assert response.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = response.json()
+    assert problem["status"] == response.status_code
+    assert problem["detail"]
+    assert "Traceback" not in response.text
+    return problem
