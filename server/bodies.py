@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -18,6 +18,12 @@ class Body(BaseModel):
     """The base of all bodies."""
 
     model_config = ConfigDict(extra="forbid")
+
+    @classmethod
+    def of(cls, status: object, **more: Any) -> Self:
+        """A body whose fields are the attributes of `status` with the same names, and `more`."""
+        own = {name: getattr(status, name) for name in cls.model_fields if name not in more}
+        return cls(**own, **more)
 
 
 class SceneView(Body):

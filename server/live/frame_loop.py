@@ -13,17 +13,12 @@ import time
 from relume.errors import RelumeError
 from server.live import painter
 from server.live.answers import Answers
-from server.live.edits import LookDesk
 from server.live.freezing import Freezer
 from server.live.painter import Order, Painted, Target
-from server.live.ports import Library, Need, Picture, Transfer
-from server.live.shown import Shown
+from server.live.parts import Parts
+from server.live.ports import Library, Need, Picture
 from server.live.threads import OneAtATime, Threads
 from server.live.viewport import Viewport
-from server.live.window import Window
-from server.live.wire import Wire
-from server.live.wishes import Wishes
-from server.metrics import Metrics
 
 REST_S = 0.040  # a hand that moves edits at least this often; refining in between would only delay the next frame
 CHECK_S = 1.0
@@ -32,24 +27,12 @@ CHECK_S = 1.0
 class FrameLoop:
     """The shown pictures on their way to one client."""
 
-    def __init__(
-        self,
-        *,
-        wire: Wire,
-        wishes: Wishes,
-        shown: Shown,
-        window: Window,
-        desk: LookDesk,
-        library: Library,
-        transfer: Transfer,
-        threads: Threads,
-        metrics: Metrics,
-    ) -> None:
-        self._wire, self._wishes, self._shown, self._window, self._desk = wire, wishes, shown, window, desk
-        self._library, self._transfer, self._metrics = library, transfer, metrics
-        self._work = OneAtATime(threads)
-        self._freezer = Freezer(wire, threads, metrics, wishes.news)
-        self._answers = Answers(wire, self._work)
+    def __init__(self, parts: Parts, library: Library, threads: Threads) -> None:
+        self._wire, self._wishes, self._shown, self._window = parts.wire, parts.wishes, parts.shown, parts.window
+        self._desk, self._transfer, self._metrics = parts.desk, parts.transfer, parts.metrics
+        self._library, self._work = library, OneAtATime(threads)
+        self._freezer = Freezer(parts.wire, threads, parts.metrics, parts.wishes.news)
+        self._answers = Answers(parts.wire, self._work)
         self._accepted: Target | None = None
         self._viewports: dict[str, Viewport] = {}
         self._rest_until_s = 0.0

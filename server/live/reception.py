@@ -12,14 +12,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from relume.errors import ParameterError, ProtocolError, RelumeError
 from server import protocol
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
-from server.live.edits import LookDesk
+from server.live.parts import Parts
 from server.live.pointers import find_curve
-from server.live.ports import Transfer
-from server.live.shown import Shown
-from server.live.window import Window
-from server.live.wire import Wire
-from server.live.wishes import Wishes
-from server.metrics import Metrics
 
 MAX_BAD_MESSAGES = 50
 
@@ -27,20 +21,10 @@ MAX_BAD_MESSAGES = 50
 class Reception:
     """Runs until the client goes or breaks the rules too often."""
 
-    def __init__(
-        self,
-        *,
-        websocket: WebSocket,
-        wire: Wire,
-        wishes: Wishes,
-        window: Window,
-        desk: LookDesk,
-        shown: Shown,
-        transfer: Transfer,
-        metrics: Metrics,
-    ) -> None:
-        self._websocket, self._wire, self._wishes, self._window = websocket, wire, wishes, window
-        self._desk, self._shown, self._transfer, self._metrics = desk, shown, transfer, metrics
+    def __init__(self, websocket: WebSocket, parts: Parts) -> None:
+        self._websocket, self._wire, self._wishes, self._shown = websocket, parts.wire, parts.wishes, parts.shown
+        self._window, self._desk, self._transfer = parts.window, parts.desk, parts.transfer
+        self._metrics = parts.metrics
         self._num_bad = 0
 
     async def run(self) -> None:

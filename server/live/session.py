@@ -17,6 +17,7 @@ from server.errors import close_code_of, problem_of
 from server.live.bake_news import BakeNews
 from server.live.edits import LookDesk
 from server.live.frame_loop import FrameLoop
+from server.live.parts import Parts
 from server.live.ports import Library, Transfer
 from server.live.reception import Reception
 from server.live.resume import ResumeStore
@@ -51,11 +52,13 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
     first = next(iter(transfer.views))
     shown = Shown(kept.views, kept.focus) if kept else Shown([first], first)
     wire = Wire(websocket, house.ack_seconds)
+    window = Window(house.ack_seconds)
+    parts = Parts(wire, Wishes(desk.target()), shown, window, desk, transfer, house.metrics)
     token = house.resumes.open(bake, desk, shown)
     house.metrics.sessions.inc()
     try:
         await wire.send(_hello(bake, transfer, desk, shown, token, kept is not None))
-        await _serve_parts(house, websocket, wire, bake, transfer, desk, shown)
+        await _run(house, websocket, bake, parts)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
     except RelumeError as error:
@@ -85,57 +88,33 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: s
     )
 
 
-async def _serve_parts(
-    house: House, websocket: WebSocket, wire: Wire, bake: str, transfer: Transfer, desk: LookDesk, shown: Shown
-) -> None:
+async def _run(house: House, websocket: WebSocket, bake: str, parts: Parts) -> None:
     """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
-    wishes, window = Wishes(desk.target()), Window(house.ack_seconds)
-    frame_loop = FrameLoop(
-        wire=wire,
-        wishes=wishes,
-        window=window,
-        desk=desk,
-        library=house.library,
-        transfer=transfer,
-        threads=house.threads,
-        metrics=house.metrics,
-        shown=shown,
-    )
-    reception = Reception(
-        websocket=websocket,
-        wire=wire,
-        wishes=wishes,
-        window=window,
-        desk=desk,
-        shown=shown,
-        transfer=transfer,
-        metrics=house.metrics,
-    )
-    parts = [
-        asyncio.create_task(reception.run()),
-        asyncio.create_task(frame_loop.run()),
-        asyncio.create_task(house.bake_news.tell(wire, bake, transfer.scene_id)),
+    tasks = [
+        asyncio.create_task(Reception(websocket, parts).run()),
+        asyncio.create_task(FrameLoop(parts, house.library, house.threads).run()),
+        asyncio.create_task(house.bake_news.tell(parts.wire, bake, parts.transfer.scene_id)),
     ]
     try:
-        done, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
-        for part in done:
-            part.result()
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
     finally:
-        await _end(parts)
+        await _end(tasks)
 
 
-async def _end(parts: Sequence[asyncio.Task[None]]) -> None:
-    """Cancel the parts and see them end, even while being cancelled: a thread may still use the picture."""
+async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:
+    """Cancel the tasks and see them end, even while being cancelled: a thread may still use the picture."""
     cancelled: asyncio.CancelledError | None = None
-    for part in parts:
-        part.cancel()
-    while not all(part.done() for part in parts):
+    for task in tasks:
+        task.cancel()
+    while not all(task.done() for task in tasks):
         try:
-            await asyncio.wait(parts)
+            await asyncio.wait(tasks)
         except asyncio.CancelledError as error:
             cancelled = error
-    for part in parts:
-        if not part.cancelled():
-            part.exception()  # one that lost the race to end the session is not told
+    for task in tasks:
+        if not task.cancelled():
+            task.exception()  # one that lost the race to end the session is not told
     if cancelled is not None:
         raise cancelled

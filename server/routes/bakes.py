@@ -122,18 +122,7 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
     """A bake as the API shows it."""
-    return BakeBody(
-        id=status.id,
-        scene=status.scene,
-        state=status.state,
-        progress=status.progress,
-        rays_per_second=status.rays_per_second,
-        seconds_left=status.seconds_left,
-        bytes=status.bytes,
-        problem=status.problem,
-        recipe=_recipe_body(status.recipe),
-        plan=_plan(status.plan, services),
-    )
+    return BakeBody.of(status, recipe=_recipe_body(status.recipe), plan=_plan(status.plan, services))
 
 
 def _recipe_body(recipe: Recipe) -> RecipeBody:

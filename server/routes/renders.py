@@ -92,15 +92,12 @@ def _state(status: RenderStatus) -> str:
 
 def _body(status: RenderStatus) -> RenderBody:
     request, total = status.request, len(status.request.looks)
-    return RenderBody(
-        id=status.id,
+    return RenderBody.of(
+        status,
         bake=request.bake,
         view=request.view,
         format=request.format,
         size=request.size,
-        state=status.state,
-        done=status.done,
         total=total,
         progress=status.done / total,
-        problem=status.problem,
     )
