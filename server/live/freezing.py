@@ -65,10 +65,11 @@ class Freezer:
 
     async def take(self) -> tuple[Viewport, Need, Any] | None:
         """What was made, when `is_done`; None where it was cancelled. Raises what making it raised."""
-        running, self._running = self._running, None
+        running = self._running
         if running is None:
             return None
-        await running.telling
+        await running.telling  # where the client is gone, `end` still has a thread to wait for
+        self._running = None
         error = running.future.exception()
         if isinstance(error, CancelledError):
             return None

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from server_fakes import Control, FakeNeed
 
-from relume.errors import StoreError
+from relume.errors import ProtocolError, StoreError
 from server.live.freezing import Freezer
 from server.live.threads import Threads
 from server.metrics import Metrics
@@ -33,10 +33,17 @@ class Broken(FakeNeed):
         raise StoreError("damaged; bake again")
 
 
-def run(scenario: Any) -> tuple[list[str], list[str]]:
+class Gone(Told):
+    """A client that has left."""
+
+    async def send(self, message: Any) -> None:
+        raise ProtocolError("nothing was read; reload the page", 4408)
+
+
+def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
     """Run a scenario (freezer, control, news) in a loop of its own; what was told, and what nobody retrieved."""
     complaints: list[str] = []
-    told = Told()
+    told = told or Told()
 
     async def main() -> None:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context["message"]))
@@ -94,6 +101,19 @@ def test_freeze_that_fails_says_why() -> None:
             await freezer.take()
 
     assert run(scenario)[1] == []
+
+
+def test_client_that_leaves_during_a_freeze_ends_it() -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        await asyncio.wait_for(news.wait(), 60)
+        with pytest.raises(ProtocolError):
+            await freezer.take()
+        await freezer.end()
+        assert control.num_cancelled == 1
+
+    assert run(scenario, Gone())[1] == []
 
 
 def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
