@@ -64,7 +64,10 @@ class SceneBody(Body):
 
 
 class ParameterBody(Body):
-    """A number that generates curves; `scale` says how a slider moves."""
+    """A number that generates curves; `scale` says how a slider moves.
+
+    One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze.
+    """
 
     name: str
     label: str
@@ -74,6 +77,7 @@ class ParameterBody(Body):
     unit: str
     scale: Literal["linear", "log"]
     help: str
+    fixed: bool
 
 
 class CurveBody(Body):
@@ -85,6 +89,36 @@ class CurveBody(Body):
     parameters: list[str]
     bands: int
     outgoing: bool
+
+
+class MaterialBody(Body):
+    """A library material under one model: what stands in a look, and how a list shows it.
+
+    `id` is "table/material", `group` what it is made of, `model` that of its highlight, `swatch` its colour "#rrggbb".
+    """
+
+    id: str
+    name: str
+    group: str
+    model: str
+    source: str
+    swatch: str
+    terms: list[dict[str, Any]]
+
+
+class MapPoint(Body):
+    """A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry."""
+
+    id: str
+    f0: float
+    sigma: float
+
+
+class MaterialMapBody(Body):
+    """Sun's navigation map; `triangles` are indices of points, counter-clockwise where x is f0 and y is log sigma."""
+
+    points: list[MapPoint]
+    triangles: list[tuple[int, int, int]]
 
 
 class ModelBody(Body):

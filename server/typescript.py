@@ -48,6 +48,8 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.FrameHeader,
     bodies.SceneBody,
     bodies.ModelBody,
+    bodies.MaterialBody,
+    bodies.MaterialMapBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

@@ -202,6 +202,30 @@ export interface LookEntry {
   bytes: number;
 }
 
+/** A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry. */
+export interface MapPoint {
+  id: string;
+  f0: number;
+  sigma: number;
+}
+
+/** A library material under one model: what stands in a look, and how a list shows it. `id` is "table/material", `group` what it is made of, `model` that of its highlight, `swatch` its colour "#rrggbb". */
+export interface MaterialBody {
+  id: string;
+  name: string;
+  group: string;
+  model: string;
+  source: string;
+  swatch: string;
+  terms: Record<string, unknown>[];
+}
+
+/** Sun's navigation map; `triangles` are indices of points, counter-clockwise where x is f0 and y is log sigma. */
+export interface MaterialMapBody {
+  points: MapPoint[];
+  triangles: [number, number, number][];
+}
+
 /** A BRDF term; `texture` is the channel it takes by default. */
 export interface ModelBody {
   model: string;
@@ -213,7 +237,7 @@ export interface ModelBody {
   curves: CurveBody[];
 }
 
-/** A number that generates curves; `scale` says how a slider moves. */
+/** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. */
 export interface ParameterBody {
   name: string;
   label: string;
@@ -223,6 +247,7 @@ export interface ParameterBody {
   unit: string;
   scale: "linear" | "log";
   help: string;
+  fixed: boolean;
 }
 
 /** What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown. */

@@ -67,6 +67,8 @@ export interface ParameterInfo {
   unit: string;
   scale: "linear" | "log";
   help: string;
+  /** Has one value for all channels, and a change of it takes as long as a freeze. */
+  fixed: boolean;
 }
 export interface CurveInfo {
   name: string;

@@ -82,6 +82,7 @@ describe("terms", () => {
       unit: "",
       scale: "linear",
       help: "",
+      fixed: false,
     })),
     curves: [],
   });

@@ -45,8 +45,8 @@ ASHIKHMIN_SHIRLEY = Term(
     model="ashikhmin_shirley",
     label="Ashikhmin–Shirley",
     parameters=(
-        Parameter("nu", "Exponent along", 1.0, 10000.0, 100.0, "", "log", "Sharpness along the tangent."),
-        Parameter("nv", "Exponent across", 1.0, 10000.0, 100.0, "", "log", "Sharpness across the tangent."),
+        Parameter("nu", "Exponent along", 0.5, 1e5, 100.0, "", "log", "Sharpness along the tangent."),
+        Parameter("nv", "Exponent across", 0.5, 1e5, 100.0, "", "log", "Sharpness across the tangent."),
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
     ),
     curves=(

@@ -1,8 +1,10 @@
-"""Cosines of the half vector, shared by the quotients. Local frame, z = normal; float32 in gives float32 out."""
+"""What quotients share: cosines of the half vector, and how ufuncs are made. Local frame, z = normal."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -27,7 +29,22 @@ def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-
     return cos_theta_h, cos_theta_d
 
 
-_DIRECTIONS_F32 = nb.float32(nb.float32, nb.float32, nb.float32, nb.float32, nb.float32, nb.float32)
-_DIRECTIONS_F64 = nb.float64(nb.float64, nb.float64, nb.float64, nb.float64, nb.float64, nb.float64)
+def quotient_ufunc_with(num_fixed: int) -> Callable[[Any], Any]:
+    """Decorator for a quotient that has fixed parameters before the six components of wi and wo.
+
+    float32 directions give float32.
+    """
+    signatures = [kind(*[kind] * (num_fixed + 6)) for kind in (nb.float32, nb.float64)]
+    return nb.vectorize(signatures, nopython=True, cache=True)  # type: ignore[no-any-return, no-untyped-call]
+
+
 # decorator that makes the ufunc of `Term.quotient`
-quotient_ufunc = nb.vectorize([_DIRECTIONS_F32, _DIRECTIONS_F64], nopython=True, cache=True)  # type: ignore[no-untyped-call]
+quotient_ufunc = quotient_ufunc_with(0)
+
+
+@quotient_ufunc
+def one_above(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
+    """One above the horizon: the quotient where the curves say it all."""
+    if wi_z <= ZERO or wo_z <= ZERO:
+        return ZERO
+    return ONE

@@ -6,13 +6,27 @@ from dataclasses import asdict
 from typing import Any
 
 from relume.brdf.ashikhmin_shirley import ASHIKHMIN_SHIRLEY
+from relume.brdf.beard_maxwell import BEARD_MAXWELL
 from relume.brdf.blinn_phong import BLINN_PHONG
 from relume.brdf.cook_torrance import COOK_TORRANCE
 from relume.brdf.ggx import GGX
+from relume.brdf.lafortune import LAFORTUNE
 from relume.brdf.lambert import LAMBERT
+from relume.brdf.oren_nayar import OREN_NAYAR
+from relume.brdf.phong import PHONG
+from relume.brdf.schlick import SCHLICK
 from relume.brdf.term import Curve, Term
+from relume.brdf.ward import WARD
+from relume.brdf.ward_anisotropic import WARD_ANISOTROPIC
+from relume.brdf.ward_duer import WARD_DUER
 
-TERMS: dict[str, Term] = {term.model: term for term in (LAMBERT, BLINN_PHONG, COOK_TORRANCE, GGX, ASHIKHMIN_SHIRLEY)}
+_ALL = (
+    LAMBERT, OREN_NAYAR,
+    PHONG, BLINN_PHONG, LAFORTUNE, WARD, WARD_DUER, WARD_ANISOTROPIC, ASHIKHMIN_SHIRLEY,
+    COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX,
+)  # fmt: skip
+
+TERMS: dict[str, Term] = {term.model: term for term in _ALL}
 
 
 def _describe_curve(curve: Curve) -> dict[str, Any]:
@@ -35,7 +49,9 @@ def describe() -> list[dict[str, Any]]:
             "help": term.help,
             "source": term.source,
             "texture": term.texture,
-            "parameters": [asdict(parameter) for parameter in term.parameters],
+            "parameters": [
+                asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters
+            ],
             "curves": [_describe_curve(curve) for curve in term.curves],
         }
         for term in TERMS.values()

@@ -25,7 +25,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Document = Mapping[str, Any]
 
-_STEPS = 1 << 16  # linear between them, the narrowest highlight (σ = 0.01) is off by less than 1e-6 of its peak
+_STEPS = 1 << 16  # linear between them, the narrowest highlight (σ = 0.005) is off by less than 1e-5 of its peak
 _POINTS_A_PACKET = 16  # neighbours that Embree traces together; where texels are drawn, they share the draw
 _TEXELS_AT_ONCE = 8192
 _SEED = 2006

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.integrate import quad
 
 
 def directions(rng, count, min_cosine=0.02):
@@ -74,4 +75,74 @@ def ashikhmin_shirley(wi, wo, nu, nv, f0):
     return lobe / (dot(wo, h) * np.maximum(wi[..., 2], wo[..., 2])) * schlick_fresnel(dot(wo, h), f0)
 
 
-CLOSED_FORMS = {f.__name__: f for f in (lambert, blinn_phong, cook_torrance, ggx, ashikhmin_shirley)}
+def phong(wi, wo, exponent):
+    """Mahajan 2008, eq. 5."""
+    mirrored = wo * [-1, -1, 1]
+    return (exponent + 1) / (2 * np.pi) * np.maximum(dot(wi, mirrored), 0) ** exponent
+
+
+def lafortune(wi, wo, exponent, c_x, c_y, c_z):
+    """Lafortune 1997 with the normalisation of Nguyen 2010."""
+    c = np.array([c_x, c_y, c_z])
+    cosine = dot(c * wi, wo) / np.abs(c).max()
+    return (exponent + 2) / (2 * np.pi) * np.maximum(cosine, 0) ** exponent
+
+
+def ward(wi, wo, alpha):
+    return ward_anisotropic(wi, wo, alpha, alpha)
+
+
+def ward_duer(wi, wo, alpha):
+    return ward(wi, wo, alpha) / np.sqrt(wi[..., 2] * wo[..., 2])
+
+
+def ward_anisotropic(wi, wo, alpha_x, alpha_y):
+    """Ward 1992, eq. 5a, its exponent by the azimuth."""
+    h = half_vector(wi, wo)
+    tan2 = 1 / h[..., 2] ** 2 - 1
+    phi = np.arctan2(h[..., 1], h[..., 0])
+    exponent = tan2 * (np.cos(phi) ** 2 / alpha_x**2 + np.sin(phi) ** 2 / alpha_y**2)
+    return np.exp(-exponent) / (4 * np.pi * alpha_x * alpha_y * np.sqrt(wi[..., 2] * wo[..., 2]))
+
+
+def schlick(wi, wo, roughness, f0):
+    """Schlick 1994: Z F / (4π cos θi cos θo)."""
+    h = half_vector(wi, wo)
+    t = h[..., 2]
+    zenith = roughness / (1 + roughness * t**2 - t**2) ** 2
+    return zenith * schlick_fresnel(dot(wo, h), f0) / (4 * np.pi * wi[..., 2] * wo[..., 2])
+
+
+def beard_maxwell(wi, wo, sigma, ior, extinction, tau, omega):
+    """Maxwell 1973, first surface; the slopes' normalisation by quadrature."""
+    h = half_vector(wi, wo)
+    tan2 = 1 / h[..., 2] ** 2 - 1
+    integral, _ = quad(lambda theta: np.sin(theta) / (sigma**2 + np.tan(theta) ** 2), 0, np.pi / 2, epsrel=1e-12)
+    total = 2 * np.pi * integral
+    slopes = 1 / (total * h[..., 2] * (sigma**2 + tan2))
+    tilt = np.degrees(np.arccos(h[..., 2])) / omega
+    shadows = (1 + tilt * np.exp(-2 * np.degrees(np.arccos(dot(wo, h))) / tau)) / (1 + tilt)
+    return complex_fresnel(dot(wo, h), ior, extinction) * slopes * shadows / (4 * wi[..., 2] * wo[..., 2])
+
+
+def oren_nayar(wi, wo, sigma, albedo):
+    """Oren & Nayar 1994, full, in angles and azimuths."""
+    theta = np.arccos(np.stack([wi[..., 2], wo[..., 2]]))
+    alpha, beta = theta.max(axis=0), theta.min(axis=0)
+    cosine = np.cos(np.arctan2(wi[..., 1], wi[..., 0]) - np.arctan2(wo[..., 1], wo[..., 0]))
+    s2 = sigma**2
+    c1 = 1 - 0.5 * s2 / (s2 + 0.33)
+    c2 = 0.45 * s2 / (s2 + 0.09) * (np.sin(alpha) - np.where(cosine >= 0, 0, (2 * beta / np.pi) ** 3))
+    c3 = 0.125 * s2 / (s2 + 0.09) * (4 * alpha * beta / np.pi**2) ** 2
+    once = c1 + cosine * c2 * np.tan(beta) + (1 - np.abs(cosine)) * c3 * np.tan((alpha + beta) / 2)
+    twice = 0.17 * albedo * s2 / (s2 + 0.13) * (1 - cosine * (2 * beta / np.pi) ** 2)
+    return np.maximum(once + twice, 0) / np.pi
+
+
+CLOSED_FORMS = {
+    f.__name__: f
+    for f in (
+        lambert, oren_nayar, phong, blinn_phong, lafortune, ward, ward_duer, ward_anisotropic, ashikhmin_shirley,
+        cook_torrance, schlick, beard_maxwell, ggx,
+    )
+}  # fmt: skip

@@ -31,11 +31,30 @@ def direction(theta, phi=0.0):
         (Angle.BETA, direction(30), direction(70), 0),
         (Angle.ALPHA, direction(30, 90), direction(70, 90), 0),
         (Angle.BETA, direction(30, 90), direction(70, 90), 50),
+        (Angle.TILT_X, direction(30), direction(70), 50),  # half vector along the tangent: all of θh is tilt along it
+        (Angle.TILT_Y, direction(30), direction(70), 0),
+        (Angle.TILT_Y, direction(30, 90), direction(70, 90), 50),
+        (Angle.TILT_X, direction(50, 45), direction(50, 45), np.degrees(np.arctan(np.tan(np.radians(50)) * 0.5**0.5))),
+        (Angle.LOBE, direction(30), direction(70), 40),
         (Angle.ALPHA, direction(50, 45), direction(50, 45), np.degrees(np.arccos(np.cos(np.radians(50)) ** 0.5))),
     ],
 )
 def test_angle_of_known_directions(angle, wi, wo, degrees):
     assert np.degrees(angles_numpy(angle, wi, wo)) == pytest.approx(degrees, abs=2e-6)
+
+
+def test_lobe_with_the_axes_of_a_mirror_is_the_mirror_angle():
+    rng = np.random.default_rng(9)
+    wi, wo = directions(rng, 200), directions(rng, 200)
+    mirror = angles_numpy(Angle.LOBE, wi, wo, (-1.0, -1.0, 1.0))
+    np.testing.assert_allclose(mirror, angles_numpy(Angle.THETA_R, wi, wo), atol=1e-12)
+
+
+def test_tilts_along_and_across_make_up_the_half_angle():
+    rng = np.random.default_rng(10)
+    wi, wo = directions(rng, 200), directions(rng, 200)
+    along, across, half = (np.tan(angles_numpy(a, wi, wo)) for a in (Angle.TILT_X, Angle.TILT_Y, Angle.THETA_H))
+    np.testing.assert_allclose(np.hypot(along, across), half, rtol=1e-9)
 
 
 @pytest.mark.parametrize("angle", list(Angle))

@@ -130,13 +130,88 @@ def test_blinn_phong_reflects_at_most_four_times_its_colour(exponent):
         assert directional_albedo(document, theta_o) <= 4 * 1.01
 
 
-def hemisphere_integral(curve, params, power):
-    """∫ f(θ) cos^power θ dω, finely."""
+@pytest.mark.parametrize("exponent", [1.0, 7.0, 50.0])
+def test_phong_reflects_what_its_cosine_lobe_lets_through(exponent):
+    document = {"model": "phong", "params": {"exponent": exponent}}
+    # from above ∫ (s+1)/(2π) cos^(s+1) dω
+    assert directional_albedo(document, 0.0) == pytest.approx((exponent + 1) / (exponent + 2), rel=1e-9)
+    for theta_o in np.radians([20.0, 60.0, 89.0]):
+        assert directional_albedo(document, theta_o) <= 1.0  # the lobe's volume is one, and cosines are at most that
+
+
+@pytest.mark.parametrize("c", [(-1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, -0.3, 0.6), (-0.2, -0.2, 1.0)])
+def test_lafortune_reflects_at_most_a_lobe(c):
+    document = {"model": "lafortune", "params": dict(zip(("c_x", "c_y", "c_z"), c, strict=True)) | {"exponent": 30.0}}
+    assert directional_albedo(document, 0.0) == pytest.approx(c[2] ** 30 / max(map(abs, c)) ** 30, rel=1e-9)
+    for theta_o in np.radians([20.0, 60.0, 89.0]):
+        # |C ∘ wo| is at most the largest C: a lobe of volume (s+2)/(s+1), times cosines
+        assert directional_albedo(document, theta_o) <= 32 / 31
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.3, 0.6, 1.0])
+def test_oren_nayar_reflects_hardly_more_than_arrives(sigma):
+    document = {"model": "oren_nayar", "params": {"sigma": sigma, "albedo": 1.0}}
+    n = np.array([0.0, 0.0, 1.0])
+    variance = sigma**2
+    from_above = 1 - 0.5 * variance / (variance + 0.33) + 0.17 * variance / (variance + 0.13)
+    np.testing.assert_allclose(eval_brdf(document, n, n), from_above / np.pi, rtol=1e-6)
+    if sigma == 0:
+        assert directional_albedo(document, 1.0, 50) == pytest.approx(1.0, abs=1e-9)
+    for theta_o, bound in ((0.0, 1.0), (45.0, 1.0), (75.0, 1.015), (89.0, 1.05)):
+        # the paper fits its functions to numerical integrals; at the rim the fit gives a few per cent too much
+        assert directional_albedo(document, np.radians(theta_o), 120) <= bound + 1e-9
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5])
+def test_ward_reflects_no_more_than_arrives(alpha):
+    n = np.array([0.0, 0.0, 1.0])
+    for model in ("ward", "ward_duer"):
+        peak = eval_brdf({"model": model, "params": {"alpha": alpha}}, n, n)
+        np.testing.assert_allclose(peak, 1 / (4 * np.pi * alpha**2), rtol=1e-12)
+    for theta_o in np.radians([0.0, 30.0, 60.0, 85.0]):
+        assert directional_albedo({"model": "ward", "params": {"alpha": alpha}}, theta_o) <= 1.01
+    both = {"alpha_x": alpha, "alpha_y": 2 * alpha}
+    assert directional_albedo({"model": "ward_anisotropic", "params": both}, 0.0) <= 1.01
+
+
+def test_ward_anisotropic_with_equal_widths_is_ward():
+    rng = np.random.default_rng(11)
+    wi, wo = directions(rng, 300), directions(rng, 300)
+    isotropic = eval_brdf({"model": "ward", "params": {"alpha": 0.3}}, wi, wo)
+    both = eval_brdf({"model": "ward_anisotropic", "params": {"alpha_x": 0.3, "alpha_y": 0.3}}, wi, wo)
+    np.testing.assert_allclose(both, isotropic, rtol=1e-9, atol=1e-300)
+
+
+# terms without masking: what each has in the place of D/4 · 1/((n·wi)(n·wo)), all facets white
+UNMASKED = [
+    ("ward_duer", {"alpha": 0.2}, 4.0),
+    ("ward_duer", {"alpha": 0.6}, 4.0),
+    ("schlick", {"roughness": 0.05, "f0": 1.0}, 1 / np.pi),
+    ("schlick", {"roughness": 1.0, "f0": 1.0}, 1 / np.pi),
+    ("beard_maxwell", {"sigma": 0.2, "ior": 1.0, "extinction": 10.0}, 1.0),
+    ("beard_maxwell", {"sigma": 0.8, "ior": 1.0, "extinction": 10.0}, 1.0),
+]
+
+
+@pytest.mark.parametrize(("model", "params", "scale"), UNMASKED)
+def test_facets_without_masking_reflect_no_more_than_they_project(model, params, scale):
+    """albedo ≤ ∫ D max(wo·h, 0) dωh / cos θo ≤ ∫ D (cos θh + tan θo sin θh max(cos φ, 0)) dωh, dωi = 4 (wo·h) dωh."""
+    curve = TERMS[model].curve("theta_h")
+    across = hemisphere_integral(curve, params, 0, lambda theta: np.sin(theta) / np.pi)
+    for theta_o in np.radians([0.0, 35.0, 60.0, 80.0]):
+        bound = scale * (hemisphere_integral(curve, params, 1) + np.tan(theta_o) * across)
+        assert directional_albedo({"model": model, "params": params}, theta_o) <= bound * 1.001
+    # straight above nothing is hidden: what the facets project is all that is reflected, less those below the horizon
+    assert directional_albedo({"model": model, "params": params}, 0.0) <= 1.01
+
+
+def hemisphere_integral(curve, params, power, factor=np.ones_like):
+    """∫ f(θ) cos^power θ · factor(θ) dω, finely."""
     edges = np.concatenate([[0], np.geomspace(1e-6, np.pi / 2, 400)])
     x, w = np.polynomial.legendre.leggauss(16)
     theta = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1 + x)
     weight = 0.5 * np.diff(edges)[:, None] * w
-    values = curve.generator(theta, params) * np.cos(theta) ** power * np.sin(theta)
+    values = curve.generator(theta, params) * np.cos(theta) ** power * np.sin(theta) * factor(theta)
     return 2 * np.pi * float(np.sum(values * weight))
 
 
@@ -146,6 +221,12 @@ def test_facet_distributions_project_onto_the_surface_they_cover(width):
     assert hemisphere_integral(ggx, {"roughness": width}, 1) == pytest.approx(1.0, rel=1e-8)
     beckmann = TERMS["cook_torrance"].curve("theta_h")  # its D is written without 1/π
     assert hemisphere_integral(beckmann, {"sigma": width}, 1) == pytest.approx(np.pi, rel=1e-8)
+    maxwell = TERMS["beard_maxwell"].curve("theta_h")
+    assert hemisphere_integral(maxwell, {"sigma": width}, 1) == pytest.approx(1.0, rel=1e-8)
+    schlick = TERMS["schlick"].curve("theta_h")  # Z is written without 1/π
+    assert hemisphere_integral(schlick, {"roughness": width}, 1) == pytest.approx(np.pi, rel=1e-8)
+    ward = TERMS["ward_duer"].curve("theta_h")  # projects cos⁴ less than Beckmann; narrow, it is one quarter
+    assert hemisphere_integral(ward, {"alpha": width}, -3) == pytest.approx(0.25, rel=1e-8)
     blinn = TERMS["blinn_phong"].curve("theta_h")
     assert hemisphere_integral(blinn, {"exponent": 1 / width**2}, 1) == pytest.approx(1.0, rel=1e-8)
 
@@ -172,6 +253,21 @@ def test_fresnel_at_the_ends():
     assert fresnel(np.array([0.0]), 1.5, 2.0)[0] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("model", [model for model in MODELS if TERMS[model].fixed])
+def test_fixed_parameters_are_put_in_and_default_to_what_is_declared(model):
+    term = TERMS[model]
+    rng = np.random.default_rng(7)
+    wi, wo = directions(rng, 50), directions(rng, 50)
+    as_declared = term.settled({"model": model})
+    np.testing.assert_array_equal(as_declared.quotient(*wi.T, *wo.T), term.quotient(*wi.T, *wo.T))
+    assert [c.axes for c in as_declared.curves] == [c.axes for c in term.curves]
+    before = eval_brdf({"model": model}, wi, wo)
+    for name in term.fixed:
+        changed = {"model": model, "params": {name: 0.5 * term.parameter(name).default}}
+        assert term.fixed_values(changed) != term.fixed_values({"model": model})
+        assert np.abs(eval_brdf(changed, wi, wo) - before).max() > 1e-4 * before.max()
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_declaration_is_complete_and_consistent(model):
     term = TERMS[model]
@@ -185,7 +281,10 @@ def test_declaration_is_complete_and_consistent(model):
         assert p.scale == "linear" or p.minimum > 0
         assert p.label
         assert p.help
-    assert {name for curve in term.curves for name in curve.parameters} == set(names)
+    generating = {name for curve in term.curves for name in curve.parameters}
+    assert generating | set(term.fixed) == set(names)
+    assert not generating & set(term.fixed)
+    assert bool(term.fixed) == (term.settle is not None)
     angles = [curve.angle for curve in term.curves]
     assert len(set(angles)) == len(angles)
     for curve in term.curves:
@@ -211,7 +310,10 @@ def test_description_is_json_for_every_term():
         ("theta_o", "theta_o", 64, True),
     ]
     roughness = ggx["parameters"][0]
-    assert set(roughness) == {"name", "label", "minimum", "maximum", "default", "unit", "scale", "help"}
+    assert set(roughness) == {"name", "label", "minimum", "maximum", "default", "unit", "scale", "help", "fixed"}
+    assert not roughness["fixed"]
+    fixed = {(entry["model"], p["name"]) for entry in listed for p in entry["parameters"] if p["fixed"]}
+    assert ("oren_nayar", "sigma") in fixed
     assert (roughness["minimum"], roughness["maximum"]) == (0.03, 1.0)
 
 

@@ -12,6 +12,13 @@ from server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("docker/*.md")])
+SYMBOLS = {
+    "alpha": r"\gamma_\alpha",
+    "beta": r"\gamma_\beta",
+    "tilt_x": r"\gamma_x",
+    "tilt_y": r"\gamma_y",
+    "lobe": r"\gamma_C",
+}
 IGNORED_FOLDERS = {"build", "dist", "data", "test-results"}
 
 
@@ -50,7 +57,7 @@ def test_method_lists_every_term_and_its_curves() -> None:
     for model, term in TERMS.items():
         assert model in rows, f"docs/method.md has no row for {model}"
         for curve in term.curves:
-            symbol = {"alpha": r"\gamma_\alpha", "beta": r"\gamma_\beta"}.get(curve.name, "\\" + curve.name)
+            symbol = SYMBOLS.get(curve.name, "\\" + curve.name)
             assert symbol in rows[model], f"docs/method.md leaves out {curve.name} of {model}"
 
 

@@ -116,6 +116,27 @@ def test_models_are_listed(client: TestClient) -> None:
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]
 
 
+def test_library_materials_are_listed_and_can_be_put_into_a_look(client: TestClient, baked: Baked) -> None:
+    listed = {entry["id"]: entry for entry in client.get("/api/materials").json()}
+    nickel = listed["low_cooktorrance_E2/nickel"]
+    assert (nickel["name"], nickel["group"], nickel["model"]) == ("Nickel", "metal", "cook_torrance")
+    look = {"materials": {"Paper": {"terms": nickel["terms"]}}}
+    request = {"bake": baked.bake, "view": "front", "looks": [look], "format": "png", "size": [32, 16]}
+    queued = client.post("/api/renders", json=request)
+    assert queued.status_code == 202, queued.text
+    assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
+
+
+def test_the_map_of_materials_has_points_of_the_library(client: TestClient) -> None:
+    listed = {entry["id"]: entry for entry in client.get("/api/materials").json()}
+    plane = client.get("/api/materials/map").json()
+    for point in plane["points"]:
+        params = listed[point["id"]]["terms"][1]["params"]
+        assert point["sigma"] == params["sigma"]
+        assert point["f0"] == pytest.approx(((params["ior"] - 1) / (params["ior"] + 1)) ** 2)
+    assert {k for triangle in plane["triangles"] for k in triangle} == set(range(len(plane["points"])))
+
+
 def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked) -> None:
     looks = [{}, {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.25, 0, 0]}] * 2}}}]
     looks[1]["materials"]["Paper"]["terms"][1] = {"model": "cook_torrance", "params": {"sigma": 0.5}}

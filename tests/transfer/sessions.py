@@ -38,13 +38,14 @@ def random_term(rng):
     """A term of any model with parameters in a lively range."""
     model = list(TERMS)[rng.integers(len(TERMS))]
     term = {"model": model, "color": rng.uniform(0, 1, 3).round(3).tolist(), "params": {}, "curves": {}}
-    return term | {"params": {p.name: random_value(rng, p) for p in TERMS[model].parameters}}
+    fixed = TERMS[model].fixed
+    return term | {"params": {p.name: random_value(rng, p, p.name in fixed) for p in TERMS[model].parameters}}
 
 
-def random_value(rng, parameter):
-    """A number or three, away from the ends of the parameter's range."""
+def random_value(rng, parameter, is_fixed):
+    """A number or, where it is not fixed at freeze, three, away from the ends of the parameter's range."""
     low, high = parameter.minimum, parameter.maximum
-    at = rng.uniform(0.1, 0.9, 3 if rng.random() < 0.2 else 1)
+    at = rng.uniform(0.1, 0.9, 3 if rng.random() < 0.2 and not is_fixed else 1)
     values = np.exp(np.log(low) + at * np.log(high / low)) if parameter.scale == "log" else low + at * (high - low)
     return values.tolist() if len(values) == 3 else float(values[0])
 
@@ -79,7 +80,10 @@ def random_edit(rng, document):
     term, declared = terms[k], TERMS[terms[k]["model"]]
     if kind == "params" and declared.parameters:
         parameter = declared.parameters[rng.integers(len(declared.parameters))]
-        term["params"] = {**term["params"], parameter.name: random_value(rng, parameter)}
+        term["params"] = {
+            **term["params"],
+            parameter.name: random_value(rng, parameter, parameter.name in declared.fixed),
+        }
     elif kind == "curve":
         curve = declared.curves[rng.integers(len(declared.curves))]
         term["curves"] = {**term["curves"], curve.name: random_curve(rng, curve.num_bands)}

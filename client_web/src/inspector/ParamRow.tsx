@@ -56,7 +56,7 @@ export function ParamRow({ info, value, initial, onChange }: Props) {
       ) : (
         <Slider {...range} label={info.label} value={value} initial={mean(initial)} onChange={onChange} />
       )}
-      {link}
+      {info.fixed ? null : link}
     </div>
   );
 }

@@ -1,0 +1,73 @@
+"""Library materials as terms of a look, from the data file that `relume.look.library.fits` writes.
+
+The numbers are the published fits of Ngan 2005 and Low 2012 to the MERL measurements (Matusik 2003), converted. A
+preset has no texture: what was fitted is the whole colour.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from relume.brdf.registry import TERMS
+
+DATA = Path(__file__).with_name("merl_fits.json")
+
+SOURCES = {
+    "low": "Löw et al. 2012, E2 fit to MERL",
+    "ngan": "Ngan et al. 2005, fit to MERL",
+}
+
+
+@dataclass(frozen=True)
+class Preset:
+    """One material of the library under one model.
+
+    Attributes:
+        id: "table/material". model: of the highlight. group: metal, plastic, paint, fabric, wood, stone or rubber.
+        swatch: its colour under even light, "#rrggbb". terms: as they stand in a look.
+    """
+
+    id: str
+    name: str
+    group: str
+    model: str
+    source: str
+    swatch: str
+    terms: list[dict[str, Any]]
+
+
+def terms_of(model: str, numbers: list[float]) -> list[dict[str, Any]]:
+    """Terms of one row: diffuse RGB, highlight RGB, the model's parameters in their order."""
+    names = [parameter.name for parameter in TERMS[model].parameters]
+    params = dict(zip(names, numbers[6:], strict=True))
+    return [
+        {"model": "lambert", "color": numbers[:3], "texture": None, "params": {}, "curves": {}},
+        {"model": model, "color": numbers[3:6], "texture": None, "params": params, "curves": {}},
+    ]
+
+
+@cache
+def presets() -> tuple[Preset, ...]:
+    """Every material of the library under every model that was fitted to it."""
+    return presets_of(json.loads(DATA.read_text(encoding="utf-8")))
+
+
+def presets_of(data: dict[str, Any]) -> tuple[Preset, ...]:
+    """The presets of a data file's content."""
+    return tuple(
+        Preset(
+            id=f"{table}/{material}",
+            name=material.replace("-", " ").capitalize(),
+            group=data["materials"][material]["group"],
+            model=rows["model"],
+            source=SOURCES[table.partition("_")[0]],
+            swatch=data["materials"][material]["swatch"],
+            terms=terms_of(rows["model"], numbers),
+        )
+        for table, rows in data["tables"].items()
+        for material, numbers in rows["materials"].items()
+    )
