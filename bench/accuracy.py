@@ -20,7 +20,9 @@ from relume.reference import reference_radiance, texels_of
 from relume.trace.embree import EmbreeScene
 from relume.trace.visibility import trace_visibility
 
-_CASES: tuple[tuple[str, dict[str, Any], str], ...] = (
+Case = tuple[str, dict[str, Any], str]
+
+_CASES: tuple[Case, ...] = (
     ("accuracy.lambert", LAMBERT, "theta_i"),
     ("accuracy.cook_torrance_0.2", cook_torrance(0.2), "theta_h"),
     ("accuracy.cook_torrance_0.05", cook_torrance(0.05), "theta_h"),
@@ -28,18 +30,23 @@ _CASES: tuple[tuple[str, dict[str, Any], str], ...] = (
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """All three terms share the shadow rays of an environment."""
-    num_points, num_lights = (20, 200) if tiny else (2000, 4000)
-    errors: dict[str, dict[str, float]] = {name: {} for name, _, _ in _CASES}
-    documents = {name: complete_term(("accuracy",), dict(term), None) for name, term, _ in _CASES}
+    """The three terms that have targets."""
+    return compare(_CASES, 20 if tiny else 2000, tiny)
+
+
+def compare(cases: tuple[Case, ...], num_points: int, tiny: bool) -> list[Figure]:
+    """A figure for each case: its name, the term of pot and table, the curve that is free. They share shadow rays."""
+    num_lights = 200 if tiny else 4000
+    errors: dict[str, dict[str, float]] = {name: {} for name, _, _ in cases}
+    documents = {name: complete_term(("accuracy",), dict(term), None) for name, term, _ in cases}
     for environment in environments()[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
         lit = lit_points(scene, (320, 320), num_points, num_lights, None)
         texels, spp = texels_of(environment), 500 if tiny else 0
         for label, of in ((environment.name, lit), (f"{environment.name} without shadows", _without_shadows(lit))):
-            terms = [[documents[name]] for name, _, _ in _CASES]
+            terms = [[documents[name]] for name, _, _ in cases]
             truth = reference_radiance(of.geometry, texels, of.points, terms, spp)
-            for (name, _, curve), right in zip(_CASES, truth, strict=True):
+            for (name, _, curve), right in zip(cases, truth, strict=True):
                 errors[name][label] = relative_rmse(frame_radiance(of, documents[name], curve), right)
     context = {"view_samples": num_points, "lights": num_lights}
     return [

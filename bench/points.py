@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.daubechies import analysis
-from relume.brdf.curves import curve_bands
+from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.light.triangles import TriangleLights, subdivide
 from relume.reference import Points
@@ -57,14 +57,19 @@ def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
 
 
 def frame_radiance(lit: Lit, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
-    """R = T · c of one term, as a frame computes it, times the term's colour. (n, 3)"""
+    """R = T · c of one term, as a frame computes it, times its colour and curves of the outgoing angle. (n, 3)"""
     frozen = freeze_along(lit, document, active)
     tiles, _, _, samples = frozen.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)
     bands = curve_bands(document, TERMS[document["model"]].curve(active))
     stream(frozen.transport, columns_of(analysis(bands)), image)
     radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: lit.points.num_points]
-    return np.asarray(radiance.astype(np.float64) * np.asarray(document["color"]))
+    factor = np.asarray(document["color"], np.float64)
+    cos_theta_o = np.einsum("nc,nc->n", lit.points.normal, lit.points.wo)
+    for curve in TERMS[document["model"]].curves:
+        if curve.outgoing:
+            factor = factor * curve_values(document, curve, np.arccos(np.clip(cos_theta_o, 0, 1))).T
+    return np.asarray(radiance.astype(np.float64) * factor)
 
 
 def relative_rmse(a: NDArray[Any], b: NDArray[Any]) -> float:
