@@ -14,11 +14,11 @@ from server.guard import Guard
 from server.live.library import open_library
 from server.metrics import Metrics
 from server.protocol import MAX_MESSAGE_BYTES
-from server.routes import bakes, client, health, looks, models, renders, scenes, session, truths
+from server.routes import bakes, client, health, library, looks, models, renders, scenes, session, truths
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
 
-ROUTE_GROUPS = (scenes, models, bakes, renders, truths, looks, session, health)
+ROUTE_GROUPS = (scenes, models, library, bakes, renders, truths, looks, session, health)
 
 
 def create_app(

@@ -11,6 +11,7 @@ import "./ui/controls.css";
 import "./ui/layout.css";
 import "./start/start.css";
 import "./curve/curve.css";
+import "./library/library.css";
 import "./truth/truth.css";
 
 function App() {

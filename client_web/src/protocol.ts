@@ -11,6 +11,7 @@ export type {
   FrameHeader,
   HelloMessage,
   LookEntry,
+  MaterialMapBody,
   PlanBody,
   ProbeAnswer,
   Problem,
@@ -53,6 +54,9 @@ export interface Look {
   lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
   display: { exposure: number; tone_map: string };
 }
+
+/** A library material, its terms in look-document form. */
+export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 
 /** A scene, its default terms in look-document form. */
 export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[] }[] };

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba as nb
@@ -29,13 +30,34 @@ def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-
     return cos_theta_h, cos_theta_d
 
 
-def quotient_ufunc_with(num_fixed: int) -> Callable[[Any], Any]:
+class LateUfunc:
+    """A ufunc that is compiled, or loaded from the cache, when it is first called: few processes need every term."""
+
+    def __init__(self, function: Callable[..., Any], signatures: Sequence[Any]) -> None:
+        self._function, self._signatures = function, signatures
+        self._lock = threading.Lock()
+        self._ufunc: Callable[..., Any] | None = None
+        self.__doc__ = function.__doc__
+
+    def __call__(self, *args: Any) -> Any:
+        """As the ufunc does."""
+        return (self._ufunc or self._made())(*args)
+
+    def _made(self) -> Callable[..., Any]:
+        with self._lock:
+            if self._ufunc is None:
+                make = nb.vectorize(self._signatures, nopython=True, cache=True)  # type: ignore[no-untyped-call]
+                self._ufunc = make(self._function)
+            return self._ufunc
+
+
+def quotient_ufunc_with(num_fixed: int) -> Callable[[Callable[..., Any]], LateUfunc]:
     """Decorator for a quotient that has fixed parameters before the six components of wi and wo.
 
     float32 directions give float32.
     """
     signatures = [kind(*[kind] * (num_fixed + 6)) for kind in (nb.float32, nb.float64)]
-    return nb.vectorize(signatures, nopython=True, cache=True)  # type: ignore[no-any-return, no-untyped-call]
+    return lambda function: LateUfunc(function, signatures)
 
 
 # decorator that makes the ufunc of `Term.quotient`

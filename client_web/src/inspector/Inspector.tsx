@@ -1,4 +1,5 @@
 /** The selected material: its terms as cards. */
+import { libraryOpen, openLibrary } from "../library/library";
 import { commit, edit } from "../state/edit";
 import { pointer, setAt } from "../state/pointer";
 import { defaultLook, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
@@ -40,6 +41,12 @@ export function Inspector() {
   if (material === null || terms.value.length === 0) {
     return (
       <aside class="panel inspector" aria-label="Inspector">
+        <header class="panel-head">
+          <h2>Material</h2>
+          <button aria-pressed={libraryOpen.value} onClick={() => void openLibrary()}>
+            Library
+          </button>
+        </header>
         <p class="hint">
           Click something in the picture, or choose a material on the left, to change how it reflects light.
         </p>
@@ -51,6 +58,9 @@ export function Inspector() {
     <aside class="panel inspector" aria-label="Inspector">
       <header class="panel-head">
         <h2>{material}</h2>
+        <button aria-pressed={libraryOpen.value} onClick={() => void openLibrary()}>
+          Library
+        </button>
         <IconButton
           icon="reset"
           label="Reset this material"

@@ -3,11 +3,14 @@ import type {
   BakeBody,
   BakeRequest,
   DryRunBody,
+  MaterialBody,
+  MaterialMapBody,
   ModelInfo,
   Problem,
   RenderBody,
   RenderRequest,
   SceneBody,
+  Term,
   TruthBody,
   TruthRequest,
 } from "../protocol";
@@ -60,6 +63,12 @@ async function get<T>(path: string): Promise<T> {
 export const listScenes = () => get<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
 export const listModels = () => get<ModelInfo[]>("/api/models");
+export const listMaterials = () => get<MaterialBody[]>("/api/materials");
+export const getMaterialMap = () => get<MaterialMapBody>("/api/materials/map");
+export const materialAt = (f0: number, sigma: number) => get<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
+/** Of a library material, whose id is "table/material". */
+export const materialThumbnail = (id: string) =>
+  `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
 export const getBake = (id: string) => get<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
 
 export const bakesOfScene = (scene: string) => get<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);

@@ -3,27 +3,18 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { hoveredMaterial, transform, wipe } from "../state/store";
 import { select } from "../state/select";
 import { showError } from "../ui/toasts";
+import { acceptMaterials } from "../library/drop";
 import { FalseColourLegend } from "./FalseColourLegend";
 import { PictureBar } from "./PictureBar";
 import { leavePicture, probeAt } from "./probe";
 import { stage } from "./stage";
-import { pan, toPicture, zoomAt } from "./transform";
+import { hitAt } from "./hit";
+import { pan, zoomAt } from "./transform";
 import { Waiting } from "./Waiting";
 import { WipeHandle } from "./WipeHandle";
 
 const CLICK_PX = 4;
 const PAN_PX = 48;
-
-function pixelAt(
-  canvas: HTMLCanvasElement,
-  event: PointerEvent | WheelEvent,
-): { x: number; y: number; px: number; py: number } {
-  const box = canvas.getBoundingClientRect();
-  const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-  const [u, v] = toPicture(transform.peek(), stage.canvasSize(), x, y);
-  const [width, height] = stage.size;
-  return { x, y, px: Math.floor(u * width), py: Math.floor(v * height) };
-}
 
 function useCanvas() {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -40,9 +31,11 @@ function useCanvas() {
     try {
       fit();
       const detach = stage.attach(element);
+      const refuse = acceptMaterials(element);
       observer.observe(element);
       return () => {
         observer.disconnect();
+        refuse();
         detach();
       };
     } catch (error) {
@@ -70,16 +63,15 @@ function usePointer() {
       transform.value = pan(transform.peek(), stage.canvasSize(), dx, dy);
       return;
     }
-    const { px, py } = pixelAt(event.currentTarget as HTMLCanvasElement, event);
+    const { px, py, material } = hitAt(event.currentTarget as HTMLCanvasElement, event);
     probeAt(px, py);
-    hoveredMaterial.value = stage.material(px, py);
+    hoveredMaterial.value = material;
   };
   const up = (event: PointerEvent) => {
     const { moved, active } = drag.current;
     drag.current.active = false;
     if (!active || moved || event.button !== 0) return;
-    const { px, py } = pixelAt(event.currentTarget as HTMLCanvasElement, event);
-    const material = stage.material(px, py);
+    const { material } = hitAt(event.currentTarget as HTMLCanvasElement, event);
     if (material !== null) select(material);
   };
   const leave = () => {
@@ -108,7 +100,7 @@ export function PictureView() {
     const element = canvas.current as HTMLCanvasElement;
     const wheel = (event: WheelEvent) => {
       event.preventDefault();
-      const { x, y } = pixelAt(element, event);
+      const { x, y } = hitAt(element, event);
       const lines = event.deltaMode === 1 ? 30 : 1;
       const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
       transform.value = zoomAt(transform.peek(), stage.canvasSize(), factor, x, y);

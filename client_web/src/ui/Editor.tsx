@@ -1,5 +1,7 @@
 /** The editor's layout: what stands where. Everything but the picture collapses. */
 import { Filmstrip } from "../looks/Filmstrip";
+import { LibraryPanel } from "../library/LibraryPanel";
+import { libraryOpen } from "../library/library";
 import { Inspector } from "../inspector/Inspector";
 import { Outline } from "../outline/Outline";
 import { PictureView } from "../picture/PictureView";
@@ -20,6 +22,7 @@ export function Editor() {
       <div class="middle">
         {outlineOpen.value && <Outline />}
         <PictureView />
+        {libraryOpen.value && <LibraryPanel />}
         {truthOpen.value && <TruthPanel />}
         {inspectorOpen.value && <Splitter />}
         {inspectorOpen.value && <Inspector />}

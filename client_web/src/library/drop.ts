@@ -1,0 +1,30 @@
+/** A library material dragged over the picture: the object below is outlined, and takes it when it is dropped. */
+import { hitAt } from "../picture/hit";
+import { hoveredMaterial } from "../state/store";
+import { DRAG_TYPE, putOn } from "./library";
+
+export function acceptMaterials(canvas: HTMLCanvasElement): () => void {
+  const over = (event: DragEvent) => {
+    if (!event.dataTransfer?.types.includes(DRAG_TYPE)) return;
+    const { material } = hitAt(canvas, event);
+    hoveredMaterial.value = material;
+    if (material !== null) event.preventDefault(); // the browser's word for "may be dropped here"
+  };
+  const drop = (event: DragEvent) => {
+    const id = event.dataTransfer?.getData(DRAG_TYPE);
+    const { material } = hitAt(canvas, event);
+    hoveredMaterial.value = null;
+    if (!id || material === null) return;
+    event.preventDefault();
+    putOn(material, id);
+  };
+  const leave = () => (hoveredMaterial.value = null);
+  canvas.addEventListener("dragover", over);
+  canvas.addEventListener("drop", drop);
+  canvas.addEventListener("dragleave", leave);
+  return () => {
+    canvas.removeEventListener("dragover", over);
+    canvas.removeEventListener("drop", drop);
+    canvas.removeEventListener("dragleave", leave);
+  };
+}

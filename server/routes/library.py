@@ -1,0 +1,74 @@
+"""/api/materials: the library of fitted materials, the map between them, and their thumbnails."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import asdict
+from functools import lru_cache
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.concurrency import run_in_threadpool
+from PIL import Image
+
+from relume.errors import NotFoundError
+from relume.imageio import to_bytes
+from relume.look.library import navigation_map, presets
+from relume.look.terms import complete_term
+from relume.tonemap import tone_map
+from server.bodies import MapPoint, MaterialBody, MaterialMapBody
+
+router = APIRouter(prefix="/api/materials", tags=["materials"])
+THUMBNAIL_SIZE = 64
+_EXPOSURE = 1.0
+Part = Annotated[str, Path(max_length=100)]
+
+
+@router.get("")
+def list_materials() -> list[MaterialBody]:
+    """The library: fitted materials under every model that was fitted to them."""
+    return [MaterialBody(**asdict(preset)) for preset in presets()]
+
+
+@router.get("/map")
+def show_material_map() -> MaterialMapBody:
+    """The library's Cook–Torrance materials in the plane of reflectance and roughness, triangulated (Sun 2007)."""
+    found = navigation_map()
+    return MaterialMapBody(
+        points=[
+            MapPoint(id=preset.id, f0=f0, sigma=sigma)
+            for preset, f0, sigma in zip(found.presets, found.f0.tolist(), found.sigma.tolist(), strict=True)
+        ],
+        triangles=[(a, b, c) for a, b, c in found.triangles.tolist()],
+    )
+
+
+@router.get("/map/at")
+def material_at(
+    f0: Annotated[float, Query(ge=0, le=1)], sigma: Annotated[float, Query(gt=0, le=10)]
+) -> list[dict[str, Any]]:
+    """Terms of any point of the map, between the materials around it."""
+    return navigation_map().at(f0, sigma)
+
+
+@router.get(
+    "/{table}/{material}/thumbnail.png", response_class=Response, responses={200: {"content": {"image/png": {}}}}
+)
+async def thumbnail(table: Part, material: Part) -> Response:
+    """A ball of a library material."""
+    png = await run_in_threadpool(_thumbnail, f"{table}/{material}")
+    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+
+
+@lru_cache(maxsize=1024)
+def _thumbnail(identity: str) -> bytes:
+    from relume.transfer.ball import ball_image  # loads compiled kernels
+
+    preset = next((preset for preset in presets() if preset.id == identity), None)
+    if preset is None:
+        raise NotFoundError(f"the library has no material {identity[:80]!r}; GET /api/materials lists them")
+    terms = [complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)]
+    shown = tone_map(ball_image(terms, THUMBNAIL_SIZE), _EXPOSURE, "agx")
+    buffer = io.BytesIO()
+    Image.fromarray(to_bytes(shown)).save(buffer, "PNG")
+    return buffer.getvalue()

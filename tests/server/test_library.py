@@ -1,0 +1,35 @@
+"""The library of materials over REST."""
+
+import io
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from relume.look.library import presets
+
+
+def test_thumbnail_shows_a_ball(client: TestClient) -> None:
+    preset = presets()[0]
+    answer = client.get(f"/api/materials/{preset.id}/thumbnail.png")
+    assert answer.headers["content-type"] == "image/png"
+    ball = np.asarray(Image.open(io.BytesIO(answer.content)), int)
+    assert ball.shape == (64, 64, 3)
+    assert ball[16:48, 16:48].std() > 3 * max(1, ball[:3].std())
+    assert client.get("/api/materials/low_cooktorrance_E2/nothing/thumbnail.png").status_code == 404
+
+
+def test_point_of_the_map_between_materials_is_a_material(client: TestClient) -> None:
+    points = client.get("/api/materials/map").json()["points"]
+    f0, sigma = (float(np.median([point[axis] for point in points])) for axis in ("f0", "sigma"))
+    terms = client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma}).json()
+    assert [term["model"] for term in terms] == ["lambert", "cook_torrance"]
+    assert terms[1]["params"]["sigma"] == pytest.approx(sigma, rel=1e-6)
+    ior = terms[1]["params"]["ior"]
+    assert ((ior - 1) / (ior + 1)) ** 2 == pytest.approx(f0, rel=1e-6)
+
+
+@pytest.mark.parametrize(("f0", "sigma"), [("nan", "0.1"), ("2", "0.1"), ("0.1", "0"), ("0.1", "inf"), ("x", "0.1")])
+def test_point_that_is_none_is_refused(client: TestClient, f0: str, sigma: str) -> None:
+    assert client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma}).status_code == 422
