@@ -4,7 +4,7 @@ import { formatNumber } from "../ui/scale";
 import { valueAt, yFraction } from "./axes";
 import { put } from "./model";
 import { pchip } from "./pchip";
-import { plotX, plotY, type Frame } from "./Plot";
+import { plotX, plotY, type Frame } from "./frame";
 import { movePoint, removePoint } from "./points";
 import { picked, type Hand } from "./tools";
 
@@ -67,9 +67,8 @@ function onKey(event: KeyboardEvent, hand: Hand, points: Point[], index: number)
 }
 
 export function Handles({ frame, hand, points }: Props) {
-  const edited = hand.channels.some((c) => hand.model.channels[c] !== null);
   return (
-    <g class={`handles ${edited ? "" : "offered"}`}>
+    <g>
       {points.map(([degrees, value], index) => (
         <g
           key={index}

@@ -9,8 +9,10 @@ export const CHANNELS: readonly ChannelName[] = ["r", "g", "b"];
 export type Channels = readonly [Point[] | null, Point[] | null, Point[] | null];
 export type Active = "rgb" | ChannelName;
 
+const CHANNELS_OF: Record<Active, number[]> = { rgb: [0, 1, 2], r: [0], g: [1], b: [2] };
+
 export function channelsOf(active: Active): number[] {
-  return active === "rgb" ? [0, 1, 2] : [CHANNELS.indexOf(active)];
+  return CHANNELS_OF[active];
 }
 
 function bandsOf(bands: number[] | number[][], channel: number, numBands: number): number[] {

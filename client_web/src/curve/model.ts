@@ -1,5 +1,5 @@
 /** The open curve as the editor shows it: the look's points, the server's bands, and how to change them. */
-import type { CurveInfo, CurveMessage, Point, Term } from "../protocol";
+import type { CurveEdits, CurveInfo, CurveMessage, Point } from "../protocol";
 import { edit } from "../state/edit";
 import { niceTop, type Axes } from "./axes";
 import { joined, readChannels, writeChannels, type Channels } from "./channels";
@@ -34,8 +34,13 @@ function same(a: readonly number[] | undefined, b: readonly number[] | undefined
 }
 
 /** What the look and the server say about a curve. Points that were just moved are drawn before the server answers. */
-export function curveModel(path: string, info: CurveInfo, term: Term, shape: CurveMessage | null): CurveModel {
-  const channels = readChannels(term.curves?.[info.name], info.bands);
+export function curveModel(
+  path: string,
+  info: CurveInfo,
+  edits: CurveEdits | undefined,
+  shape: CurveMessage | null,
+): CurveModel {
+  const channels = readChannels(edits, info.bands);
   const ghosts = shape?.generated.map((bands) => bandSamples(bands)) ?? null;
   const lines = channels.map((points, c) => (points === null ? (ghosts?.[c] ?? []) : sampled(points)));
   const generated = shape?.generated;

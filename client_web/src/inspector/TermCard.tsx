@@ -1,4 +1,5 @@
 /** One term of the selected material: model, colour, parameters, and its curves; the open curve unfolds in place. */
+import { useMemo } from "preact/hooks";
 import { CurveEditor } from "../curve/CurveEditor";
 import type { ModelInfo, Rgb, Term } from "../protocol";
 import { edit } from "../state/edit";
@@ -26,6 +27,9 @@ function symbol(label: string): string {
 function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: number }) {
   const open = selectedTerm.value === index ? selectedCurve.value : null;
   const info = model.curves.find((curve) => curve.name === open);
+  const edits = info && term.curves?.[info.name];
+  // the same node for the same curve: moving a parameter leaves the plot alone until the server sends the new shape
+  const editor = useMemo(() => info && <CurveEditor info={info} edits={edits} />, [info, edits]);
   return (
     <>
       <div class="curve-tabs" role="group" aria-label="Curves">
@@ -47,7 +51,7 @@ function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: n
           </button>
         ))}
       </div>
-      {info !== undefined && <CurveEditor info={info} term={term} />}
+      {editor}
     </>
   );
 }

@@ -1,4 +1,5 @@
-/** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset. */
+/** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
+ * Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
 import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
 import { formatNumber, fromFraction, toFraction, type Range } from "./scale";
@@ -25,7 +26,7 @@ const STEPS: Record<string, number> = {
 export function Slider(props: Props) {
   const { label, value, unit = "", initial, tint, onChange } = props;
   const track = useRef<HTMLDivElement>(null);
-  const drag = useRef({ x: 0, at: 0, before: value });
+  const drag = useRef({ x: 0, at: 0, width: 1, before: value });
   const [typing, setTyping] = useState(false);
   const at = toFraction(props, value);
 
@@ -40,13 +41,14 @@ export function Slider(props: Props) {
     element.setPointerCapture(event.pointerId);
     const box = element.getBoundingClientRect();
     const clicked = (event.clientX - box.left) / box.width;
-    drag.current = { x: event.clientX, at, before: event.detail < 2 ? value : drag.current.before };
+    const before = event.detail < 2 ? value : drag.current.before;
+    drag.current = { x: event.clientX, at, width: box.width, before };
     if (Math.abs(clicked - at) * box.width > 7) set(clicked);
   };
   const move = (event: PointerEvent) => {
     const element = track.current as HTMLDivElement;
     if (!element.hasPointerCapture(event.pointerId)) return;
-    const dx = (event.clientX - drag.current.x) / element.clientWidth;
+    const dx = (event.clientX - drag.current.x) / drag.current.width;
     drag.current.x = event.clientX;
     if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
   };
@@ -74,7 +76,7 @@ export function Slider(props: Props) {
         aria-valuemax={props.maximum}
         aria-valuenow={value}
         aria-valuetext={shown}
-        style={{ "--at": at, ...(tint === undefined ? {} : { "--tint": tint }) }}
+        style={tint === undefined ? undefined : { "--tint": tint }}
         onPointerDown={down}
         onPointerMove={move}
         onKeyDown={key}
@@ -83,8 +85,10 @@ export function Slider(props: Props) {
           setTyping(true);
         }}
       >
-        <span class="fill" />
-        <span class="thumb" />
+        <span class="fill" style={{ transform: `scaleX(${at.toFixed(4)})` }} />
+        <span class="way" style={{ transform: `translateX(${(100 * at).toFixed(2)}%)` }}>
+          <span class="thumb" />
+        </span>
         {initial !== undefined && <span class="initial" style={{ left: `${toFraction(props, initial) * 100}%` }} />}
       </div>
       {typing ? (
