@@ -1,6 +1,7 @@
 /** The curve editor's switches: tools and channels above the plot, axes and resets below it. */
 import { IconButton } from "../ui/Button";
 import type { IconName } from "../ui/Icon";
+import { Switch } from "../ui/Switch";
 import { inspectorWidth } from "../state/store";
 import { CHANNELS, type Active } from "./channels";
 import { pointsOf, put } from "./model";
@@ -85,12 +86,7 @@ export function CurveBar({ hand }: { hand: Hand }) {
       >
         log
       </button>
-      <IconButton
-        icon="eye"
-        label="Pointing at the curve tints the pixels it lights"
-        pressed={lights.value}
-        onClick={() => (lights.value = !lights.value)}
-      />
+      <Switch icon="eye" label="Pointing at the curve tints the pixels it lights" of={lights} />
       <IconButton
         icon="table"
         label="Points as numbers"

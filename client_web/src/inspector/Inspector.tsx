@@ -1,8 +1,8 @@
 /** The selected material: its terms as cards. */
 import { libraryOpen, openLibrary } from "../library/library";
-import { commit, edit } from "../state/edit";
-import { pointer, setAt } from "../state/pointer";
-import { defaultLook, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
+import { edit } from "../state/edit";
+import { pointer } from "../state/pointer";
+import { defaultLook, history, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
 import { defaultTerm } from "./terms";
@@ -10,7 +10,8 @@ import { defaultTerm } from "./terms";
 const MAX_TERMS = 8;
 
 function replaceTerms(label: string, material: string, next: unknown): void {
-  if (look.value !== null) commit(label, setAt(look.value, pointer("materials", material, "terms"), next));
+  history.seal();
+  edit(label, pointer("materials", material, "terms"), next);
 }
 
 function AddTerm({ material }: { material: string }) {

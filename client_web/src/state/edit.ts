@@ -1,7 +1,8 @@
 /** The one way to change the look: an undoable operation, and the newest look to the server. */
 import type { Look } from "../protocol";
 import { getAt, setAt } from "./pointer";
-import { history, look } from "./store";
+import { stepName } from "./step";
+import { history, look, models } from "./store";
 
 type Listener = (look: Look, inputTime: number) => void;
 let listener: Listener = () => undefined;
@@ -38,7 +39,7 @@ export function commit(label: string, next: Look, key?: string): void {
 }
 
 /** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */
-export function edit(label: string, path: string, value: unknown): void {
+export function edit(deed: string, path: string, value: unknown): void {
   if (look.value === null || getAt(look.value, path) === value) return;
-  commit(label, setAt(look.value, path, value), path);
+  commit(stepName(path, deed, look.value, models.value), setAt(look.value, path, value), path);
 }

@@ -9,6 +9,8 @@ export interface Latency {
 }
 
 const MAX_KEPT = 1000;
+/** The number on the status bar changes at most this often: painting it must not cost frames. */
+const SHOW_EVERY_MS = 250;
 const waiting: { revision: number; inputTime: number }[] = [];
 const latencies: Latency[] = [];
 
@@ -29,6 +31,14 @@ export function forgetWaiting(): void {
   waiting.length = 0;
 }
 
+let shownTime = -Infinity;
+
+function show(ms: number, now: number): void {
+  if (now - shownTime < SHOW_EVERY_MS) return;
+  shownTime = now;
+  latencyMs.value = ms;
+}
+
 /** A frame of this revision is on the canvas. */
 export function frameDrawn(revision: number): void {
   const drawnTime = performance.now();
@@ -36,6 +46,6 @@ export function frameDrawn(revision: number): void {
     const { revision: sent, inputTime } = waiting.shift() as { revision: number; inputTime: number };
     latencies.push({ revision: sent, inputTime, drawnTime });
     if (latencies.length > MAX_KEPT) latencies.shift();
-    if (waiting[0] === undefined || waiting[0].revision > revision) latencyMs.value = drawnTime - inputTime;
+    if (waiting[0] === undefined || waiting[0].revision > revision) show(drawnTime - inputTime, drawnTime);
   }
 }

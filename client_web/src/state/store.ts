@@ -1,5 +1,5 @@
 /** What the editor knows, as signals. Functions that change it live beside it, one concern per file. */
-import { computed, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
 import { FIT, type Transform } from "../picture/transform";
 import type { BakeBody, CurveMessage, HelloMessage, Look, ModelInfo, ProbeAnswer, SceneBody, Term } from "../protocol";
@@ -61,6 +61,8 @@ export const retryInMs = signal(0);
 /** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
 export const freezing = signal<{ state: "freezing" | "shading"; what: string; progress: number } | null>(null);
 export const exact = signal(false);
+/** Exact, and for a moment: what the status bar says, so that it stands still while a hand drags. */
+export const settled = signal(false);
 export const latencyMs = signal<number | null>(null);
 /** Counts up with every frame that is drawn. */
 export const drawn = signal(0);
@@ -74,3 +76,13 @@ export const helpOpen = signal(false);
 export function modelOf(term: Term): ModelInfo | undefined {
   return models.value.find((model) => model.model === term.model);
 }
+
+const SETTLED_MS = 250;
+effect(() => {
+  if (!exact.value) {
+    settled.value = false;
+    return undefined;
+  }
+  const timer = setTimeout(() => (settled.value = true), SETTLED_MS);
+  return () => clearTimeout(timer);
+});

@@ -3,7 +3,7 @@ import { useComputed } from "@preact/signals";
 import { cancelBake } from "../net/api";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
-import { coming, connection, exact, freezing, latencyMs, look, retryInMs } from "../state/store";
+import { coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
 import { toggleTruth, truthOpen } from "../truth/truth";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
@@ -27,7 +27,7 @@ function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
-  return exact.value ? "exact ✓" : "refining…";
+  return settled.value ? "exact ✓" : "refining…";
 }
 
 function bakeWords(): string {
@@ -59,7 +59,7 @@ export function StatusBar() {
       <span class="latency" title="From the hand to the drawn frame">
         edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
-      <span class={`exactness ${exact.value ? "is-exact" : ""}`}>{pictureWords()}</span>
+      <span class={`exactness ${settled.value ? "is-exact" : ""}`}>{pictureWords()}</span>
       <button aria-pressed={truthOpen.value} title="Compare this picture with brute force" onClick={toggleTruth}>
         How true is this?
       </button>

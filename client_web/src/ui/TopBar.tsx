@@ -22,6 +22,7 @@ import { redo, undo } from "../state/undo";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
 import { Slider } from "./Slider";
+import { Switch } from "./Switch";
 
 function Views() {
   if (views.value.length < 2) return null;
@@ -106,24 +107,9 @@ function Display() {
 function Panels() {
   return (
     <div class="group" role="group" aria-label="Panels">
-      <IconButton
-        icon="left"
-        label="Scene panel"
-        pressed={outlineOpen.value}
-        onClick={() => (outlineOpen.value = !outlineOpen.value)}
-      />
-      <IconButton
-        icon="bottom"
-        label="Looks"
-        pressed={filmstripOpen.value}
-        onClick={() => (filmstripOpen.value = !filmstripOpen.value)}
-      />
-      <IconButton
-        icon="right"
-        label="Inspector"
-        pressed={inspectorOpen.value}
-        onClick={() => (inspectorOpen.value = !inspectorOpen.value)}
-      />
+      <Switch icon="left" label="Scene panel" of={outlineOpen} />
+      <Switch icon="bottom" label="Looks" of={filmstripOpen} />
+      <Switch icon="right" label="Inspector" of={inspectorOpen} />
     </div>
   );
 }
