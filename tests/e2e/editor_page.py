@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Locator, Page
 
-WAIT_MS = 30_000
+WAIT_MS = 120_000
 # A patch is sent within one animation frame, the status bar follows within another.
 SETTLE = """() => new Promise((done) => {
   let left = 4;

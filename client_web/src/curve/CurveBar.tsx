@@ -11,7 +11,7 @@ import type { Hand } from "./tools";
 const TOOLS: { name: Tool; icon: IconName; label: string; keys: string }[] = [
   { name: "points", icon: "points", label: "Points", keys: "P" },
   { name: "draw", icon: "draw", label: "Draw", keys: "D" },
-  { name: "stretch", icon: "stretch", label: "Scale and shift a stretch", keys: "S" },
+  { name: "stretch", icon: "stretch", label: "Scale and shift a stretch", keys: "T" },
 ];
 const ACTIVE: Active[] = ["rgb", ...CHANNELS];
 const WIDE = 560;

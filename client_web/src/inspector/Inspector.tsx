@@ -27,7 +27,7 @@ function AddTerm({ material }: { material: string }) {
         event.currentTarget.value = "";
       }}
     >
-      <option value="">＋ Add a term…</option>
+      <option value="">+ Add a term…</option>
       {models.value.map((m) => (
         <option key={m.model} value={m.model}>
           {m.label}

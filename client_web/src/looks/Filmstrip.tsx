@@ -5,6 +5,7 @@ import { commit } from "../state/edit";
 import { defaultLook, history, look, scene } from "../state/store";
 import { goTo } from "../state/undo";
 import { IconButton } from "../ui/Button";
+import { Icon } from "../ui/Icon";
 import { completed, markLook, saveLook, sideA } from "./compare";
 import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
 import { historyThumbnail, thumbnailsMade } from "./strip";
@@ -187,7 +188,7 @@ export function Filmstrip() {
         disabled={look.value === null}
         title="Save the live look (Ctrl+S)"
       >
-        <span class="plus">＋</span>
+        <Icon name="plus" />
         Save look
       </button>
       {defaultLook.value !== null && shelf.value.length > 0 && (

@@ -2,7 +2,9 @@
 import { toHex } from "../inspector/color";
 import type { MaterialLook } from "../protocol";
 import { select } from "../state/select";
-import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial } from "../state/store";
+import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial, solo } from "../state/store";
+import { toggleSolo } from "../state/solo";
+import { IconButton } from "../ui/Button";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 
 /** A ball in the material's colours: body from its diffuse term, highlight from the rest. */
@@ -43,7 +45,9 @@ function Materials() {
       {materialNames.value.map((name) => {
         const material = look.value?.materials[name];
         const changed =
-          look.value !== null && JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
+          look.value !== null &&
+          material !== defaultLook.value?.materials[name] &&
+          JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
         return (
           <button
             key={name}
@@ -69,11 +73,20 @@ function Materials() {
 }
 
 export function Outline() {
+  const selected = selectedMaterial.value;
   return (
     <nav class="panel outline" aria-label="Scene">
       <header class="panel-head">
         <h2>Materials</h2>
-        <span class="count">{materialNames.value.length}</span>
+        <span class="spacer count">{materialNames.value.length}</span>
+        <IconButton
+          icon="solo"
+          label={selected === null ? "Select a material to show it alone" : `Show ${selected} alone`}
+          keys="S"
+          pressed={solo.value !== null}
+          disabled={selected === null && solo.value === null}
+          onClick={toggleSolo}
+        />
       </header>
       <Materials />
       <EnvironmentPanel />

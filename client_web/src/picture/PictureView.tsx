@@ -5,6 +5,7 @@ import { select } from "../state/select";
 import { showError } from "../ui/toasts";
 import { acceptMaterials } from "../library/drop";
 import { FalseColourLegend } from "./FalseColourLegend";
+import { HistogramView } from "./HistogramView";
 import { PictureBar } from "./PictureBar";
 import { leavePicture, probeAt } from "./probe";
 import { stage } from "./stage";
@@ -123,6 +124,7 @@ export function PictureView() {
         {failure !== null && <p class="failure">{failure}</p>}
         {wipe.value.on && <WipeHandle />}
         <FalseColourLegend />
+        <HistogramView />
         <Waiting />
       </div>
       <PictureBar />

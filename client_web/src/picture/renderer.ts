@@ -17,6 +17,8 @@ export interface DrawState {
   falseColour: boolean;
   wipe: number;
   hover: number;
+  /** Id of the material that is shown alone, -1 for none. */
+  solo: number;
   brush: boolean;
   displayReferred: boolean;
   surround: [number, number, number];
@@ -117,6 +119,7 @@ export class Renderer {
       compare: state.wipe > 0,
       brush: state.brush,
       outline: state.hover >= 0,
+      solo: state.solo >= 0,
     });
     this.bindTextures(state.place[2] / this.size[0] >= NEAREST_FROM);
     gl.uniform2f(program.at("uCanvas"), canvas.width, canvas.height);
@@ -125,6 +128,7 @@ export class Renderer {
     gl.uniform1f(program.at("uGain"), 2 ** state.exposure);
     gl.uniform1f(program.at("uWipe"), state.wipe);
     gl.uniform1i(program.at("uHover"), state.hover);
+    gl.uniform1i(program.at("uSolo"), state.solo);
     gl.uniform3f(program.at("uSurround"), ...state.surround);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }

@@ -14,6 +14,7 @@ export interface Features {
   compare: boolean;
   brush: boolean;
   outline: boolean;
+  solo: boolean;
 }
 
 export const VERTEX = `#version 300 es
@@ -37,6 +38,7 @@ export function fragment(features: Features): string {
     features.compare && "COMPARE",
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
+    features.solo && "SOLO",
   ];
   const lines = defines.flatMap((name) => (name ? [`#define ${name}`] : []));
   return ["#version 300 es", ...lines, BODY].join("\n");
@@ -56,6 +58,7 @@ uniform vec2 uSize;            // pixels of the picture
 uniform float uGain;           // 2^exposure
 uniform float uWipe;           // picture fraction left of which the reference shows
 uniform int uHover;            // material to outline
+uniform int uSolo;             // material that is shown alone
 uniform vec3 uSurround;
 out vec4 outColour;
 
@@ -164,6 +167,9 @@ void main() {
     float grey = dot(colour, vec3(0.2126, 0.7152, 0.0722));
     colour = mix(vec3(grey * 0.6), ACCENT, sqrt(share) * 0.9);
   }
+#endif
+#ifdef SOLO
+  if (idAt(uv) != uSolo) colour = vec3(0.08 + 0.3 * dot(colour, vec3(0.2126, 0.7152, 0.0722)));
 #endif
 #ifdef OUTLINE
   if (outlined(uv)) colour = ACCENT;

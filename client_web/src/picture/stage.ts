@@ -160,6 +160,7 @@ class Stage {
   private settings() {
     const transform = store.transform.value;
     const hovered = store.hoveredMaterial.value;
+    const alone = store.solo.value;
     const { on, at } = store.wipe.value;
     return {
       transform,
@@ -168,6 +169,7 @@ class Stage {
       falseColour: store.falseColour.value,
       wipe: this.reference === null ? -1 : store.showBefore.value ? 2 : on ? at : -1,
       hover: hovered === null || this.ids === null ? -1 : store.materialNames.value.indexOf(hovered),
+      solo: alone === null || this.ids === null ? -1 : store.materialNames.value.indexOf(alone),
       brush: store.brushed.value !== null && this.brush !== null,
     };
   }
@@ -212,6 +214,11 @@ class Stage {
     this.reference = pixels;
     if (pixels !== null) this.renderer?.setReference(pixels);
     this.redraw();
+  }
+
+  /** RGB9_E5 words of the picture, not to be changed. */
+  get words(): Uint32Array {
+    return this.pixels.words;
   }
 
   /** Linear radiance of a pixel; null outside. */

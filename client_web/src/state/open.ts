@@ -32,7 +32,7 @@ function reset(scene: SceneBody): void {
   store.scene.value = scene;
   store.look.value = store.defaultLook.value = null;
   store.bake.value = store.coming.value = null;
-  store.selectedMaterial.value = store.selectedCurve.value = null;
+  store.selectedMaterial.value = store.selectedCurve.value = store.solo.value = null;
   store.transform.value = FIT;
   store.connection.value = "connecting";
   store.freezing.value = null;

@@ -52,6 +52,9 @@ export const brushed = signal<[from: number, to: number] | null>(null);
 
 export const transform = signal<Transform>(FIT);
 export const falseColour = signal(false);
+export const histogramOpen = signal(false);
+/** The material that is shown alone, the others in dim grey; display only, no edit. */
+export const solo = signal<string | null>(null);
 export const wipe = signal<{ on: boolean; at: number }>({ on: false, at: 0.5 });
 export const showBefore = signal(false);
 export const probe = signal<{ x: number; y: number; answer: ProbeAnswer | null } | null>(null);

@@ -3,7 +3,7 @@ import { useComputed } from "@preact/signals";
 import { cancelBake } from "../net/api";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
-import { coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
+import { coming, connection, freezing, latencyMs, look, retryInMs, settled, solo } from "../state/store";
 import { toggleTruth, truthOpen } from "../truth/truth";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
@@ -30,6 +30,10 @@ function pictureWords(): string {
   return settled.value ? "exact ✓" : "refining…";
 }
 
+function soloWords(): string {
+  return solo.value === null ? "" : `Only ${solo.value} is shown, the other materials in grey`;
+}
+
 function bakeWords(): string {
   const next = coming.value;
   if (next === null) return "";
@@ -44,7 +48,7 @@ export function StatusBar() {
   const memory = useMemory();
   // announced: only what changes seldom, without the numbers that run
   const announced = useComputed(() =>
-    [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords()]
+    [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords(), soloWords()]
       .filter(Boolean)
       .join(". "),
   );

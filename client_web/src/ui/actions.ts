@@ -4,11 +4,13 @@ import { markA, saveLook, swapA, toggleWipe } from "../looks/compare";
 import { logarithmic, tool } from "../curve/settings";
 import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
 import { edit } from "../state/edit";
+import { toggleSolo } from "../state/solo";
 import { redo, undo } from "../state/undo";
 import {
   falseColour,
   filmstripOpen,
   helpOpen,
+  histogramOpen,
   inspectorOpen,
   look,
   outlineOpen,
@@ -48,6 +50,8 @@ export const ACTIONS: readonly Action[] = [
   { group: "Picture", label: "Fit", keys: ["f"], run: zoomFit },
   { group: "Picture", label: "One to one", keys: ["1"], run: zoomActual },
   { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
+  { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
+  { group: "Picture", label: "Selected material alone", keys: ["s"], run: toggleSolo },
   { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => expose(-THIRD) },
   { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => expose(THIRD) },
   { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
@@ -67,7 +71,7 @@ export const ACTIONS: readonly Action[] = [
   },
   { group: "Curve", label: "Points", keys: ["p"], run: () => (tool.value = "points") },
   { group: "Curve", label: "Draw", keys: ["d"], run: () => (tool.value = "draw") },
-  { group: "Curve", label: "Scale and shift a stretch", keys: ["s"], run: () => (tool.value = "stretch") },
+  { group: "Curve", label: "Scale and shift a stretch", keys: ["t"], run: () => (tool.value = "stretch") },
   { group: "Curve", label: "Logarithmic values", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
   { group: "Panels", label: "Only the picture", keys: ["\\"], run: togglePanels },
   { group: "Panels", label: "These keys", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
