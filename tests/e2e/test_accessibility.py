@@ -8,7 +8,7 @@ from editor_server import Server
 from playwright.sync_api import Browser, Page
 
 NAMELESS = """() => {
-  const controls = "button, input, select, canvas, a, [role=slider], [role=option], [tabindex='0']";
+  const controls = "button, input, select, canvas:not([aria-hidden]), a, [role=slider], [role=option], [tabindex='0']";
   const text = (e) => [e.getAttribute("aria-label"), ...[...(e.labels ?? [])].map((l) => l.textContent), e.innerText,
     e.querySelector?.("img[alt]:not([alt=''])")?.alt].map((t) => (t ?? "").trim()).filter(Boolean);
   return [...document.querySelectorAll(controls)]
