@@ -17,7 +17,7 @@ from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 
-NUM_LIGHTS, BAKE_S = 200, 120.0
+NUM_LIGHTS, BAKE_S = 200, 300.0
 ARGUMENTS = [
     "--no-sandbox",
     "--use-gl=angle",

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 SIZE = (320, 240)
-START_S = 60.0
+START_S = 240.0
 
 
 class Server:
