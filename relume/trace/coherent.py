@@ -1,0 +1,88 @@
+"""Which light triangles each view sample of a bake sees, with a fraction of the rays.
+
+After Ben-Artzi et al. 2006b, "Efficient shadows from sampled environment maps": few samples are traced, the others are
+predicted, rays go where neighbours disagree, and a prediction found wrong floods its neighbours. Neighbours are samples
+that follow each other, and lights beside each other on the sphere (docs/adr/0013-coherent-shadows.md). Nothing is
+random, and blocks know nothing of each other: the same samples give the same bits whatever the threads.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.color import luminance
+from relume.light.neighbours import neighbours_of
+from relume.light.triangles import TriangleLights
+from relume.parallel import for_ranges
+from relume.trace.coherent_kernel import BLOCK, trace_blocks
+from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+
+F32 = NDArray[np.float32]
+
+_SAMPLES_A_RANGE = 8 * BLOCK
+_STRONG_SHARE = 5e-3  # of all the light; a triangle with more is not predicted: one wrong bit of it could be seen
+
+
+@dataclass(frozen=True)
+class RayCounts:
+    """What prediction saved, and how far it can be believed.
+
+    Attributes:
+        traced: shadow rays. full: those that a full trace takes, all pairs above the horizon.
+        checked: predicted bits that were traced all the same, spread evenly. wrong: those of them that were wrong.
+    """
+
+    traced: int
+    full: int
+    checked: int
+    wrong: int
+
+    @property
+    def wrong_share(self) -> float:
+        """Estimate of the wrong bits among all: the wrong share of the checked, times the share that is predicted."""
+        return self.wrong / max(1, self.checked) * (1 - self.traced / max(1, self.full))
+
+
+@dataclass(frozen=True)
+class Coherent:
+    """Visibility of n view samples.
+
+    Attributes:
+        visible: light m of a sample in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
+        trace_s: wall time of the tracing and predicting alone.
+    """
+
+    visible: NDArray[np.uint8]
+    rays: RayCounts
+    trace_s: float
+
+
+def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, lights: TriangleLights) -> Coherent:
+    """Find what samples see, tracing where it changes and predicting where it does not.
+
+    Args:
+        origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
+        normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
+    Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
+    """
+    bits = np.zeros((len(origins), (lights.num_lights + 7) // 8), np.uint8)
+    arguments = packet_arguments(coherent=True)
+    power = luminance(lights.power)
+    directed = (lights.direction, *neighbours_of(lights.direction), power > _STRONG_SHARE * power.sum())
+    found = [np.zeros(4, np.int64)]
+
+    def kernel(start: int, stop: int) -> None:
+        counts = np.zeros(4, np.int64)
+        trace_blocks(
+            occluded16, scene.handle, arguments.ctypes.data, origins, normals, directed, start, stop, bits, counts
+        )
+        found.append(counts)
+
+    began = time.perf_counter()
+    for_ranges(kernel, len(origins), _SAMPLES_A_RANGE)
+    trace_s = time.perf_counter() - began
+    return Coherent(bits, RayCounts(*(int(count) for count in np.sum(found, axis=0))), trace_s)

@@ -1,0 +1,52 @@
+"""Neighbours of lights on the sphere, against what triangulations of a sphere must be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import studio
+
+from relume.light.neighbours import neighbours_of
+from relume.light.triangles import subdivide
+
+
+def sets_of(neighbours):
+    return [set(part.tolist()) for part in np.split(neighbours.beside, neighbours.first[1:-1])]
+
+
+def random_directions(count):
+    v = np.random.default_rng(3).normal(size=(count, 3))
+    return (v / np.linalg.norm(v, axis=1, keepdims=True)).astype(np.float32)
+
+
+def test_neighbourhood_is_mutual_and_a_triangulation_of_the_sphere():
+    directions = subdivide(studio(), 300).direction
+    beside = sets_of(neighbours_of(directions))
+    assert len(beside) == len(directions)
+    assert all(m not in near for m, near in enumerate(beside))
+    assert all(m in beside[other] for m, near in enumerate(beside) for other in near)
+    assert sum(map(len, beside)) == 6 * len(directions) - 12  # Euler: a triangulation of a sphere has 3n - 6 edges
+
+
+def test_the_nearest_direction_is_a_neighbour():
+    directions = random_directions(200)
+    cosine = directions @ directions.T
+    np.fill_diagonal(cosine, -1)
+    beside = sets_of(neighbours_of(directions))
+    assert all(int(near) in beside[m] for m, near in enumerate(cosine.argmax(axis=1)))
+
+
+def test_a_direction_twice_is_its_twins_neighbour():
+    directions = random_directions(40)
+    directions[17] = directions[4]
+    beside = sets_of(neighbours_of(directions))
+    assert 4 in beside[17]
+    assert 17 in beside[4]
+    assert all(beside)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 8])
+def test_of_a_few_lights_all_are_neighbours(count):
+    beside = sets_of(neighbours_of(random_directions(count))) if count else []
+    assert beside == [set(range(count)) - {m} for m in range(count)]
+    assert neighbours_of(random_directions(count)).first.tolist() == [max(0, count - 1) * m for m in range(count + 1)]

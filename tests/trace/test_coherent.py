@@ -1,0 +1,197 @@
+"""Predicted visibility against the full trace, against a twin in plain Python, and where prediction is hardest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, quad, scene_of, still_life, studio
+
+from relume.color import luminance
+from relume.light.neighbours import neighbours_of
+from relume.light.triangles import TriangleLights, subdivide
+from relume.scene.demo import demo_scene
+from relume.trace.coherent import trace_coherent
+from relume.trace.geometry import merge
+from relume.trace.view_samples import BACKGROUND, sample_view
+from relume.trace.visibility import trace_visibility
+
+UNKNOWN, LIT, HIDDEN, BELOW = range(4)
+# What a bake may differ by from one that traces everything: bits, and relative RMSE of a picture. These pictures are a
+# fiftieth of the usual size, so that shadows change over fewer samples than they do in a bake.
+WRONG_SHARE, PICTURE_CHANGE = 1e-3, 1e-3
+HARDEST_CHANGE = 3e-3  # where every shadow is thinner than a pixel, so that what a pixel sees is chance anyway
+
+
+def bits_of(visible, num_lights):
+    return np.unpackbits(visible, axis=1, bitorder="little")[:, :num_lights].astype(bool)
+
+
+def samples_of(scene, size, view=None):
+    geometry = merge(scene)
+    samples = sample_view(scene, geometry, view or scene.cameras[0].name, size)
+    solid = samples.material != BACKGROUND
+    return geometry, samples.surface.position[solid], samples.surface.normal[solid]
+
+
+def both(scene, size, num_lights):
+    """Bits of the full trace and predicted ones, the cosines, the lights and the counts."""
+    geometry, position, normal = samples_of(scene, size)
+    lights = subdivide(scene.environment.radiance, num_lights)
+    full = trace_visibility(geometry.embree, position, normal, lights.direction)
+    found = trace_coherent(geometry.embree, position, normal, lights)
+    count = lights.num_lights
+    assert found.rays.full == full.num_rays
+    cosine = np.maximum(normal @ lights.direction.T, 0)
+    return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.power[:, 1], found.rays
+
+
+def change(full, predicted, weight):
+    """Relative RMSE of the irradiance."""
+    right, wrong = (full * weight).sum(axis=1), (predicted * weight).sum(axis=1)
+    return np.sqrt(np.mean((wrong - right) ** 2) / np.mean(right**2))
+
+
+def fence():
+    """Wires as thin as a third of a pixel, in front of a floor and a wall: every level's samples look between them."""
+    wires = [
+        quad(f"wire{k}", [[x, 0, 0.5], [x + 0.004, 0, 0.5], [x + 0.004, 1, 0.5], [x, 1, 0.5]], 0)
+        for k, x in enumerate(np.linspace(-1, 1, 41))
+    ]
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
+    wall = quad("wall", [[-2, 0, -0.5], [2, 0, -0.5], [2, 1.5, -0.5], [-2, 1.5, -0.5]], 0)
+    camera = looking("c", [0, 1.6, 2.4], [0, 0.3, 0], 0.7)
+    return scene_of(*wires, floor, wall, camera=camera, environment=studio(64))
+
+
+def lids():
+    """Tiles close above a floor: contact shadows a few pixels wide, between the samples that are traced first."""
+    floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    tiles = [
+        quad(f"lid{k}", [[x, 0.01, z + 0.02], [x + 0.02, 0.01, z + 0.02], [x + 0.02, 0.01, z], [x, 0.01, z]], 0)
+        for k, (x, z) in enumerate(np.random.default_rng(2).uniform(-0.4, 0.4, (30, 2)))
+    ]
+    return scene_of(floor, *tiles, camera=looking("c", [0, 0.6, 1.2], [0, 0, 0], 0.7), environment=studio(64))
+
+
+def first_of(lights, count):
+    return TriangleLights(lights.nodes[..., :count], lights.direction[:count], lights.power[:count])
+
+
+@pytest.mark.parametrize(
+    ("scene", "num_lights", "saving", "bound"),
+    [
+        (demo_scene, 1000, 2.0, PICTURE_CHANGE),
+        (still_life, 300, 1.5, PICTURE_CHANGE),
+        (lids, 1000, 2.0, PICTURE_CHANGE),
+        (fence, 1000, 2.0, HARDEST_CHANGE),
+    ],
+)
+def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bound):
+    full, predicted, weight, rays = both(scene(), (96, 72), num_lights)
+    wrong = (full != predicted).sum() / rays.full
+    assert wrong <= WRONG_SHARE
+    assert change(full, predicted, weight) <= bound
+    assert rays.full > saving * rays.traced
+    assert rays.checked > 0
+    # the estimate is that of what the check saw before it mended it: right to three deviations of the count
+    assert wrong <= rays.wrong_share + 3 * np.sqrt(rays.wrong + 9) / max(1, rays.checked)
+    assert 0.1 < full[weight > 0].mean() < 0.99
+
+
+def twin(seen, facing, position, lights):
+    """The same bits and number of rays, sample by sample, from the answers of a full trace."""
+    neighbours, power = neighbours_of(lights.direction), luminance(lights.power)
+    beside, strong = np.split(neighbours.beside, neighbours.first[1:-1]), power > 5e-3 * power.sum()
+    bits, rays = np.zeros_like(seen), 0
+    for start in range(0, len(seen), 64):
+        rows = np.arange(start, min(start + 64, len(seen)))
+        known = np.zeros_like(seen)
+        everything, nothing = np.ones(seen.shape[1], bool), np.full(seen.shape[1], UNKNOWN)
+        whole, doubt = flood(seen, facing, known, rows, ends(position, rows), nothing, everything, beside)
+        for quarter in np.split(rows, range(16, len(rows), 16)):
+            held, deep = flood(seen, facing, known, quarter, ends(position, quarter), whole, doubt | strong, beside)
+            held, _ = flood(seen, facing, known, quarter, quarter, held, deep | strong, beside)
+            for light in range(seen.shape[1]):
+                number = ((light + quarter[0]) * 2_654_435_761 & 0xFFFFFFFF) * 128 >> 32
+                if number < len(quarter) and held[light] in (LIT, HIDDEN):
+                    row = quarter[number]
+                    assert known[row, light] or not facing[row, light] or seen[row, light] == (held[light] == LIT)
+                    known[row, light] |= facing[row, light]
+            bits[quarter] = np.where(known[quarter], seen[quarter], facing[quarter] & (held == LIT))
+        rays += known.sum()
+    return bits, rays
+
+
+def ends(position, rows):
+    here = position[rows].astype(np.float64)
+    one = np.argmax(((here - here.mean(axis=0)) ** 2).sum(axis=1))
+    return rows[[one, np.argmax(((here - here[one]) ** 2).sum(axis=1))]]
+
+
+def predict(seen, facing, known, rows, light):
+    if not facing[rows, light].any():
+        return BELOW
+    answers = seen[rows, light][known[rows, light]]
+    return UNKNOWN if len(answers) == 0 or answers.any() != answers.all() else LIT if answers.all() else HIDDEN
+
+
+def flood(seen, facing, known, rows, samples, before, doubt, beside):
+    lights = range(seen.shape[1])
+    held = np.array([before[m] if facing[rows, m].any() else BELOW for m in lights])
+    queue = [m for m in lights if held[m] != BELOW and doubt[m]]
+    for m in queue:  # grows as it runs
+        known[samples, m] |= facing[samples, m]
+        held[m] = predict(seen, facing, known, rows, m)
+        answers = seen[rows, m][known[rows, m]]
+        if (before[m] == LIT and not answers.all()) or (before[m] == HIDDEN and answers.any()):
+            queue += [o for o in beside[m] if o not in queue and held[o] != BELOW]
+    doubted = np.zeros(len(held), bool)
+    for m in queue:
+        doubted[m] = held[m] == UNKNOWN or any(held[o] not in (BELOW, held[m]) for o in beside[m])
+    return held, doubted
+
+
+def test_kernel_does_what_its_twin_does():
+    geometry, position, normal = samples_of(still_life(), (24, 18))
+    lights = subdivide(studio(), 300)
+    seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
+    found = trace_coherent(geometry.embree, position, normal, lights)
+    assert found.rays.wrong == 0  # the twin does not mend
+    bits, rays = twin(seen, normal @ lights.direction.T > 0, position, lights)
+    np.testing.assert_array_equal(bits_of(found.visible, lights.num_lights), bits)
+    assert found.rays.traced == rays
+
+
+@pytest.mark.parametrize("num_samples", [1, 2, 15, 17, 63, 65, 130])
+@pytest.mark.parametrize("num_lights", [1, 9])
+def test_any_number_of_samples_and_lights(num_samples, num_lights):
+    geometry, position, normal = samples_of(still_life(), (48, 36))
+    position, normal = position[:num_samples], normal[:num_samples]
+    lights = first_of(subdivide(studio(), 50), num_lights)
+    found = trace_coherent(geometry.embree, position, normal, lights)
+    full = trace_visibility(geometry.embree, position, normal, lights.direction)
+    assert found.visible.shape == full.visible.shape
+    assert found.rays.traced <= found.rays.full == full.num_rays
+    if num_samples <= 2:  # both are traced
+        np.testing.assert_array_equal(found.visible, full.visible)
+    assert not np.unpackbits(found.visible, axis=1, bitorder="little")[:, num_lights:].any()
+
+
+def test_nothing_to_trace_is_no_error():
+    geometry, position, normal = samples_of(still_life(), (24, 18))
+    lights = subdivide(studio(), 50)
+    found = trace_coherent(geometry.embree, position[:0], normal[:0], lights)
+    assert found.visible.shape == (0, 7)
+    assert found.rays.traced == found.rays.full == 0
+    assert found.rays.wrong_share == 0
+
+
+def test_threads_change_neither_bits_nor_counts(monkeypatch):
+    geometry, position, normal = samples_of(still_life(), (96, 72))
+    lights = subdivide(studio(), 100)
+    results = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("RELUME_THREADS", threads)
+        results.append(trace_coherent(geometry.embree, position, normal, lights))
+    np.testing.assert_array_equal(results[0].visible, results[1].visible)
+    assert results[0].rays == results[1].rays
