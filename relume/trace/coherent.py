@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from relume.color import luminance
 from relume.light.neighbours import neighbours_of
-from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges
 from relume.trace.coherent_kernel import BLOCK, trace_blocks
 from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
@@ -61,24 +60,26 @@ class Coherent:
     trace_s: float
 
 
-def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, lights: TriangleLights) -> Coherent:
+def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, directions: F32, power: F32) -> Coherent:
     """Find what samples see, tracing where it changes and predicting where it does not.
 
     Args:
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
+        directions: unit, towards the lights. (m, 3) float32
+        power: what each light gives, per colour; where it is much, nothing is predicted. (m, 3) float32
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
-    bits = np.zeros((len(origins), (lights.num_lights + 7) // 8), np.uint8)
+    bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
     arguments = packet_arguments(coherent=True)
-    power = luminance(lights.power)
-    directed = (lights.direction, *neighbours_of(lights.direction), power > _STRONG_SHARE * power.sum())
+    luminous = luminance(power)
+    lights = (directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
     found = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
         trace_blocks(
-            occluded16, scene.handle, arguments.ctypes.data, origins, normals, directed, start, stop, bits, counts
+            occluded16, scene.handle, arguments.ctypes.data, origins, normals, lights, start, stop, bits, counts
         )
         found.append(counts)
 

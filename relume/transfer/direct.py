@@ -9,6 +9,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular
     views/<k>/visibility                                     samples on surfaces only
+    views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import weigh
 from relume.look import default_look
 from relume.scene.model import Scene
+from relume.trace.coherent import trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
-from relume.trace.visibility import trace_visibility
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
-from relume.transfer.stored import read_lights, read_tiles
+from relume.transfer.stored import SHARD_ROWS, read_lights, read_tiles
 
-CHUNK_ROWS, SHARD_ROWS = 1024, 16_384
+CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SAMPLES_A_PIXEL = 1.5  # upper bound over the scenes measured; edges have two or three
 _SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
@@ -142,13 +143,16 @@ class DirectMethod:
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         # light that may come to any part of a tile is asked for in its middle
         relightable = bool(store.attributes["relightable"])
-        towards = read_tiles(store).centroids.astype(np.float32) if relightable else read_lights(store).direction
+        lights = read_lights(store)
+        towards = read_tiles(store).centroids.astype(np.float32) if relightable else lights.direction
         geometry = self._geometry_of(scene)
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        traced = trace_visibility(geometry.embree, position, normal, towards)
-        return Written({f"{prefix}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
+        found = trace_coherent(geometry.embree, position, normal, towards, lights.power)
+        rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
+        arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
+        return Written(arrays, found.rays.traced, found.trace_s)
 
     def _geometry_of(self, scene: Scene) -> Geometry:
         with self._lock:

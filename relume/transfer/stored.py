@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from relume.errors import StoreError
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
+from relume.trace.coherent import RayCounts
 from relume.transfer.base import StoreReader
 from relume.transfer.projector import Receivers
+
+SHARD_ROWS = 16_384
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
@@ -23,6 +26,16 @@ def read_tiles(store: StoreReader) -> Tiles:
     if not tiles.is_whole():
         raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
     return tiles
+
+
+def read_rays(store: StoreReader) -> RayCounts:
+    """Shadow rays of the whole bake: traced, saved, and how often a prediction was found wrong."""
+    counts = [
+        store.read(f"views/{k}/rays/{shard}")
+        for k in range(len(store.attributes["views"]))
+        for shard in range(-(-store.shape(f"views/{k}/visibility")[0] // SHARD_ROWS))
+    ]
+    return RayCounts(*(int(count) for count in np.sum(counts, axis=0))) if counts else RayCounts(0, 0, 0, 0)
 
 
 def read_receivers(store: StoreReader, k: int, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
