@@ -68,6 +68,7 @@ GROUPS = (
     Group("bench.rotation", ("accuracy.rotation_lambert", "accuracy.rotation_cook_torrance_0.2")),
     Group("bench.rays", ("bake.rays_vs_embreex",)),
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
+    Group("bench.ray_saving", ("bake.ray_saving",)),
     Group("bench.store_size", ("store.bytes_per_view_sample",)),
     Group("bench.workers", ("bake.two_workers_speedup",)),
     Group("bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),

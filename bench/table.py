@@ -28,6 +28,8 @@ TARGETS = {
     "peer.mitsuba_time_ratio": "≥ 1000",
     "bake.rays_vs_embreex": "≥ 3",
     "bake.wall_vs_rays": "≤ 1.3",
+    "bake.teatray_s": "≤ 15 s",
+    "bake.ray_saving": "≥ 3",
     "bake.two_workers_speedup": "≥ 1.8",
     "store.bytes_per_view_sample": "≤ 600",
     "demo.bake_s": "≤ 30 s",

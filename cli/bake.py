@@ -12,6 +12,8 @@ import typer
 from cli.options import Data, SceneName, Scheduler, Size, parse_size
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from relume.transfer.base import Recipe
     from server.settings import Settings
     from worker.scenes import SceneRecord
@@ -84,17 +86,33 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str) 
             status = follow(changes, label)
     except KeyboardInterrupt:
         return _interrupted(service, settings, identity)
-    return _report(status, time.monotonic() - began)
+    return _report(status, settings, time.monotonic() - began)
 
 
-def _report(status: BakeStatus, seconds: float) -> int:
+def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
     """Say how it ended; the id alone goes to stdout."""
+    from worker.paths import bake_path
+
     if status.state != "ready":
         typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
         return 1
     typer.echo(status.id)
     typer.echo(f"{status.bytes / 1e6:,.1f} MB in {seconds:.1f} s", err=True)
+    if status.recipe.method == "direct":
+        _report_rays(bake_path(settings.data, status.id))
     return 0
+
+
+def _report_rays(store: Path) -> None:
+    from relume.store import open_store
+    from relume.transfer.stored import read_rays
+
+    rays = read_rays(open_store(store))
+    typer.echo(
+        f"{rays.traced / 1e6:,.1f} of {rays.full / 1e6:,.1f} M shadow rays traced, the others predicted; "
+        f"wrong by the bake's own check: {100 * rays.wrong_share:.2g} %",
+        err=True,
+    )
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:

@@ -14,11 +14,11 @@ FIXED_NAMES = {
     "frame.bandwidth_ratio", "frame.incremental_rmse", "session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95",
     "canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95", "freeze.curve_switch_s", "accuracy.lambert",
     "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05", "peer.mitsuba_time_ratio", "bake.rays_vs_embreex",
-    "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "store.bytes_per_view_sample",
+    "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "bake.ray_saving", "store.bytes_per_view_sample",
 }  # fmt: skip
 IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.rays",
-    "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms",
+    "bench.bake", "bench.ray_saving", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms",
 ]  # fmt: skip
 WITH_PROCESSES = ["bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth"]
 

@@ -1,0 +1,78 @@
+"""bake.ray_saving: shadow rays of a full trace ÷ those that the bake traced, and what that changed.
+
+The built-in scene, one view, baked twice: as always, and with every ray traced. The row has the bits that differ, the
+bake's own estimate of them, and the relative RMSE between both pictures: of the scene's own look and all Lambert.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.points import relative_rmse
+from bench.scenes import LAMBERT
+from relume.look import complete, validate
+from relume.scene.demo import demo_scene
+from relume.scene.model import Scene
+from relume.store import bake_here, open_store
+from relume.trace.visibility import trace_visibility
+from relume.transfer.base import Recipe, StoreReader, Task, Written
+from relume.transfer.direct import DirectMethod
+from relume.transfer.opened import open_transfer
+from relume.transfer.render import render_image
+from relume.transfer.stored import read_lights, read_rays
+
+
+class _EveryRay(DirectMethod):
+    """The same bake without predictions."""
+
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
+        position = store.read(f"views/{k}/position", task.start, task.stop)
+        normal = store.read(f"views/{k}/normal", task.start, task.stop)
+        embree = self._geometry_of(scene).embree
+        traced = trace_visibility(embree, position, normal, read_lights(store).direction)
+        return Written({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Two bakes, two pictures of each."""
+    scene = demo_scene()
+    recipe = Recipe("direct", ("front",), (64, 48) if tiny else (640, 480), 60 if tiny else 2000)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [
+            bake_here(method, scene, recipe, Path(folder) / f"{k}.zarr")
+            for k, method in enumerate((DirectMethod(), _EveryRay()))
+        ]
+        rays = read_rays(open_store(paths[0]))
+        bits = [np.unpackbits(open_store(path).read("views/0/visibility")) for path in paths]
+        context = {
+            "rays": rays.traced,
+            "full_trace": rays.full,
+            "wrong_bits": float(np.count_nonzero(bits[0] != bits[1]) / rays.full),
+            "estimated_by_the_bake": rays.wrong_share,
+            **_changes(scene, paths),
+            "size": list(recipe.size),
+            "lights": recipe.num_lights,
+        }
+    return [Figure("bake.ray_saving", rays.full / rays.traced, "ratio", context)]
+
+
+def _changes(scene: Scene, paths: list[Path]) -> dict[str, float]:
+    """Relative RMSE between the pictures of two stores."""
+    looks: dict[str, dict[str, Any]] = {
+        "own_look_changes_by": {},
+        "lambert_changes_by": {"materials": {m.name: {"terms": [LAMBERT]} for m in scene.materials}},
+    }
+    changes = {}
+    for name, partial in looks.items():
+        pictures = []
+        for path in paths:
+            transfer = open_transfer(path)
+            look = validate(complete(partial, transfer.default_look), transfer.default_look)
+            pictures.append(render_image(transfer, "front", look))
+        changes[name] = relative_rmse(*pictures)
+    return changes
