@@ -26,6 +26,7 @@ class MaterialImage:
         self._cos_theta_o = view.cos_theta_o[rows]
         self._textures = {name: texture[rows] for name, texture in view.textures.items()}
         self.documents = list(documents)
+        self._rotation = 0.0
         self.terms = [TermImage(document, self._cos_theta_o) for document in documents]
         self._is_current = False
 
@@ -36,12 +37,18 @@ class MaterialImage:
         kept = len(self.terms)
         for k, document in enumerate(documents):
             if k >= kept:
-                self.terms.append(TermImage(document, self._cos_theta_o))
+                self.terms.append(TermImage(document, self._cos_theta_o, self._rotation))
             elif document != self.documents[k]:
                 self.terms[k].set_document(document)
         del self.terms[len(documents) :]
         self.documents = list(documents)
         self._is_current = False
+
+    def set_rotation(self, rotation: float) -> None:
+        """The environment is turned by so many degrees."""
+        self._rotation = rotation
+        for term in self.terms:
+            term.set_rotation(rotation)
 
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""

@@ -29,6 +29,7 @@ class Need:
     Attributes:
         what: in words. key: its name in the cache; equal keys are the same need.
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
+        rotation: of the environment.
         is_default: the term is one of the scene's own look, whose images are kept beside the store.
     """
 
@@ -42,6 +43,7 @@ class Need:
     bands: Mapping[str, NDArray[np.float64]]
     active: str | None
     num_bytes: int
+    rotation: float
     is_default: bool
 
     @property
@@ -58,7 +60,7 @@ class Need:
             CancelledError: `cancelled` said so.
         """
         images, active = self.images, self.active
-        lights = images.transfer.lights
+        lights = images.transfer.lights_at(self.rotation)
 
         def frozen(curve: str) -> Frozen:
             receivers = images.view.receivers(self.material.index)
@@ -153,5 +155,6 @@ def _need(images: ViewImages, candidate: Candidate) -> Need:
         bands=image.target,
         active=curve,
         num_bytes=_num_bytes(candidate),
-        is_default=image.document in images.default.materials[name].terms,
+        rotation=images.rotation,
+        is_default=images.rotation == 0 and image.document in images.default.materials[name].terms,
     )

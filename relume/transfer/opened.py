@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from relume.errors import StoreError
-from relume.light.triangles import TriangleLights
+from relume.light.environment import lookup, turned
+from relume.light.triangles import TriangleLights, weigh
 from relume.store import open_store
 from relume.transfer.base import StoreReader
 from relume.transfer.derived import DerivedImages
-from relume.transfer.stored import read_lights
+from relume.transfer.stored import read_lights, read_tiles
 from relume.transfer.view import View, open_view
+
+_LIGHTS_KEPT = 4
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,27 @@ class Transfer:
     def lights(self) -> TriangleLights:
         """The environment's triangles."""
         return read_lights(self.store)
+
+    @cached_property
+    def environment(self) -> NDArray[np.float32]:
+        """Radiance of the environment. (height, width, 3) float32"""
+        return np.asarray(self.store.read("lights/environment"), np.float32)
+
+    def lights_at(self, rotation: float) -> TriangleLights:
+        """The triangles of the environment turned about +Y by some degrees: the same tiles, weighed again."""
+        return self.lights if rotation == 0 else self._weighed(rotation)
+
+    @cached_property
+    def _weighed(self) -> Callable[[float], TriangleLights]:
+        tiles = read_tiles(self.store)
+        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda rotation: weigh(tiles, self.environment, rotation))
+
+    def background_at(self, view: View, rotation: float) -> NDArray[np.float32]:
+        """Radiance of a view's samples of the turned environment. (n, 3) float32"""
+        if rotation == 0:
+            return view.background()
+        towards = turned(view.background_directions(), -rotation)
+        return lookup(self.environment, towards.astype(np.float32))
 
 
 def open_transfer(path: Path) -> Transfer:

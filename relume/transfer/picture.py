@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
-from relume.errors import EditNotSupportedError, ParameterError
+from relume.errors import ParameterError
 from relume.look import Look
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
@@ -53,18 +53,15 @@ class Picture:
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._baked_rotation = self._look.environment.rotation
+        self._shown_rotation = self._images.rotation
         self._touched: CurvePointer | None = None
 
     def set_look(self, look: Look) -> None:
-        """A new target; nothing is computed yet.
-
-        Raises:
-            EditNotSupportedError: the bake cannot follow it.
-        """
-        if look.environment.rotation != self._baked_rotation:
-            raise EditNotSupportedError(self._transfer.method, "the environment's rotation")
+        """A new target; nothing is computed yet."""
+        before = self._images.rotation
         self._images.set_look(look)
+        if self._images.rotation != before:
+            self._touched = None  # the hand has moved on to the environment
         self._look = look
 
     def touch(self, pointer: str) -> None:
@@ -131,10 +128,11 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        if not np.array_equal(self._gain, self._look.environment.gain):
-            self._gain = np.array(self._look.environment.gain)
+        rotation = images.rotation
+        if rotation != self._shown_rotation or not np.array_equal(self._gain, self._look.environment.gain):
+            self._gain, self._shown_rotation = np.array(self._look.environment.gain), rotation
             first = self._view.num_surface_samples
-            self._radiance[:, first:] = self._view.background().T
+            self._radiance[:, first:] = self._transfer.background_at(self._view, rotation).T
             tiles.update(self._view.all_tiles)
         return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
 

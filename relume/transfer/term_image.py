@@ -31,25 +31,27 @@ class TermImage:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
         active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
-        term: the declaration of the term's model, fixed parameters put in. kind: what tells it from others.
+        term: the declaration of the term's model, fixed parameters put in. kind: what tells it from
+            others, the light included.
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
 
-    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64) -> None:
+    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, rotation: float = 0.0) -> None:
+        self._rotation = rotation
         self._theta_o = np.arccos(cos_theta_o)
         self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
         self.effective: dict[str, F64] | None = None
         self.active: str | None = None
         self.shown: F64 | None = None
         self.is_composed = False
-        self.kind: tuple[str, tuple[float, ...]] | None = None
+        self.kind: tuple[str, tuple[float, ...], float] | None = None
         self.set_document(document)
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
         model: str = document["model"]
-        kind = (model, TERMS[model].fixed_values(document))
+        kind = (model, TERMS[model].fixed_values(document), self._rotation)
         if kind != self.kind:
             self.effective = self.active = self.shown = None
         self.kind = kind
@@ -58,6 +60,11 @@ class TermImage:
         self.target = {curve.name: curve_bands(document, curve) for curve in self.term.curves if not curve.outgoing}
         self.outgoing = self._outgoing()
         self.is_composed = False
+
+    def set_rotation(self, rotation: float) -> None:
+        """The environment is turned: what the image shows counts for nothing, but stands until there is a new one."""
+        self._rotation = rotation
+        self.set_document(self.document)
 
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
         """Go on from an image of these curves, which may have been the target some time ago."""

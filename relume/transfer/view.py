@@ -68,6 +68,10 @@ class View:
         """Radiance of the samples after the surfaces. (n, 3) float32"""
         return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
 
+    def background_directions(self) -> NDArray[np.float64]:
+        """Unit directions in which those samples look. (n, 3)"""
+        return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
+
     def material_ids(self) -> NDArray[np.uint16]:
         """The material that covers most of each pixel, 65535 where that is the background. (height, width)"""
         material = np.full(self.num_view_samples, BACKGROUND, np.uint16)

@@ -19,12 +19,14 @@ class ViewImages:
 
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
+        rotation: of the environment, degrees in [0, 360); 0 is as it was baked.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
         self.default = validate(transfer.default_look, transfer.default_look)
+        self.rotation = 0.0
         self.by_name = {
             name: MaterialImage(self.view, index, self.default.materials[name].terms)
             for index, name in enumerate(transfer.material_names)
@@ -32,6 +34,11 @@ class ViewImages:
 
     def set_look(self, look: Look) -> None:
         """A new target for every term."""
+        rotation = look.environment.rotation % 360
+        if rotation != self.rotation:
+            self.rotation = rotation
+            for material in self.by_name.values():
+                material.set_rotation(rotation)
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
 

@@ -151,6 +151,7 @@ def stream(transport, change, image):
 def radiance_of(transfer, view: View, look):
     """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
     out = np.zeros((view.num_view_samples, 3))
+    lights = transfer.lights_at(look.environment.rotation % 360)
     for index, name in enumerate(transfer.material_names):
         rows = view.rows(index)
         if rows.start == rows.stop:
@@ -159,7 +160,7 @@ def radiance_of(transfer, view: View, look):
         for document in look.materials[name].terms:
             term = TERMS[document["model"]].settled(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-            projector = Projector(term, contract(term, bands, None), transfer.lights, receivers)
+            projector = Projector(term, contract(term, bands, None), lights, receivers)
             image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
             if document["texture"] is not None:
                 image *= view.textures[document["texture"]][rows]
@@ -167,7 +168,7 @@ def radiance_of(transfer, view: View, look):
                 if curve.outgoing:
                     image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
             out[rows] += image
-    out[view.num_surface_samples :] = view.background()
+    out[view.num_surface_samples :] = transfer.background_at(view, look.environment.rotation % 360)
     return np.array(look.environment.gain) * out
 
 

@@ -1,4 +1,4 @@
-/** The light around the scene: how bright it is and its tint. */
+/** The light around the scene: how bright it is, which way it is turned, and its tint. */
 import { ColorField } from "../inspector/ColorField";
 import { edit } from "../state/edit";
 import { defaultLook, look } from "../state/store";
@@ -24,6 +24,19 @@ export function EnvironmentPanel() {
           scale="log"
           unit="×"
           onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
+        />
+      </div>
+      <div class="param alone">
+        <span class="param-label">Rotation</span>
+        <Slider
+          label="Environment rotation"
+          value={shown.rotation}
+          initial={initial.rotation}
+          minimum={-180}
+          maximum={180}
+          scale="linear"
+          unit="°"
+          onChange={(value) => edit("Environment rotation", "/environment/rotation", value)}
         />
       </div>
       <div class="param alone">
