@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,12 @@ class TriangleLights:
     def num_lights(self) -> int:
         """M."""
         return int(self.nodes.shape[2])
+
+    @cached_property
+    def radius(self) -> F32:
+        """Angle within which of its direction all of a light lies: that to its farthest corner, radians. (M,)"""
+        chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
+        return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
 
 
 def _tangent_frame(normal: F64) -> F64:

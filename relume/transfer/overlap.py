@@ -11,28 +11,19 @@ import numba as nb
 import numpy as np
 
 _ONE = np.float32(1)
-_ZERO = np.float32(0)
 # corners closer than this, in bands, count as one: the formula divides by their distance
 _CLOSE = np.float32(1e-4)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def overlap_of(a, b, c):  # type: ignore[no-untyped-def]
-    """What `area_below` needs of a triangle, whose corners have the angles a, b, c in bands, in any order.
+    """What the share below an angle needs of a triangle, whose corners have the angles a, b, c in bands, in any order.
 
     Returns:
-        Smallest, middle and largest angle; 1/((b−a)(c−a)), 1/((c−b)(c−a)) and (c−b)/(c−a) of the sorted ones.
+        Smallest, middle and largest angle; 1/((b−a)(c−a)) and 1/((c−b)(c−a)) of the sorted ones.
     """
-    low, high = min(a, min(b, c)), max(a, max(b, c))
-    middle = a + b + c - low - high
+    smaller, larger = min(a, b), max(a, b)
+    low, middle, high = min(smaller, c), max(smaller, min(larger, c)), max(larger, c)
     rising, falling = max(middle - low, _CLOSE), max(high - middle, _CLOSE)
     width = rising + falling
-    return low, middle, high, _ONE / (rising * width), _ONE / (falling * width), falling / width
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def area_below(y, low, middle, high, rise, fall, rest):  # type: ignore[no-untyped-def]
-    """Share of the triangle's area where the angle is below y, low ≤ y ≤ high; free of branches."""
-    risen = min(y, middle) - low
-    left = high - max(y, middle)
-    return risen * risen * rise + rest - left * left * fall
+    return low, middle, high, _ONE / (rising * width), _ONE / (falling * width)

@@ -1,8 +1,9 @@
-"""The projector's kernels: lists of visible lights, their angles, their division into leaves, their sharing out.
+"""The projector's kernels: the angles of the listed lights, their division into leaves, their sharing out.
 
 A leaf is a triangle over which every angle is linear: a light triangle, or a part of one near an angle's pole
-(appendix A, Ben-Artzi 2006). Leaves are gathered in arrays and spent together, so that each loop is short enough for
-the compiler to keep in registers; arrays handed to a helper inside a hot loop would be counted as references there.
+(appendix A, Ben-Artzi 2006). All triangles of a level are divided together and leaves are gathered in arrays and spent
+together, so that each loop is short enough for the compiler to keep in registers and long enough to fill them; arrays
+handed to a helper inside a hot loop would be counted as references there.
 """
 
 from __future__ import annotations
@@ -12,11 +13,14 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import angle_at, angles_into
-from relume.transfer.overlap import area_below, overlap_of
+from relume.brdf.angles import angles_into
+from relume.transfer.eight_bands import NUM as EIGHT
+from relume.transfer.eight_bands import deposit_eight, mean_of_eight
+from relume.transfer.overlap import overlap_of
 
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
+_BELOW_ONE = np.float32(1 - 2**-24)
 # An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
 # away from the pole, where curves are wider, a share of the angle more.
 _TOLERANCE_BANDS = np.float32(0.12)
@@ -26,35 +30,17 @@ _MAX_DEPTH = 4
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
+_BATCH = 16  # lights divided together
+# Loops run to a multiple of this many triangles: the compiler's vector code rounds otherwise than its code for the
+# rest, and what a triangle gives must not depend on which others are left out.
+_LANES = 32
+_MOST_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
+_MOST_LEAVES = _BATCH * 4**_MAX_DEPTH
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def local_directions(normal, tangent, wo, visible, directions, start, stop, first, light, wi, out):  # type: ignore[no-untyped-def]
-    """List the visible lights of points [start, stop) in their local frames.
-
-    Writes first (points + 1,), light (K,), wi (3, K) and wo as `out` (3, K); returns K.
-    """
-    n = 0
-    for p in range(start, stop):
-        first[p - start] = n
-        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
-        tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
-        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        ox = tx * wo[p, 0] + ty * wo[p, 1] + tz * wo[p, 2]
-        oy = bx * wo[p, 0] + by * wo[p, 1] + bz * wo[p, 2]
-        oz = nx * wo[p, 0] + ny * wo[p, 1] + nz * wo[p, 2]
-        for m in range(directions.shape[0]):
-            if (visible[p, m >> 3] >> (m & 7)) & 1 == 0:
-                continue
-            x, y, z = directions[m, 0], directions[m, 1], directions[m, 2]
-            light[n] = m
-            wi[0, n] = tx * x + ty * y + tz * z
-            wi[1, n] = bx * x + by * y + bz * z
-            wi[2, n] = nx * x + ny * y + nz * z
-            out[0, n], out[1, n], out[2, n] = ox, oy, oz
-            n += 1
-    first[stop - start] = n
-    return n
+@nb.njit(nogil=True, cache=True)
+def _padded(num):  # type: ignore[no-untyped-def]
+    return (num + _LANES - 1) // _LANES * _LANES
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -81,8 +67,9 @@ def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyp
 def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
     """The largest bend over all angles of each light, or `_CULLED` where a dormant curve is nothing all over it.
 
-    gamma: angles at the nodes, in bands. (C, 6, ≥ num). bend: (≥ num,), written.
+    gamma: angles at the nodes, in bands. (C, 6, …). bend: (…), written.
     """
+    num = _padded(num)
     bend[:num] = 0
     for k in range(gamma.shape[0]):
         a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
@@ -97,160 +84,138 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _gather_linear(gamma, num_entries, bend, leaves, shares, of_entry, bent):  # type: ignore[no-untyped-def]
-    """Make a leaf of each light over which all angles are linear; list those that bend in `bent`.
-
-    Returns the number of both.
-    """
-    num = num_bent = 0
-    for entry in range(num_entries):
-        if bend[entry] < 0:
-            continue
-        if bend[entry] <= 1:
-            of_entry[num] = entry
-            num += 1
-        else:
-            bent[num_bent] = entry
-            num_bent += 1
-    shares[:num] = 1
+def _append(gamma, which, count, nodes, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
+    """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves."""
     for k in range(gamma.shape[0]):
         for corner in range(3):
-            for n in range(num):
-                leaves[k, corner, n] = gamma[k, corner, of_entry[n]]
-    return num, num_bent
+            node = nodes[corner]
+            for n in range(count):
+                leaves[k, corner, num + n] = gamma[k, node, which[n]]
+    for n in range(count):
+        of_entry[num + n] = origin[which[n]]
+    shares[num : num + count] = share
+    return num + count
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _quarter(gamma, entry, share, leaves, shares, num):  # type: ignore[no-untyped-def]
-    """Append the four triangles that the midpoints of an entry's edges make; returns the new number of leaves."""
-    for child in range(4):
-        for k in range(gamma.shape[0]):
-            for corner in range(3):
-                leaves[k, corner, num] = gamma[k, _CHILDREN[child, corner], entry]
-        shares[num] = _QUARTER * share
-        num += 1
-    return num
+def _sort_out(gamma, bend, num_triangles, level, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
+    """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
 
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, scaled_wo, local, gamma, entry, stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num
-):
-    """Divide an entry's triangle in four until its angles are linear, depth first (appendix A).
-
-    Chord areas share out the light. Appends to the corner angles of the leaves (C, 3, n) and their shares (n,); returns
-    their new number.
+    Args:
+        origin: light that each triangle is a part of.
+        lists: scratch for the numbers of triangles; those that must be divided further are left in lists[2].
+    Returns:
+        The new number of leaves, and how many must be divided.
     """
-    num_curves = kinds.shape[0]
-    for corner in range(3):
-        for axis in range(3):
-            stack[0, corner, axis] = local[axis, corner, entry]
-        for k in range(num_curves):
-            stack_gamma[0, k, corner] = gamma[k, corner, entry]
-    depth[0] = 0
-    top = 1
-    while top > 0:
-        top -= 1
-        level = depth[top]
-        dirs[:3] = stack[top]
-        for edge in range(3):
-            following = (edge + 1) % 3
-            x = dirs[edge, 0] + dirs[following, 0]
-            y = dirs[edge, 1] + dirs[following, 1]
-            z = dirs[edge, 2] + dirs[following, 2]
-            inverse = np.float32(1) / math.sqrt(x * x + y * y + z * z)
-            dirs[3 + edge, 0], dirs[3 + edge, 1], dirs[3 + edge, 2] = x * inverse, y * inverse, z * inverse
-        bend = np.float32(0)
-        for k in range(num_curves):
-            g = own_gamma[k, :, 0]
-            for corner in range(3):
-                g[corner] = stack_gamma[top, k, corner]
-            ox, oy, oz = scaled_wo[k, 0], scaled_wo[k, 1], scaled_wo[k, 2]
-            for node in range(3, 6):
-                g[node] = scale[k] * angle_at(kinds[k], dirs[node, 0], dirs[node, 1], dirs[node, 2], ox, oy, oz)
-            bend = max(bend, _bend_of(g[0], g[1], g[2], g[3], g[4], g[5]))
-        share = _QUARTER**level
-        if bend <= 1:
-            leaves[:, :, num] = own_gamma[:, :3, 0]
-            shares[num] = share
-            num += 1
-        elif bend <= _QUARTERED_BEND or level == _MAX_DEPTH - 1:
-            num = _quarter(own_gamma, 0, share, leaves, shares, num)
-        else:
-            for child in range(4):
-                for corner in range(3):
-                    node = _CHILDREN[child, corner]
-                    for axis in range(3):
-                        stack[top + child, corner, axis] = dirs[node, axis]
-                    for k in range(num_curves):
-                        stack_gamma[top + child, k, corner] = own_gamma[k, node, 0]
-                depth[top + child] = level + 1
-            top += 4
-    return num
+    num_whole = num_quartered = num_divided = 0
+    is_last = level == _MAX_DEPTH - 1
+    for n in range(num_triangles):
+        lists[0, num_whole] = n
+        lists[1, num_quartered] = n
+        lists[2, num_divided] = n
+        is_whole, is_simple = bend[n] <= 1, bend[n] <= _QUARTERED_BEND or is_last
+        num_whole += (bend[n] >= 0) & is_whole
+        num_quartered += is_simple & (not is_whole)
+        num_divided += (not is_simple) & (not is_whole)
+    share = _QUARTER**level
+    num = _append(gamma, lists[0], num_whole, (0, 1, 2), origin, share, leaves, shares, of_entry, num)
+    for child in range(4):
+        nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
+        part = _QUARTER * share
+        num = _append(gamma, lists[1], num_quartered, nodes, origin, part, leaves, shares, of_entry, num)
+    return num, num_divided
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _multiply_means(corner, bands, num_bands, is_gray, num, weight):  # type: ignore[no-untyped-def]
+def _children(local, gamma, origin, which, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
+    """Corners of the four children of the listed triangles, and the midpoints of their edges. Returns their number."""
+    for child in range(4):
+        begin = child * count
+        for corner in range(3):
+            node = _CHILDREN[child, corner]
+            for n in range(count):
+                for axis in range(3):
+                    child_local[axis, corner, begin + n] = local[axis, node, which[n]]
+                for k in range(gamma.shape[0]):
+                    child_gamma[k, corner, begin + n] = gamma[k, node, which[n]]
+        for n in range(count):
+            child_origin[begin + n] = origin[which[n]]
+    for edge in range(3):
+        following = (edge + 1) % 3
+        for n in range(_padded(4 * count)):
+            x = child_local[0, edge, n] + child_local[0, following, n]
+            y = child_local[1, edge, n] + child_local[1, following, n]
+            z = child_local[2, edge, n] + child_local[2, following, n]
+            inverse = np.float32(1) / math.sqrt(x * x + y * y + z * z)
+            child_local[0, 3 + edge, n] = x * inverse
+            child_local[1, 3 + edge, n] = y * inverse
+            child_local[2, 3 + edge, n] = z * inverse
+    return 4 * count
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
+    """Angles of all curves at nodes [first_node, 6) of the first triangles, in bands.
+
+    wo: times `Curve.axes`, one for each curve. (C, 3). gamma: (C, 6, …), written.
+    """
+    num = _padded(num)
+    for k in range(kinds.shape[0]):
+        for node in range(first_node, 6):
+            angles_into(
+                kinds[k], scale[k], local[0, node, :num], local[1, node, :num], local[2, node, :num],
+                wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node],
+            )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
+    """`overlap_of` of leaves, angles held below the last band's end. corner: (3, n), overlap: (5, n), written."""
+    end = np.float32(num_bands) * _BELOW_ONE
+    for n in range(num):
+        low, middle, high, rise, fall = overlap_of(
+            min(corner[0, n], end), min(corner[1, n], end), min(corner[2, n], end)
+        )
+        overlap[0, n], overlap[1, n], overlap[2, n] = low, middle, high
+        overlap[3, n], overlap[4, n] = rise, fall
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _multiply_means(overlap, bands, num_bands, num_channels, num, weight):  # type: ignore[no-untyped-def]
     """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
 
     Args:
-        corner: the angle at the leaves' corners, in bands. (3, n). bands: of the curve. (≥ num_bands, 3)
-        is_gray: the curve is the same in all channels.
+        overlap: from `_overlaps`. bands: of the curve, padded. (3, ≥ num_bands + 8)
+        num_channels: 1 where the curve is the same in all channels, else 3.
     """
-    last = np.uint64(num_bands - 1)
+    last = num_bands - 1
     for n in range(num):
-        low, middle, high, rise, fall, rest = overlap_of(corner[0, n], corner[1, n], corner[2, n])
-        first_band, last_band = min(np.uint64(low), last), min(np.uint64(high), last)
-        below = red = green = blue = np.float32(0)
-        for j in range(first_band, last_band):
-            upto = area_below(np.float32(j + np.uint64(1)), low, middle, high, rise, fall, rest)
-            red += (upto - below) * bands[j, 0]
-            if not is_gray:
-                green += (upto - below) * bands[j, 1]
-                blue += (upto - below) * bands[j, 2]
-            below = upto
-        rest = np.float32(1) - below
-        red += rest * bands[last_band, 0]
-        weight[0, n] *= red
-        weight[1, n] *= red if is_gray else green + rest * bands[last_band, 1]
-        weight[2, n] *= red if is_gray else blue + rest * bands[last_band, 2]
+        first_band, last_band = min(np.int64(overlap[0, n]), last), min(np.int64(overlap[2, n]), last)
+        mean = np.float32(0)
+        for channel in range(num_channels):
+            mean = np.float32(0)
+            for band in range(first_band, last_band + 1, EIGHT):
+                mean += mean_of_eight(
+                    bands, channel, band,
+                    overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n],
+                )  # fmt: skip
+            weight[channel, n] *= mean
+        for channel in range(num_channels, 3):
+            weight[channel, n] *= mean
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _deposit(corner, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
-    """Share leaves out to the bands of the free curve (eq. 22). corner: (3, n), weight: (3, n), out: (J, 3)."""
-    last = np.uint64(num_bands - 1)
+def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
+    """Share leaves out to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
+    last = num_bands - 1
     for n in range(num):
-        low, middle, high, rise, fall, rest = overlap_of(corner[0, n], corner[1, n], corner[2, n])
-        first_band, last_band = min(np.uint64(low), last), min(np.uint64(high), last)
-        red, green, blue = weight[0, n], weight[1, n], weight[2, n]
-        below = np.float32(0)
-        for j in range(first_band, last_band):
-            upto = area_below(np.float32(j + np.uint64(1)), low, middle, high, rise, fall, rest)
-            out[j, 0] += (upto - below) * red
-            out[j, 1] += (upto - below) * green
-            out[j, 2] += (upto - below) * blue
-            below = upto
-        rest = np.float32(1) - below
-        out[last_band, 0] += rest * red
-        out[last_band, 1] += rest * green
-        out[last_band, 2] += rest * blue
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spend(leaves, num, num_bands, bands, is_gray, active, weight, out):  # type: ignore[no-untyped-def]
-    """Weigh the leaves by the dormant curves and share them out."""
-    for k in range(leaves.shape[0]):
-        if k != active:
-            _multiply_means(leaves[k], bands[k], num_bands[k], is_gray[k], num, weight)
-    if active >= 0:
-        _deposit(leaves[active], num_bands[active], num, weight, out)
-        return
-    for channel in range(3):
-        total = np.float32(0)
-        for n in range(num):
-            total += weight[channel, n]
-        out[0, channel] += total
+        first_band, last_band = min(np.int64(overlap[0, n]), last), min(np.int64(overlap[2, n]), last)
+        for band in range(first_band, last_band + 1, EIGHT):
+            deposit_eight(
+                out, band,
+                overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n],
+                weight[0, n], weight[1, n], weight[2, n],
+            )  # fmt: skip
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -266,61 +231,81 @@ def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out):  # type: ignore[no-untyped-def]
+    """Weigh the leaves by the dormant curves and share them out."""
+    for k in range(leaves.shape[0]):
+        if k != active:
+            _overlaps(leaves[k], num_bands[k], num, overlap)
+            _multiply_means(overlap, bands[k], num_bands[k], num_channels[k], num, weight)
+    if active >= 0:
+        _overlaps(leaves[active], num_bands[active], num, overlap)
+        _deposit(overlap, num_bands[active], num, weight, out)
+        return
+    for channel in range(3):
+        total = np.float32(0)
+        for n in range(num):
+            total += weight[channel, n]
+        out[channel, 0] += total
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, power,
-    kinds, axes, num_bands, bands, is_gray, support, active, start, stop, out,
+    kinds, axes, num_bands, bands, num_channels, support, active, start, stop, out,
 ):  # fmt: skip
-    """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their visible lights.
+    """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their lights.
 
-    out: (points, J, 3) float32, added to.
+    out: (points, 3, J padded by 8) float32, added to.
     """
     num_curves, num_lights = kinds.shape[0], nodes.shape[2]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    local = np.empty((3, 6, num_lights), np.float32)
-    gamma = np.empty((num_curves, 6, num_lights), np.float32)
-    capacity = num_lights + 2 * 4**_MAX_DEPTH
-    leaves = np.empty((num_curves, 3, capacity), np.float32)
-    shares, of_entry = np.empty(capacity, np.float32), np.empty(capacity, np.int64)
-    weight, bend = np.empty((3, capacity), np.float32), np.empty(num_lights, np.float32)
-    bent = np.empty(num_lights, np.int64)
-    stack, depth = np.empty((3 * _MAX_DEPTH + 4, 3, 3), np.float32), np.empty(3 * _MAX_DEPTH + 4, np.int64)
-    stack_gamma = np.empty((3 * _MAX_DEPTH + 4, num_curves, 3), np.float32)
-    dirs, own_gamma = np.empty((6, 3), np.float32), np.empty((num_curves, 6, 1), np.float32)
+    room = _padded(num_lights)
+    widest = max(room, _MOST_DIVIDED)
+    local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
+    origin, lists, bend = np.arange(widest), np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
+    # two generations of divided triangles
+    part_local, part_gamma = (
+        np.zeros((2, 3, 6, _MOST_DIVIDED), np.float32), np.zeros((2, num_curves, 6, _MOST_DIVIDED), np.float32),
+    )  # fmt: skip
+    part_origin = np.empty((2, _MOST_DIVIDED), np.int64)
+    divided = np.empty(num_lights, np.int64)
+    capacity = 4 * num_lights + _MOST_LEAVES
+    leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
+    of_entry = np.empty(capacity, np.int64)
+    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
     scaled_wo = np.empty((num_curves, 3), np.float32)
-    one = np.float32(1)
     for p in range(start, stop):
         row = p - start
-        begin, end = first[row], first[row + 1]
-        if begin == end:
+        begin, num_entries = first[row], first[row + 1] - first[row]
+        if num_entries == 0:
             continue
-        if num_curves > 0:
-            _turn_nodes(normal[p], tangent[p], nodes, light, begin, end, local)
         for k in range(num_curves):
             for axis in range(3):
                 scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
-            for node in range(6):
-                angles_into(
-                    kinds[k], scale[k], local[0, node, : end - begin], local[1, node, : end - begin],
-                    local[2, node, : end - begin], scaled_wo[k, 0], scaled_wo[k, 1], scaled_wo[k, 2], gamma[k, node],
-                )  # fmt: skip
-        _bends(gamma, support, end - begin, bend)
-        num, num_bent = _gather_linear(gamma, end - begin, bend, leaves, shares, of_entry, bent)
-        for b in range(num_bent):
-            entry = bent[b]
-            if num + 4**_MAX_DEPTH > capacity:
+        if num_curves > 0:
+            _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
+        _angles(kinds, scale, scaled_wo, local, 0, num_entries, gamma)
+        _bends(gamma, support, num_entries, bend)
+        num, num_divided = _sort_out(gamma, bend, num_entries, 0, origin, leaves, shares, of_entry, 0, lists)
+        divided[:num_divided] = lists[2, :num_divided]
+        for batch in range(0, num_divided, _BATCH):
+            if num + _MOST_LEAVES > capacity:
                 _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-                _spend(leaves, num, num_bands, bands, is_gray, active, weight, out[row])
+                _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out[row])
                 num = 0
-            before = num
-            if bend[entry] <= _QUARTERED_BEND:
-                num = _quarter(gamma, entry, one, leaves, shares, num)
-            else:
-                num = _divide(
-                    kinds, scale, scaled_wo, local, gamma, entry,
-                    stack, stack_gamma, depth, dirs, own_gamma, leaves, shares, num,
-                )  # fmt: skip
-            of_entry[before:num] = entry
+            count = min(_BATCH, num_divided - batch)
+            lists[2, :count] = divided[batch : batch + count]
+            of_local, of_gamma, of_origin = local, gamma, origin
+            for level in range(1, _MAX_DEPTH):
+                to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
+                num_parts = _children(of_local, of_gamma, of_origin, lists[2], count, to_local, to_gamma, to_origin)
+                _angles(kinds, scale, scaled_wo, to_local, 3, num_parts, to_gamma)
+                _bends(to_gamma, support, num_parts, bend)
+                num, count = _sort_out(
+                    to_gamma, bend, num_parts, level, to_origin, leaves, shares, of_entry, num, lists
+                )
+                of_local, of_gamma, of_origin = to_local, to_gamma, to_origin
         _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-        _spend(leaves, num, num_bands, bands, is_gray, active, weight, out[row])
+        _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out[row])

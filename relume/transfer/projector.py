@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
-from relume.transfer.project_kernel import local_directions, project_points
+from relume.transfer.eight_bands import NUM as EIGHT
+from relume.transfer.listing import list_lights
+from relume.transfer.project_kernel import project_points
 
 F32 = NDArray[np.float32]
 
@@ -48,8 +50,8 @@ class Contraction:
         kinds: `Angle` of each curve that depends on wi. (C,) int64
         axes: `Curve.axes` of each. (C, 3) float32
         num_bands: (C,) int64
-        bands: padded with the last band. (C, max J, 3) float32
-        is_gray: the curve is the same in all channels. (C,) bool
+        bands: padded with the last band. (C, 3, max J + 8) float32
+        num_channels: 1 where the curve is the same in all channels, else 3. (C,) int64
         support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
         constant: product of the curves, where all are flat and none is listed. (3,) float32
         active: index of the free curve, -1 for none.
@@ -59,7 +61,7 @@ class Contraction:
     axes: F32
     num_bands: NDArray[np.int64]
     bands: F32
-    is_gray: NDArray[np.bool_]
+    num_channels: NDArray[np.int64]
     support: F32
     constant: F32
     active: int
@@ -97,14 +99,14 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
         curves = []
     rows = [bands[curve.name] for curve in curves]
     free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
-    widest = max((row.shape[1] for row in rows), default=1)
+    widest = max((row.shape[1] for row in rows), default=1) + EIGHT
     padded = [np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge") for row in rows]
     return Contraction(
         np.array([int(curve.angle) for curve in curves], np.int64),
         np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
         np.array([row.shape[1] for row in rows], np.int64),
-        np.ascontiguousarray(np.array(padded, np.float32).reshape(len(rows), 3, widest).transpose(0, 2, 1)),
-        np.array([bool(np.all(row == row[0])) for row in rows], np.bool_),
+        np.array(padded, np.float32).reshape(len(rows), 3, widest),
+        np.array([1 if np.all(row == row[0]) else 3 for row in rows], np.int64),
         np.array([np.inf if k == free else _support(row) for k, row in enumerate(rows)], np.float32),
         constant.astype(np.float32),
         free,
@@ -117,9 +119,11 @@ class Projector:
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
         self._term, self._contraction, self._lights, self._receivers = term, contraction, lights, receivers
         self._power = lights.power * contraction.constant
+        # radians
+        self._support = contraction.support * np.float32(np.pi / 2) / contraction.num_bands.astype(np.float32)
         capacity = _POINTS_A_BLOCK * lights.num_lights
         self._first = np.empty(_POINTS_A_BLOCK + 1, np.int64)
-        self._light = np.empty(capacity, np.int32)
+        self._light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
 
     def project(self, start: int, stop: int) -> F32:
@@ -128,20 +132,24 @@ class Projector:
         Returns:
             (stop - start, J, 3) float32; J = 1 where no curve is free.
         """
-        out = np.zeros((stop - start, self._contraction.num_columns, 3), np.float32)
+        num_columns = self._contraction.num_columns
+        out = np.zeros((stop - start, 3, num_columns + EIGHT), np.float32)
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-        return out
+        return out[:, :, :num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         r, lights, c = self._receivers, self._lights, self._contraction
-        num = local_directions(
+        num = list_lights(
             r.normal,
             r.tangent,
             r.wo,
             r.visible,
             lights.direction,
+            lights.radius,
+            c.kinds,
+            self._support,
             start,
             stop,
             self._first,
@@ -165,7 +173,7 @@ class Projector:
             c.axes,
             c.num_bands,
             c.bands,
-            c.is_gray,
+            c.num_channels,
             c.support,
             c.active,
             start,
