@@ -25,6 +25,8 @@ TARGETS = {
     "accuracy.lambert": "≤ 0.5 %",
     "accuracy.cook_torrance_0.2": "≤ 0.8 %",
     "accuracy.cook_torrance_0.05": "≤ 4 %",
+    "pca.blinn_phong_6": "≤ 1e-3",
+    "pca.vectors": "≤ 12",
     "peer.mitsuba_time_ratio": "≥ 1000",
     "bake.rays_vs_embreex": "≥ 3",
     "bake.wall_vs_rays": "≤ 1.3",
@@ -41,7 +43,7 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.", "paper.")) or name == "frame.incremental_rmse"
+        if name.startswith(("accuracy.", "truth.", "paper.", "pca.")) or name == "frame.incremental_rmse"
         else "performance.md"
     )
 

@@ -1,0 +1,64 @@
+"""pca.*: how few vectors stand for the curves of a parameter (Nguyen 2010, section 4 and figure 5).
+
+Norm of `pca.blinn_phong_6`: √mean (linearised − exact)² ÷ √mean exact² over all bands and values of the parameter, the
+exponent evenly spaced over [3, 300] as in the paper, 256 bands; decomposed at 298 values, measured at those between.
+`pca.vectors` is the largest number of vectors, over all terms and sliders, that holds this norm to 1e-3; in its context
+are the errors of each slider with 2 to 16 vectors: over all values, and at the worst of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.figure import Figure
+from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
+from relume.brdf.registry import TERMS
+from relume.brdf.sweep import bands_at, moved_curves, slider_values
+from relume.brdf.term import F64, Parameter, Term
+
+_NUM_VECTORS = (2, 4, 6, 8, 10, 12, 16)
+_BOUND = 1e-3
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """The paper's curve first, then every slider of every term."""
+    num = 12 if tiny else 129
+    exponent = replace(TERMS["blinn_phong"].parameter("exponent"), minimum=3.0, maximum=300.0, scale="linear")
+    paper = _errors(TERMS["blinn_phong"], exponent, 12 if tiny else 298)
+    needed, context = 0, {}
+    for term in TERMS.values():
+        for parameter in term.parameters:
+            if not moved_curves(term, parameter.name):
+                continue
+            errors = _errors(term, parameter, num)
+            enough = [k for k, (overall, _) in errors.items() if overall <= _BOUND]
+            needed = max(needed, min(enough, default=_NUM_VECTORS[-1] + 1))
+            context[f"{term.model}.{parameter.name}"] = _said(errors)
+    return [
+        Figure("pca.blinn_phong_6", paper[6][0], "relative RMS", {"errors": _said(paper)}),
+        Figure("pca.vectors", needed, "vectors", context),
+    ]
+
+
+def _errors(term: Term, parameter: Parameter, num: int) -> dict[int, tuple[float, float]]:
+    """Error over all values, and at the worst, by number of vectors."""
+    components = decompose(_curves(term, parameter, slider_values(parameter, num)))
+    exact = _curves(term, parameter, slider_values(parameter, num - 1, between=True))
+    errors = {}
+    for k in _NUM_VECTORS:
+        few = components.first(k)
+        found = few.synthesis(few.analysis(exact))
+        errors[k] = relative_rms(found, exact), worst_relative_rms(found, exact)
+    return errors
+
+
+def _curves(term: Term, parameter: Parameter, values: F64) -> F64:
+    """What a parameter moves, all its curves multiplied. (values, J)"""
+    curves = moved_curves(term, parameter.name)
+    return np.array([joint([bands_at(term, curve, {parameter.name: value}) for curve in curves]) for value in values])
+
+
+def _said(errors: dict[int, tuple[float, float]]) -> str:
+    return ", ".join(f"{k}: {overall:.1e} ({worst:.1e})" for k, (overall, worst) in errors.items())
