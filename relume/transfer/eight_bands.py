@@ -2,7 +2,7 @@
 
 Half of the projector's time goes into the inner sums over bands, a handful for each triangle: too few for the compiler
 to vectorise by itself, and scattered where it cannot know that they do not alias. Written as vectors they take half
-the time (docs/performance.md). LLVM lowers them to whatever registers the machine has.
+the time (docs/adr/0017-eight-bands-at-once.md). LLVM lowers them to whatever registers the machine has.
 """
 
 from __future__ import annotations

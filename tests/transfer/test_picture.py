@@ -580,7 +580,9 @@ def test_curves_of_each_channel_reach_their_channel(transfer):
 
     coloured, white = (opened(transfer, look=look_of(transfer, change)).image() for change in (red, plain))
     alone = pixels_of_ball_alone(transfer)
-    np.testing.assert_allclose(coloured[alone][:, 1:], white[alone][:, 1:], rtol=1e-5)
+    # lights of which a curve sees less than a billionth are left out, and the curves of red see others
+    nothing = 1e-9 * white[alone].max()
+    np.testing.assert_allclose(coloured[alone][:, 1:], white[alone][:, 1:], rtol=1e-5, atol=nothing)
     assert relative_rmse(coloured[alone][:, 0], white[alone][:, 0]) > 0.01
     expected = twins.full_evaluation(transfer, "front", look_of(transfer, red))
     assert relative_rmse(coloured, expected) < 1e-6
