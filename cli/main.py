@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import typer
 from typer.exceptions import TyperException
 
-from cli import bake, bench, demo, import_scene, reference, render, serve, worker
+from cli import bake, bench, demo, import_scene, material_export, material_import, reference, render, serve, worker
 from cli.sentence import sentence
 
 app = typer.Typer(
@@ -31,6 +31,10 @@ app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
+materials = typer.Typer(help="Measured materials in MERL files.", no_args_is_help=True, rich_markup_mode=None)
+materials.command("import")(material_import.material_import)
+materials.command("export")(material_export.material_export)
+app.add_typer(materials, name="material")
 
 INTERRUPTED = 130
 

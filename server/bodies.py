@@ -122,15 +122,31 @@ class MaterialMapBody(Body):
 
 
 class ModelBody(Body):
-    """A BRDF term; `texture` is the channel it takes by default."""
+    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`)."""
 
     model: str
     label: str
     help: str
     source: str
     texture: str
+    needs_data: bool
     parameters: list[ParameterBody]
     curves: list[CurveBody]
+
+
+class MeasuredBody(Body):
+    """A measured material; looks name it by `data`, `terms` is how it begins.
+
+    `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel.
+    """
+
+    id: str
+    data: str
+    name: str
+    created: str
+    terms: list[dict[str, Any]]
+    lobes_error: tuple[float, float, float]
+    homomorphic_error: tuple[float, float, float]
 
 
 class BakeRequest(Body):

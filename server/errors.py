@@ -83,6 +83,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (PreconditionRequiredError, Row(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
     (ForbiddenOriginError, Row(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
     (relume_errors.SceneError, Row(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
+    (relume_errors.MaterialError, Row(422, "material", "Measured material cannot be used", CLOSE_INTERNAL)),
     (relume_errors.ParameterError, Row(422, "parameter", "Value not allowed", CLOSE_POLICY)),
     (relume_errors.ShapeMismatchError, Row(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
     (relume_errors.MemoryBudgetError, Row(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),

@@ -12,8 +12,10 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from relume.measured.merl import FILE_BYTES
 from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
 
+MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -103,7 +105,9 @@ class Guard:
         return dressed
 
     def _limit(self, scope: Scope) -> int:
-        return self._max_upload_bytes if scope["path"] == "/api/scenes" else self._max_body_bytes
+        if scope["path"] == "/api/scenes":
+            return self._max_upload_bytes
+        return MAX_MATERIAL_BYTES if scope["path"] == "/api/materials/measured" else self._max_body_bytes
 
     def _too_large(self, scope: Scope) -> TooLargeError:
         return TooLargeError(f"the request is larger than {self._limit(scope):,} bytes; send less")

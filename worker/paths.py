@@ -21,6 +21,11 @@ def scene_path(data_dir: Path, scene_id: str) -> Path:
     return data_dir / "scenes" / _checked(scene_id)
 
 
+def materials_path(data_dir: Path) -> Path:
+    """Folder of the measured materials; `relume.measured.shelf` names what is in it."""
+    return data_dir / "materials"
+
+
 def bake_path(data_dir: Path, bake_id: str) -> Path:
     """The published store of a bake."""
     return data_dir / "bakes" / f"{_checked(bake_id)}.zarr"

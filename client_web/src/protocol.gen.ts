@@ -233,6 +233,7 @@ export interface ModelBody {
   help: string;
   source: string;
   texture: string;
+  needs_data: boolean;
   parameters: ParameterBody[];
   curves: CurveBody[];
 }

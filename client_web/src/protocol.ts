@@ -40,6 +40,7 @@ export type CurveEdits = CurveOverride | CurveOverride[];
 
 export interface Term {
   model: string;
+  data?: string;
   color: Rgb;
   params?: Record<string, ParamValue>;
   texture?: string | null;
@@ -88,6 +89,7 @@ export interface ModelInfo {
   help: string;
   source: string;
   texture: string | null;
+  needs_data: boolean;
   parameters: ParameterInfo[];
   curves: CurveInfo[];
 }

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { fromHex, strength, toHex } from "../src/inspector/color";
-import { defaultTerm, withModel } from "../src/inspector/terms";
+import { defaultTerm, modelsFor, withModel } from "../src/inspector/terms";
 import { freeName } from "../src/looks/names";
 import type { ModelInfo, Rgb } from "../src/protocol";
 import { sortFiles } from "../src/start/files";
@@ -73,6 +73,7 @@ describe("terms", () => {
     help: "",
     source: "",
     texture: "specular",
+    needs_data: false,
     parameters: parameters.map((p) => ({
       name: p,
       label: p,
@@ -103,6 +104,18 @@ describe("terms", () => {
       curves: {},
     });
     expect(withModel(term, "nothing", models)).toBe(term);
+  });
+
+  test("measured models are offered to terms that name a material, and keep it between them", () => {
+    const measured = models.map((m) => ({ ...m, model: `measured_${m.model}`, needs_data: true }));
+    const all = [...models, ...measured];
+    const term = { model: "ggx", color: [1, 1, 1] as Rgb };
+    const other = { ...term, model: measured[0]!.model, data: "merl:0123456789abcdef" };
+    expect(modelsFor(null, all)).toEqual(models);
+    expect(modelsFor(term, all)).toEqual(models);
+    expect(modelsFor(other, all)).toEqual(all);
+    expect(withModel(other, measured[0]!.model, all)).toHaveProperty("data", other.data);
+    expect(withModel(other, models[0]!.model, all)).not.toHaveProperty("data");
   });
 });
 

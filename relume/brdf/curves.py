@@ -6,7 +6,7 @@ outside, or {"bands": J or 3 × J values}; "channels" says for which of "rgb". D
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -41,8 +41,20 @@ def _generated(model: str, curve_name: str, params: tuple[tuple[str, float], ...
     return bands
 
 
+@lru_cache(maxsize=64)
+def _given_bands(factor: Callable[[F64], F64], num_bands: int) -> F64:
+    """Band averages of a curve that data give. (3, J)"""
+
+    def average(channel: int) -> F64:
+        return band_averages(lambda gamma: np.asarray(factor(gamma)[channel]), num_bands)
+
+    return np.stack([average(channel) for channel in range(3)])
+
+
 def generated_bands(term_document: Mapping[str, Any], curve: Curve) -> F64:
-    """What the parameters alone would give: band averages. (3, J) float64, not negative."""
+    """What the parameters or data alone would give: band averages. (3, J) float64, not negative."""
+    if curve.factor is not None:
+        return _given_bands(curve.factor, curve.num_bands).copy()
     model = term_document["model"]
     return np.stack([_generated(model, curve.name, tuple(p.items())) for p in channel_params(term_document, curve)])
 
@@ -109,7 +121,10 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     Returns:
         (3, ...) float64, not negative
     """
-    values = np.stack([curve.generator(gamma, params) for params in channel_params(term_document, curve)])
+    if curve.factor is not None:
+        values = np.array(curve.factor(gamma))
+    else:
+        values = np.stack([curve.generator(gamma, params) for params in channel_params(term_document, curve)])
     for drawn in drawn_curves(term_document, curve):
         if "points" in drawn:
             ends, spline = _points(drawn)

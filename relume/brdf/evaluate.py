@@ -67,7 +67,7 @@ def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
     """
     term = TERMS[term_document["model"]].settled(term_document)
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
-    value = term.quotient(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0))[..., None]
+    value = np.moveaxis(term.quotients(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0)), 0, -1)
     value = value * np.asarray(term_document.get("color", (1.0, 1.0, 1.0)), np.float64)
     for curve in term.curves:
         gamma = angles_numpy(curve.angle, wi, wo, curve.axes)

@@ -12,6 +12,7 @@ from relume.brdf.cook_torrance import COOK_TORRANCE
 from relume.brdf.ggx import GGX
 from relume.brdf.lafortune import LAFORTUNE
 from relume.brdf.lambert import LAMBERT
+from relume.brdf.measured import MEASURED_HD, MEASURED_HF, MEASURED_LV
 from relume.brdf.oren_nayar import OREN_NAYAR
 from relume.brdf.phong import PHONG
 from relume.brdf.schlick import SCHLICK
@@ -24,6 +25,7 @@ _ALL = (
     LAMBERT, OREN_NAYAR,
     PHONG, BLINN_PHONG, LAFORTUNE, WARD, WARD_DUER, WARD_ANISOTROPIC, ASHIKHMIN_SHIRLEY,
     COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX,
+    MEASURED_LV, MEASURED_HD, MEASURED_HF,
 )  # fmt: skip
 
 TERMS: dict[str, Term] = {term.model: term for term in _ALL}
@@ -49,6 +51,7 @@ def describe() -> list[dict[str, Any]]:
             "help": term.help,
             "source": term.source,
             "texture": term.texture,
+            "needs_data": term.needs_data,
             "parameters": [
                 asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters
             ],

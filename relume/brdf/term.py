@@ -65,6 +65,7 @@ class Curve:
         num_bands: J, a power of two.
         label: what people read, e.g. "half angle θh".
         axes: what multiplies wo, axis by axis, before the angle is taken; other than ones for `LOBE` only.
+        factor: γ in radians (...) -> (3, ...), above zero: where data give the curve, it stands in for the generator.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Curve:
     parameters: tuple[str, ...]
     num_bands: int
     axes: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    factor: Callable[[F64], F64] | None = None
 
     @property
     def outgoing(self) -> bool:
@@ -88,11 +90,14 @@ class Term:
     Attributes:
         model: name in look documents.
         quotient: ufunc (wi_x, wi_y, wi_z, wo_x, wo_y, wo_z) -> value, local frame, z = normal; float32 and float64
-            loops; zero where either direction is below the horizon.
+            loops; zero where either direction is below the horizon. With three channels, three values, channels first.
         source: the equation it is built from.
         texture: the texture channel it takes by default, "diffuse" or "specular".
         fixed: parameters that no curve reads: they shape the quotient or an angle, and changing one freezes anew.
-        settle: params -> the fields of this declaration that `fixed` changes; as declared they hold for the defaults.
+        settle: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
+            defaults.
+        num_channels: of the quotient, 1 or 3.
+        needs_data: whether documents must name a measured material, as `data`; it is fixed at freeze too.
     """
 
     model: str
@@ -104,18 +109,26 @@ class Term:
     texture: str
     help: str
     fixed: tuple[str, ...] = ()
-    settle: Callable[[Params], dict[str, Any]] | None = None
+    settle: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
+    num_channels: int = 1
+    needs_data: bool = False
 
-    def fixed_values(self, document: Mapping[str, Any]) -> tuple[float, ...]:
-        """Of a term document, in the order of `fixed`; what it leaves out has its default."""
+    def fixed_values(self, document: Mapping[str, Any]) -> tuple[tuple[str, float | str], ...]:
+        """Names and values of what a term document fixes at freeze; what it leaves out has its default."""
         given = document.get("params") or {}
-        return tuple(float(given.get(name, self.parameter(name).default)) for name in self.fixed)
+        values = tuple((name, float(given.get(name, self.parameter(name).default))) for name in self.fixed)
+        return (*values, ("data", str(document["data"]))) if self.needs_data else values
 
     def settled(self, document: Mapping[str, Any]) -> Term:
         """This term with its fixed parameters put in: quotient and angles have none left."""
         if self.settle is None:
             return self
-        return replace(self, **self.settle(dict(zip(self.fixed, self.fixed_values(document), strict=True))))
+        return replace(self, **self.settle(dict(self.fixed_values(document))))
+
+    def quotients(self, *directions: NDArray[np.floating] | float) -> NDArray[Any]:
+        """The quotient with its channels first, (1, ...) or (3, ...); directions as it takes them."""
+        value = self.quotient(*directions)
+        return np.asarray(value) if self.num_channels == 3 else np.asarray(value)[None]
 
     def parameter(self, name: str) -> Parameter:
         """The declaration of one parameter; KeyError where there is none of that name."""

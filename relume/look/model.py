@@ -23,9 +23,13 @@ class DrawnCurve(TypedDict):
 
 
 class TermLook(TypedDict):
-    """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give."""
+    """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give.
+
+    `data` names the measured material, for models that need one and for no other.
+    """
 
     model: str
+    data: NotRequired[str]
     color: Rgb
     texture: Literal["diffuse", "specular"] | None
     params: dict[str, float | Rgb]

@@ -21,11 +21,12 @@ from relume.look.checks import (
     fail,
     names_text,
 )
+from relume.measured.shelf import is_known, known_names
 
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
 _TEXTURES = ("diffuse", "specular")
-_FIELDS = ("model", "color", "texture", "params", "curves")
+_FIELDS = ("model", "data", "color", "texture", "params", "curves")
 
 
 def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -49,11 +50,25 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
     known_curves = known["curves"] if known is not None and known["model"] == model else {}
     return {
         "model": model,
+        **_checked_data((*pointer, "data"), given, term),
         "color": color,
         "texture": texture,
         "params": _complete_params((*pointer, "params"), given.get("params", {}), term),
         "curves": _checked_curves((*pointer, "curves"), given.get("curves", {}), term, known_curves),
     }
+
+
+def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
+    """The name of the material that a term is measured from, where it is."""
+    name = given.get("data")
+    if not term.needs_data:
+        if "data" in given:
+            raise fail(pointer, name, f"nothing: {term.model!r} has no data")
+        return {}
+    if not isinstance(name, str) or not is_known(name):
+        known = names_text(known_names())
+        raise fail(pointer, name, f"the data of a measured material that was imported here: {known}")
+    return {"data": name}
 
 
 def _complete_params(pointer: Pointer, given: Any, term: Term) -> dict[str, Any]:

@@ -146,6 +146,7 @@ class _Grid:
         mean, whole = (
             (values * self._seen).sum(axis=3) / np.where(weight > 0, weight, 1.0) for values in (rest, self.values)
         )
+        weight *= np.sin(2 * grid_angles()[1].ravel())  # dωd, which vanishes at both ends of θd
         share = np.divide(mean, whole, out=np.zeros_like(mean), where=whole > 0)
         pairs = [rank_one(channel, weight * of_whole) for channel, of_whole in zip(mean, share, strict=True)]
         return np.array([u for u, _ in pairs]), np.array([v for _, v in pairs])

@@ -96,6 +96,8 @@ def _quotients(part, table, curves, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z, out):  #
         theta_d = math.atan2(apart, math.sqrt(hx * hx + hy * hy + hz * hz))
         # sin θh sin θd times cosine and sine of φd, but for a common factor; exchanging wi and wo adds π
         phi_d = math.atan2(iy * ox - ix * oy, 0.5 * (oz - iz) * math.sqrt(hx * hx + hy * hy + hz * hz))
+        if hx * hx + hy * hy < 1e-28:  # the half vector is the normal and has no azimuth; the nodes there say zero
+            phi_d = math.atan2(iy, ix)
         if phi_d < 0.0:
             phi_d += math.pi
         h = math.sqrt(theta_h * (NUM_KNOTS * _PER_RADIAN))

@@ -92,13 +92,14 @@ def add_lights(kinds, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy,
         tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
         is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
         is_gray: the curve is the same in all channels. (C,) bool
-        shading: quotient · cos θi. (≥ num,) float64. power: (m, 3) float64
+        shading: quotient · cos θi, one for all channels or three. (1 or 3, ≥ num) float64. power: (m, 3) float64
     """
+    blue_row = shading.shape[0] - 1
     scale = (tables.shape[2] - 1) / (math.pi / 2)
     red = green = blue = 0.0
     for n in range(num):
-        r = g = b = shading[n]
-        if r == 0.0:
+        r, g, b = shading[0, n], shading[blue_row // 2, n], shading[blue_row, n]
+        if r == 0.0 and g == 0.0 and b == 0.0:
             continue
         for k in range(kinds.shape[0]):
             x, y, z = axes[k, 0] * ox, axes[k, 1] * oy, axes[k, 2] * oz

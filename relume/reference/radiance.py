@@ -151,7 +151,7 @@ def _add_texels(
         x, y, z = wi[:, :num]
         for m, terms in enumerate(tables):
             for table in terms:
-                shading = table.term.quotient(x, y, z, ox, oy, oz) * z
+                shading = table.term.quotients(x, y, z, ox, oy, oz) * z
                 total = np.zeros(3)
                 add_lights(
                     table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,

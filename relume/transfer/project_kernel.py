@@ -221,13 +221,13 @@ def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-d
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
     """Light of each leaf: power · q cos θi · its share of the triangle. weight: (3, n), written."""
+    blue_row = shading.shape[0] - 1
     for n in range(num):
         entry = begin + of_entry[n]
         m = np.uint64(light[entry])
-        value = shading[entry] * shares[n]
-        weight[0, n] = power[m, 0] * value
-        weight[1, n] = power[m, 1] * value
-        weight[2, n] = power[m, 2] * value
+        weight[0, n] = power[m, 0] * (shading[0, entry] * shares[n])
+        weight[1, n] = power[m, 1] * (shading[blue_row // 2, entry] * shares[n])
+        weight[2, n] = power[m, 2] * (shading[blue_row, entry] * shares[n])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -255,7 +255,7 @@ def project_points(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their lights.
 
-    out: (points, 3, J padded by 8) float32, added to.
+    shading: one row for all channels, or three. (1 or 3, K). out: (points, 3, J padded by 8) float32, added to.
     """
     num_curves, num_lights = kinds.shape[0], nodes.shape[2]
     scale = np.empty(num_curves, np.float32)

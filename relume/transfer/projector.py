@@ -158,7 +158,7 @@ class Projector:
             self._wo,
         )
         wi, wo = self._wi[:, :num], self._wo[:, :num]
-        shading = self._term.quotient(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
+        shading = self._term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
         shading *= wi[2]
         project_points(
             r.normal,

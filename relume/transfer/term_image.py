@@ -45,7 +45,7 @@ class TermImage:
         self.active: str | None = None
         self.shown: F64 | None = None
         self.is_composed = False
-        self.kind: tuple[str, tuple[float, ...], float] | None = None
+        self.kind: Hashable = None
         self.set_document(document)
 
     def set_document(self, document: Mapping[str, Any]) -> None:

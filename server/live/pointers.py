@@ -21,7 +21,7 @@ def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any
     """
     match = CURVE.match(pointer)
     term = _term(document, match["material"], int(match["term"])) if match else None
-    curves = {curve.name: curve for curve in TERMS[term["model"]].curves} if term else {}
+    curves = {curve.name: curve for curve in TERMS[term["model"]].settled(term).curves} if term else {}
     if match is None or term is None or match["curve"] not in curves:
         raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
     return term, curves[match["curve"]]

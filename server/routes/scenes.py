@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections import defaultdict
 from collections.abc import Mapping
@@ -19,11 +18,11 @@ from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import thumbnail
+from server.uploads import keep_upload, plain_stem
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
-COPY_BYTES = 1 << 20
 SceneFile = Annotated[
     UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
 ]
@@ -50,33 +49,20 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
         order = Order(
             data=str(settings.data.resolve()),
             database=settings.database_url,
-            scene=str(_keep(scene, Path(folder) / "scene")),
+            scene=str(keep_upload(scene, Path(folder) / "scene")),
             environment=None if environment is None else _keep_environment(environment, Path(folder)),
-            name=name.strip() or _plain_stem(scene.filename),
+            name=name.strip() or plain_stem(scene.filename) or "Scene",
             seconds=settings.import_seconds,
             max_bytes=settings.import_bytes,
         )
         return import_in_process(order)
 
 
-def _keep(upload: UploadFile, path: Path) -> Path:
-    """The upload as a file of our own name; its size was bounded while it streamed in."""
-    with path.open("wb") as file:
-        shutil.copyfileobj(upload.file, file, COPY_BYTES)
-    return path
-
-
 def _keep_environment(upload: UploadFile, folder: Path) -> str:
     """Kept under the suffix that its content says; the uploaded name becomes no part of a path."""
     start = upload.file.read(4)
     upload.file.seek(0)
-    return str(_keep(upload, folder / ("environment.exr" if start == b"\x76\x2f\x31\x01" else "environment.hdr")))
-
-
-def _plain_stem(filename: str | None) -> str:
-    """A scene's name from the uploaded file's."""
-    stem = (filename or "").replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-    return "".join(c for c in stem if c.isprintable()).strip()[:80] or "Scene"
+    return str(keep_upload(upload, folder / ("environment.exr" if start == b"\x76\x2f\x31\x01" else "environment.hdr")))
 
 
 @router.get("")

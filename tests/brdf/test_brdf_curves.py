@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from analytic_terms import ANALYTIC
 from scipy.interpolate import PchipInterpolator
 
 from relume.basis.bands import band_averages, band_edges
 from relume.brdf.curves import channel_params, curve_bands, curve_values, generated_bands
 from relume.brdf.registry import TERMS
 
-CURVES = [(t.model, c.name) for t in TERMS.values() for c in t.curves]
+CURVES = [(t.model, c.name) for t in ANALYTIC.values() for c in t.curves]
 
 
 def slow_averages(function, num_bands, panels=512):

@@ -4,6 +4,8 @@ import pytest
 from merl_files import planes_of
 
 from relume.measured.lookup import table_of
+from relume.measured.merl import write_merl
+from relume.measured.shelf import keep, records, shelf_at
 
 
 @pytest.fixture(scope="session")
@@ -18,3 +20,19 @@ def table(planes):
     made = table_of(planes)
     made.flags.writeable = False
     return made
+
+
+@pytest.fixture(scope="session")
+def shelf(planes, tmp_path_factory):
+    """A folder with one imported material, in use."""
+    folder = tmp_path_factory.mktemp("measured")
+    write_merl(folder / "plastic.binary", planes)
+    with shelf_at(folder / "materials") as materials:
+        keep(materials, folder / "plastic.binary", "Plastic")
+        yield materials
+
+
+@pytest.fixture(scope="session")
+def data(shelf):
+    """How look documents name it."""
+    return records(shelf)[0].data

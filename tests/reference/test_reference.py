@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from analytic_terms import ANALYTIC
 from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
 
 from relume.brdf.evaluate import eval_brdf
-from relume.brdf.registry import TERMS
 from relume.errors import CancelledError, PlanError
 from relume.light.environment import texel_directions, texel_solid_angles, uv_to_direction
 from relume.look import default_look, validate
@@ -63,11 +63,11 @@ def test_floor_under_one_texel_has_the_closed_form() -> None:
 DRAWN = {"theta_h": [{"points": [[0, 9.0], [20, 2.0], [90, 0.1]], "channels": "rg"}, {"bands": [0.5, 2.0] * 128}]}
 
 
-HALF_ANGLE = [name for name, term in TERMS.items() if "theta_h" in {curve.name for curve in term.curves}]
+HALF_ANGLE = [name for name, term in ANALYTIC.items() if "theta_h" in {curve.name for curve in term.curves}]
 
 
 @pytest.mark.parametrize(
-    ("model", "curves"), [*((name, {}) for name in TERMS), *((name, DRAWN) for name in HALF_ANGLE)]
+    ("model", "curves"), [*((name, {}) for name in ANALYTIC), *((name, DRAWN) for name in HALF_ANGLE)]
 )
 def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) -> None:
     rng = np.random.default_rng(3)

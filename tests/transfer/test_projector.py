@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
+from analytic_terms import ANALYTIC
 from tiny_scenes import studio
 
 from relume.brdf.curves import curve_bands
@@ -16,7 +17,7 @@ from relume.transfer.projector import Projector, Receivers, contract
 
 NUM_POINTS = 40
 # every curve that enters the transport, and every pair of a term's
-CURVES = [(model, c.name) for model, term in TERMS.items() for c in term.curves if not c.outgoing]
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
 # what an angle may be off and still count as linear, in bands: docs/method.md, "Overlap of triangle and band"
 TOLERANCE_BANDS, TOLERANCE_SHARE = 0.12, 0.015
 
@@ -109,7 +110,7 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
 
 
 def test_flat_curves_are_left_out_and_multiply(lights, receivers):
-    for model in TERMS:
+    for model in ANALYTIC:
         names = [c.name for c in TERMS[model].curves if not c.outgoing]
         flat = {c.name: np.full((3, c.num_bands), 0.5) * [[1], [2], [3]] for c in TERMS[model].curves}
         ones = {c.name: np.ones((3, c.num_bands)) for c in TERMS[model].curves}
@@ -177,7 +178,7 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
     assert not parts[3].any()
 
 
-@pytest.mark.parametrize("model", TERMS)
+@pytest.mark.parametrize("model", ANALYTIC)
 def test_against_the_twin_with_exact_angles(model, lights, receivers):
     for bands in (default_bands(model), coloured_bands(model)):
         found = image(model, bands, None, lights, receivers)

@@ -72,9 +72,9 @@ def samples_of(term, lights, receivers, row, depth):
     frame = frames(receivers)[row]
     wo = frame @ receivers.wo[row].astype(float)
     wi = lights.direction[seen].astype(float) @ frame.T
-    shading = term.quotient(*wi.T, *(np.full(len(seen), o) for o in wo)) * wi[:, 2]
+    shading = term.quotients(*wi.T, *(np.full(len(seen), o) for o in wo)).T * wi[:, 2:]
     middles, shares = pieces(lights, depth)
-    return lights.power[seen].astype(float) * shading[:, None], shares[seen], middles[seen] @ frame.T, wo
+    return lights.power[seen].astype(float) * shading, shares[seen], middles[seen] @ frame.T, wo
 
 
 def project(term, bands, active, lights, receivers, depth=5):
@@ -134,7 +134,7 @@ def integrate_texels(document, radiance, receivers, seen=None):
         if seen is not None:
             above &= seen[row]
         wi = wi[above]
-        weight = power[above] * (term.quotient(*wi.T, *(np.full(len(wi), o) for o in wo)) * wi[:, 2])[:, None]
+        weight = power[above] * term.quotients(*wi.T, *(np.full(len(wi), o) for o in wo)).T * wi[:, 2:]
         for curve in term.curves:
             if not curve.outgoing:
                 gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)

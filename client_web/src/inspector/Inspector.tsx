@@ -5,7 +5,7 @@ import { pointer } from "../state/pointer";
 import { defaultLook, history, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
-import { defaultTerm } from "./terms";
+import { defaultTerm, modelsFor } from "./terms";
 
 const MAX_TERMS = 8;
 
@@ -28,7 +28,7 @@ function AddTerm({ material }: { material: string }) {
       }}
     >
       <option value="">+ Add a term…</option>
-      {models.value.map((m) => (
+      {modelsFor(null, models.value).map((m) => (
         <option key={m.model} value={m.model}>
           {m.label}
         </option>

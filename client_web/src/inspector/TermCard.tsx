@@ -10,7 +10,7 @@ import { selectTerm } from "../state/select";
 import { toHex } from "./color";
 import { ColorField } from "./ColorField";
 import { ParamRow } from "./ParamRow";
-import { withModel } from "./terms";
+import { modelsFor, withModel } from "./terms";
 
 interface Props {
   material: string;
@@ -85,7 +85,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
           value={term.model}
           onChange={(event) => changeModel(event.currentTarget.value)}
         >
-          {models.value.map((m) => (
+          {modelsFor(term, models.value).map((m) => (
             <option key={m.model} value={m.model}>
               {m.label}
             </option>

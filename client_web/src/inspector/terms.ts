@@ -11,13 +11,20 @@ export function defaultTerm(model: ModelInfo): Term {
   };
 }
 
+/** The models that a term can take: those that are measured only where it names a measured material. */
+export function modelsFor(term: Term | null, models: readonly ModelInfo[]): readonly ModelInfo[] {
+  return models.filter((model) => !model.needs_data || term?.data !== undefined);
+}
+
 /** The term under another model: colour and texture stay, and parameters of the same name. Drawn curves belong to
- * the old model's angles and go. */
+ * the old model's angles and go; a measured material stays where the new model is measured too. */
 export function withModel(term: Term, name: string, models: readonly ModelInfo[]): Term {
   const model = models.find((m) => m.model === name);
   if (model === undefined) return term;
   const params = Object.fromEntries(
     model.parameters.map((info) => [info.name, term.params?.[info.name] ?? info.default]),
   );
-  return { ...term, model: name, params, curves: {} };
+  const { data, ...others } = term;
+  const measured = model.needs_data && data !== undefined ? { data } : {};
+  return { ...others, ...measured, model: name, params, curves: {} };
 }

@@ -1,0 +1,35 @@
+"""`relume material export`: writes a look's material as a MERL file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import Data, read_look
+
+
+def material_export(
+    look: Annotated[Path, typer.Argument(metavar="LOOK.json", help="Look document; may be partial.")],
+    material: Annotated[str, typer.Argument(metavar="MATERIAL", help="Name of a material that the look names.")],
+    output: Annotated[Path, typer.Option(metavar="FILE.binary", help="Where to write it.")],
+    data: Data = None,
+) -> None:
+    """Write an edited material as a MERL file, for other renderers; any isotropic terms will do."""
+    from cli.house import open_settings
+    from relume.errors import ParameterError
+    from relume.look import complete, default_look
+    from relume.measured.export import sample_terms
+    from relume.measured.merl import write_merl
+    from relume.scene.model import Material
+
+    open_settings(data)
+    if not output.parent.is_dir():
+        raise ParameterError("--output", str(output), "a file in a folder that exists")
+    materials = read_look(look).get("materials")
+    found = materials.get(material) if isinstance(materials, dict) else None
+    if not isinstance(found, dict) or "terms" not in found:
+        raise ParameterError("MATERIAL", material, "the name of a material whose terms stand in the look")
+    document = complete({"materials": {material: found}}, default_look([Material(material, ())]))
+    write_merl(output, sample_terms(document["materials"][material]["terms"]))

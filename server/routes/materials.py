@@ -1,0 +1,72 @@
+"""/api/materials/measured: import, list, show and delete measured materials."""
+
+from __future__ import annotations
+
+import tempfile
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi.concurrency import run_in_threadpool
+
+from relume.measured import shelf
+from relume.measured.shelf import MaterialRecord
+from server.bodies import Id, MeasuredBody
+from server.importing import UPLOAD_PREFIX
+from server.services import Services, Shared
+from server.uploads import keep_upload, plain_stem
+from worker.paths import materials_path
+
+router = APIRouter(prefix="/api/materials/measured", tags=["materials"])
+MaterialFile = Annotated[UploadFile, File(description="MERL .binary")]
+MaterialName = Annotated[str, Form(max_length=200)]
+
+
+@router.post("", status_code=201)
+async def import_measured(
+    material: MaterialFile, services: Shared, response: Response, name: MaterialName = ""
+) -> MeasuredBody:
+    """Import a MERL file; the body says how look documents name it."""
+    async with services.import_slots:
+        record = await run_in_threadpool(_import, material, name, services)
+    response.headers["Location"] = f"/api/materials/measured/{record.id}"
+    return _body(record)
+
+
+def _import(material: UploadFile, name: str, services: Services) -> MaterialRecord:
+    name = shelf.check_name(name or plain_stem(material.filename) or "Material")
+    with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
+        path = keep_upload(material, Path(folder) / "material.binary")
+        return shelf.keep(materials_path(services.settings.data), path, name)
+
+
+@router.get("")
+def list_measured(services: Shared) -> list[MeasuredBody]:
+    """All measured materials, newest first."""
+    return [_body(record) for record in shelf.records(materials_path(services.settings.data))]
+
+
+@router.get("/{material}")
+def get_measured(material: Id, services: Shared) -> MeasuredBody:
+    """One measured material."""
+    return _body(shelf.get_record(materials_path(services.settings.data), material))
+
+
+@router.delete("/{material}", status_code=204)
+def delete_measured(material: Id, services: Shared) -> Response:
+    """Delete a measured material; looks that name it are refused from then on."""
+    shelf.remove(materials_path(services.settings.data), material)
+    return Response(status_code=204)
+
+
+def _body(record: MaterialRecord) -> MeasuredBody:
+    return MeasuredBody(
+        id=record.id,
+        data=record.data,
+        name=record.name,
+        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        terms=record.terms(),
+        lobes_error=record.lobes_error,
+        homomorphic_error=record.homomorphic_error,
+    )

@@ -1,0 +1,23 @@
+"""Uploaded files, kept under names of our own."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from fastapi import UploadFile
+
+COPY_BYTES = 1 << 20
+
+
+def keep_upload(upload: UploadFile, path: Path) -> Path:
+    """The upload as a file of our own name; its size was bounded while it streamed in."""
+    with path.open("wb") as file:
+        shutil.copyfileobj(upload.file, file, COPY_BYTES)
+    return path
+
+
+def plain_stem(filename: str | None) -> str:
+    """A name from the uploaded file's; empty where nothing printable is left."""
+    stem = (filename or "").replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+    return "".join(c for c in stem if c.isprintable()).strip()[:80]

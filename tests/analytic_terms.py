@@ -1,0 +1,5 @@
+"""The terms that a formula gives: those that need no measured material, so that a test can write their documents."""
+
+from relume.brdf.registry import TERMS
+
+ANALYTIC = {model: term for model, term in TERMS.items() if not term.needs_data}

@@ -1,0 +1,129 @@
+"""Imported materials: kept whole or not at all, named by content, found by name only."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from relume.errors import MaterialError, NotFoundError, ParameterError
+from relume.look.terms import complete_term
+from relume.measured import shelf as shelves
+from relume.measured.merl import write_merl
+from relume.measured.shelf import get_record, is_known, keep, known_names, material, records, remove, shelf_at
+
+
+@pytest.fixture
+def copied(shelf, data, tmp_path):
+    """Another folder with the same material, its files free to be damaged; its path and the material's id."""
+    identity = data.removeprefix("merl:")
+    shutil.copytree(shelf / identity, tmp_path / "materials" / identity)
+    return tmp_path / "materials", identity
+
+
+def test_an_import_is_listed_and_can_be_used(shelf, data, table, planes):
+    (record,) = records(shelf)
+    assert (record.name, record.data) == ("Plastic", data)
+    assert len(record.id) == 16
+    assert max(record.lobes_error) < 0.2
+    assert record.terms() == [{"model": "measured_lv", "data": data}, {"model": "measured_hd", "data": data}]
+    np.testing.assert_array_equal(material(data).table, table)
+    assert not material(data).table.flags.writeable
+    assert sorted(path.name for path in shelf.iterdir()) == [record.id]
+
+
+def test_the_source_is_kept_bit_for_bit(shelf, data, planes, tmp_path):
+    write_merl(tmp_path / "again.binary", planes)
+    assert shelves.source_of(data).read_bytes() == (tmp_path / "again.binary").read_bytes()
+
+
+def test_the_same_file_again_is_the_same_material_under_its_newest_name(copied):
+    folder, identity = copied
+    created = get_record(folder, identity).created
+    keep(folder, folder / identity / "measured.binary", "Renamed")
+    (record,) = records(folder)
+    assert (record.id, record.name, record.created) == (identity, "Renamed", created)
+
+
+def test_a_bad_file_leaves_nothing_behind(tmp_path):
+    (tmp_path / "bad.binary").write_bytes(b"no")
+    with pytest.raises(MaterialError):
+        keep(tmp_path / "materials", tmp_path / "bad.binary", "Bad")
+    assert not (tmp_path / "materials").exists()
+
+
+def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
+    monkeypatch.setattr(shelves, "MAX_MATERIALS", 1)
+    other = planes.copy()
+    other[0, 0, 0, 0] += 1
+    write_merl(tmp_path / "other.binary", other)
+    with pytest.raises(MaterialError, match="delete one first"):
+        keep(shelf, tmp_path / "other.binary", "Other")
+
+
+def test_what_is_removed_is_known_no_more(copied):
+    folder, identity = copied
+    with pytest.raises(NotFoundError):
+        remove(folder, "0" * 16)
+    remove(folder, identity)
+    assert records(folder) == []
+    with pytest.raises(NotFoundError, match="import it first"):
+        get_record(folder, identity)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "merl:", "merl:../../../etc/passwd", "merl:0000000000000000", "0000000000000000", "merl:" + "G" * 16]
+)
+def test_only_names_of_imported_materials_are_known(shelf, name):
+    assert not is_known(name)
+    with pytest.raises(NotFoundError):
+        material(name)
+
+
+def test_names_are_known_while_their_folder_is_in_use(shelf, data, copied):
+    folder, identity = copied
+    (folder / identity).rename(folder / "fedcba9876543210")
+    name = "merl:fedcba9876543210"
+    assert not is_known(name)
+    with shelf_at(folder):
+        assert is_known(name)
+        assert set(known_names()) >= {name, data}
+    assert not is_known(name)
+
+
+def change(document, key, value):
+    return json.dumps({**document, key: value}).encode()
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("material.json", lambda document: b"{"),
+        ("material.json", lambda document: b" " * (2 << 20)),
+        ("material.json", lambda document: change(document, "format", 99)),
+        ("material.json", lambda document: change(document, "lobes", [[1.0]])),
+        ("material.json", lambda document: change(document, "homomorphic", None)),
+        ("material.json", lambda document: change(document, "lobes", (0 * np.ones((4, 3, 90))).tolist())),
+        ("table.npy", lambda document: b""),
+        ("table.npy", lambda document: b"\x93NUMPY\x01\x00"),
+    ],
+)
+def test_damaged_files_are_named(copied, file, content):
+    folder, identity = copied
+    path = folder / identity / file
+    path.write_bytes(content(json.loads((folder / identity / "material.json").read_text())))
+    (folder / identity).rename(folder / "fedcba9876543210")
+    with shelf_at(folder), pytest.raises(MaterialError, match="import it again"):
+        material("merl:fedcba9876543210")
+
+
+def test_a_look_names_known_data_for_measured_terms_and_no_other(data):
+    term = complete_term(("terms", 0), {"model": "measured_hd", "data": data}, None)
+    assert (term["data"], term["texture"], term["params"]) == (data, "specular", {})
+    for bad in (None, 7, "merl:0000000000000000", "../x", ["merl:"], data + " "):
+        with pytest.raises(ParameterError, match=r"terms/0/data is .* imported here: 'merl:"):
+            complete_term(("terms", 0), {"model": "measured_hd", "data": bad}, None)
+    with pytest.raises(ParameterError, match="imported here"):
+        complete_term(("terms", 0), {"model": "measured_lv"}, None)
+    with pytest.raises(ParameterError, match="'lambert' has no data"):
+        complete_term(("terms", 0), {"model": "lambert", "data": data}, None)

@@ -1,0 +1,79 @@
+"""Measured materials by the command line and over HTTP."""
+
+import json
+
+import pytest
+from fastapi.testclient import TestClient
+from merl_files import planes_of
+
+from cli.main import main
+from relume.measured.merl import is_measured, read_merl, write_merl
+from relume.measured.shelf import records
+from server.app import create_app
+from server.settings import Settings
+
+RED = ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory):
+    path = tmp_path_factory.mktemp("red") / "red.binary"
+    write_merl(path, planes_of(RED))
+    return path
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """A data folder for all tests here: a material that one imports is there for the next."""
+    return tmp_path_factory.mktemp("home")
+
+
+def test_command_line_takes_a_file_in_and_gives_the_edited_one_out(home, red, tmp_path, capsys):
+    assert main(["material", "import", str(red), "--name", "Red paint", "--data", str(home)]) == 0
+    told = capsys.readouterr().out.splitlines()
+    (record,) = records(home / "materials")
+    assert (told[0], record.name) == (record.data, "Red paint")
+    terms = json.loads(told[1])["terms"]
+    terms[0]["color"] = [0.5, 2.0, 1.0]
+    look, output = tmp_path / "look.json", tmp_path / "edited.binary"
+    look.write_text(json.dumps({"materials": {"Wall": {"terms": terms}}}))
+    assert main(["material", "export", str(look), "Wall", "--output", str(output), "--data", str(home)]) == 0
+    before, after = read_merl(red), read_merl(output)
+    kept = is_measured(before)
+    for channel, scale in enumerate((0.5, 2.0, 1.0)):
+        assert after[channel, kept] == pytest.approx(scale * before[channel, kept], rel=1e-6)
+
+
+def test_command_line_says_in_one_line_what_is_wrong(home, tmp_path, capsys):
+    (tmp_path / "bad.binary").write_bytes(b"bad")
+    (tmp_path / "look.json").write_text(json.dumps({"materials": {"Wall": {"terms": [{"model": "measured_lv"}]}}}))
+    look, data = str(tmp_path / "look.json"), ["--data", str(home)]
+    for arguments, said in (
+        (["import", str(tmp_path / "bad.binary")], "not a MERL file"),
+        (["import", str(tmp_path / "bad.binary"), "--name", " "], "printable"),
+        (["export", look, "Floor", "--output", str(tmp_path / "x.binary")], "terms stand in the look"),
+        (["export", look, "Wall", "--output", str(tmp_path / "x.binary")], "imported here"),
+        (["export", look, "Wall", "--output", str(tmp_path / "no" / "x.binary")], "folder that exists"),
+    ):
+        assert main(["material", *arguments, *data]) == 1
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / "x.binary").exists()
+
+
+def test_rest_imports_lists_shows_and_deletes(home, red, tmp_path):
+    settings = Settings(data=tmp_path / "data", client=tmp_path / "client", allowed_hosts=["testserver"])
+    with TestClient(create_app(settings)) as client:
+        url = "/api/materials/measured"
+        response = client.post(url, files={"material": ("some/red.binary", red.read_bytes())})
+        assert response.status_code == 201, response.text
+        made = response.json()
+        assert response.headers["Location"] == f"{url}/{made['id']}"
+        assert (made["name"], made["data"]) == ("red", f"merl:{made['id']}")
+        assert [term["model"] for term in made["terms"]] == ["measured_lv", "measured_hd"]
+        assert max(made["lobes_error"]) < 0.01
+        assert client.get(url).json() == [made] == [client.get(f"{url}/{made['id']}").json()]
+        needing = [m["model"] for m in client.get("/api/models").json() if m["needs_data"]]
+        assert needing == ["measured_lv", "measured_hd", "measured_hf"]
+        assert client.delete(f"{url}/{made['id']}").status_code == 204
+        assert client.get(url).json() == []
+        assert client.get(f"{url}/{made['id']}").status_code == 404
