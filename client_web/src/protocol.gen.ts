@@ -226,7 +226,7 @@ export interface MaterialMapBody {
   triangles: [number, number, number][];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default. */
+/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
