@@ -26,7 +26,7 @@ CACHE_BYTES = 1 << 28
 
 
 def warm() -> None:
-    """Bake with every method, edit every analytic term through every curve. Cost: 1 min of a core, 2 s when compiled."""
+    """Bake with every method, edit each analytic term by each curve. Cost: 1 min of one core, 2 s when compiled."""
     with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
         folder = Path(name)
         save_scene(demo_scene(), folder / "scene")

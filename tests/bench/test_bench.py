@@ -93,10 +93,10 @@ def test_failure_is_a_figure_and_the_others_go_on(
 
 def test_table_keeps_rows_that_were_not_measured() -> None:
     text = f"before\n{table.BEGIN}\n{table.END}\nafter\n"
-    one = {"name": "bake.teatray_s", "value": 12.345, "unit": "s", "context": {"size": [640, 480]}}
+    one = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": {"size": [640, 480]}}
     two = {"name": "accuracy.lambert", "value": 0.00412, "unit": "relative RMSE", "context": {}}
     once = table.filled(text, [one])
-    assert "| `bake.teatray_s` | 12.3 s |  | size 640×480 |" in once.splitlines()
+    assert "| `bake.nothing_s` | 12.3 s |  | size 640×480 |" in once.splitlines()
     both = table.filled(once, [two])
     assert "| `accuracy.lambert` | 0.41 % | ≤ 0.5 % |  |" in both.splitlines()
     assert "12.3 s" in both
