@@ -124,6 +124,7 @@ class BakeRunner:
         try:
             cost = future.result()
         except FutureCancelledError as error:  # nobody here cancels a task
+            self._flying.clear()  # handed out while the scheduler went away, they would never end
             raise RelumeError(SCHEDULER_LOST) from error
         except Exception as error:
             if not _is_lost_process(error):
