@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from relume.basis.bands import band_averages
-from relume.brdf.term import F64, Curve, Parameter, Term
+from relume.basis.bands import MAX_ANGLE, band_averages
+from relume.brdf.term import F64, Angle, Curve, Parameter, Term
+
+_FROM_A_PLANE = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 
 
 def moved_curves(term: Term, parameter: str) -> tuple[Curve, ...]:
@@ -28,3 +30,13 @@ def bands_at(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
     """Band averages of one curve, what `params` leaves out at its default. (J,)"""
     settings = {name: params.get(name, term.parameter(name).default) for name in curve.parameters}
     return np.maximum(band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands), 0)
+
+
+def solid_angles(curve: Curve) -> F64:
+    """Share of all directions whose angle lies in each band, up to a factor. (J,)
+
+    Directions are as dense at an angle as its sine; the angles along and across a tangent begin at a plane, not at a
+    pole, and are evenly spread.
+    """
+    middle = (np.arange(curve.num_bands) + 0.5) * (MAX_ANGLE / curve.num_bands)
+    return np.ones(curve.num_bands) if curve.angle in _FROM_A_PLANE else np.sin(middle)

@@ -181,27 +181,24 @@ def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _multiply_means(overlap, bands, num_bands, num_channels, num, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
+def _multiply_means(overlap, bands, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
+    """Multiply the weights (R, n) of leaves by the mean of a dormant curve over each.
 
     Args:
-        overlap: from `_overlaps`. bands: of the curve, padded. (3, ≥ num_bands + 8)
-        num_channels: 1 where the curve is the same in all channels, else 3.
+        overlap: from `_overlaps`. bands: of the curve, padded. (≥ num_rows, ≥ num_bands + 8)
+        num_rows: how many rows of `bands` differ; row r of the weights takes row r modulo this.
     """
     last = num_bands - 1
+    mean = np.empty(num_rows, np.float32)
     for n in range(num):
-        first_band, last_band = min(np.int64(overlap[0, n]), last), min(np.int64(overlap[2, n]), last)
-        mean = np.float32(0)
-        for channel in range(num_channels):
-            mean = np.float32(0)
-            for band in range(first_band, last_band + 1, EIGHT):
-                mean += mean_of_eight(
-                    bands, channel, band,
-                    overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n],
-                )  # fmt: skip
-            weight[channel, n] *= mean
-        for channel in range(num_channels, 3):
-            weight[channel, n] *= mean
+        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
+        mean[:] = 0
+        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
+            for row in range(num_rows):
+                mean[row] += mean_of_eight(bands, row, band, low, middle, high, rise, fall)
+        for row in range(num_rows):
+            for alike in range(row, weight.shape[0], num_rows):
+                weight[alike, n] *= mean[row]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -220,42 +217,44 @@ def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-d
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
-    """Light of each leaf: power · q cos θi · its share of the triangle. weight: (3, n), written."""
-    blue_row = shading.shape[0] - 1
+    """Light of each leaf: power · q cos θi · its share of the triangle, in all rows of weight (3 N, n)."""
+    num_settings, blue_row = weight.shape[0] // 3, shading.shape[0] - 1
     for n in range(num):
         entry = begin + of_entry[n]
         m = np.uint64(light[entry])
-        weight[0, n] = power[m, 0] * (shading[0, entry] * shares[n])
-        weight[1, n] = power[m, 1] * (shading[blue_row // 2, entry] * shares[n])
-        weight[2, n] = power[m, 2] * (shading[blue_row, entry] * shares[n])
+        for channel in range(3):
+            of_channel = power[m, channel] * (shading[blue_row * channel // 2, entry] * shares[n])
+            for row in range(channel * num_settings, (channel + 1) * num_settings):
+                weight[row, n] = of_channel
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out):  # type: ignore[no-untyped-def]
+def _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out):  # type: ignore[no-untyped-def]
     """Weigh the leaves by the dormant curves and share them out."""
     for k in range(leaves.shape[0]):
         if k != active:
             _overlaps(leaves[k], num_bands[k], num, overlap)
-            _multiply_means(overlap, bands[k], num_bands[k], num_channels[k], num, weight)
+            _multiply_means(overlap, bands[k], num_bands[k], num_rows[k], num, weight)
     if active >= 0:
         _overlaps(leaves[active], num_bands[active], num, overlap)
         _deposit(overlap, num_bands[active], num, weight, out)
         return
-    for channel in range(3):
+    for row in range(weight.shape[0]):
         total = np.float32(0)
         for n in range(num):
-            total += weight[channel, n]
-        out[channel, 0] += total
+            total += weight[row, n]
+        out[row, 0] += total
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, power,
-    kinds, axes, num_bands, bands, num_channels, support, active, start, stop, out,
+    kinds, axes, num_bands, bands, num_rows, support, active, start, stop, out,
 ):  # fmt: skip
     """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their lights.
 
-    shading: one row for all channels, or three. (1 or 3, K). out: (points, 3, J padded by 8) float32, added to.
+    shading: one row for all channels, or three. (1 or 3, K)
+    out: (points, 3, J padded by 8) float32, added to; with no free curve (points, 3 N, 1) for N settings of the others.
     """
     num_curves, num_lights = kinds.shape[0], nodes.shape[2]
     scale = np.empty(num_curves, np.float32)
@@ -274,7 +273,7 @@ def project_points(  # type: ignore[no-untyped-def]
     capacity = 4 * num_lights + _MOST_LEAVES
     leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
     of_entry = np.empty(capacity, np.int64)
-    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
+    overlap, weight = np.empty((5, capacity), np.float32), np.empty((out.shape[1], capacity), np.float32)
     scaled_wo = np.empty((num_curves, 3), np.float32)
     for p in range(start, stop):
         row = p - start
@@ -293,7 +292,7 @@ def project_points(  # type: ignore[no-untyped-def]
         for batch in range(0, num_divided, _BATCH):
             if num + _MOST_LEAVES > capacity:
                 _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-                _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out[row])
+                _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out[row])
                 num = 0
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
@@ -308,4 +307,4 @@ def project_points(  # type: ignore[no-untyped-def]
                 )
                 of_local, of_gamma, of_origin = to_local, to_gamma, to_origin
         _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-        _spend(leaves, num, num_bands, bands, num_channels, active, overlap, weight, out[row])
+        _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out[row])

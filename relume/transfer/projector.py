@@ -50,44 +50,54 @@ class Contraction:
         kinds: `Angle` of each curve that depends on wi. (C,) int64
         axes: `Curve.axes` of each. (C, 3) float32
         num_bands: (C,) int64
-        bands: padded with the last band. (C, 3, max J + 8) float32
-        num_channels: 1 where the curve is the same in all channels, else 3. (C,) int64
+        bands: padded with the last band; rows are the N settings of each channel, as far as they differ, channel by
+            channel. (C, at most 3 N, max J + 8) float32
+        num_rows: how many rows of each curve differ: 1, N or 3 N. (C,) int64
         support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
         constant: product of the curves, where all are flat and none is listed. (3,) float32
         active: index of the free curve, -1 for none.
+        num_settings: N, settings of the curves that are contracted at once; 1 where a curve is free.
     """
 
     kinds: NDArray[np.int64]
     axes: F32
     num_bands: NDArray[np.int64]
     bands: F32
-    num_channels: NDArray[np.int64]
+    num_rows: NDArray[np.int64]
     support: F32
     constant: F32
     active: int
+    num_settings: int
 
     @property
     def num_columns(self) -> int:
-        """J of the free curve, or 1."""
-        return int(self.num_bands[self.active]) if self.active >= 0 else 1
+        """J of the free curve, or N."""
+        return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
 
-def _support(bands: NDArray[np.float64]) -> float:
-    """Number of bands after which a curve stays below a billionth of its peak. bands: (3, J)"""
-    seen = np.nonzero(bands.max(axis=0) > _NOTHING * bands.max())[0]
+def _support(rows: NDArray[np.float64]) -> float:
+    """Number of bands after which each of a curve's rows stays below a billionth of its own peak. rows: (R, J)"""
+    seen = np.nonzero((rows > _NOTHING * rows.max(axis=1, keepdims=True)).any(axis=0))[0]
     return float(seen[-1] + 1) if len(seen) else 0.0
 
 
 def _is_flat(bands: NDArray[np.float64]) -> bool:
     """Whether a curve (3, J) is the same everywhere, but for rounding."""
-    return bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
+    return bands.ndim == 2 and bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
+
+
+def _rows(bands: NDArray[np.float64], num_settings: int) -> NDArray[np.float64]:
+    """A curve's rows as far as they differ, see `Contraction.bands`. (3, J) or (3, N, J) -> (1, N or 3 N, J)"""
+    if np.all(bands == bands[0]):
+        return np.atleast_2d(bands[0])
+    return bands.reshape(-1, bands.shape[-1]) if bands.ndim == 3 else np.repeat(bands, num_settings, axis=0)
 
 
 def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
     """Make a term ready: curves of the outgoing angle are left out (they multiply the finished sample).
 
     Args:
-        bands: of each curve by name. (3, J) float64
+        bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings of it at once
         active: the curve that stays free, None to contract all.
     """
     curves = [curve for curve in term.curves if not curve.outgoing]
@@ -97,19 +107,25 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
         # divided, and a curve that becomes flat must not change that
         constant = np.prod([bands[curve.name].mean(axis=1) for curve in curves], axis=0)
         curves = []
-    rows = [bands[curve.name] for curve in curves]
+    num_settings = max((bands[curve.name].shape[1] for curve in curves if bands[curve.name].ndim == 3), default=1)
+    rows = [_rows(bands[curve.name], num_settings) for curve in curves]
     free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
     widest = max((row.shape[1] for row in rows), default=1) + EIGHT
-    padded = [np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge") for row in rows]
+    highest = max((len(row) for row in rows), default=1)
+    padded = [
+        np.pad(np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge"), ((0, highest - len(row)), (0, 0)))
+        for row in rows
+    ]
     return Contraction(
         np.array([int(curve.angle) for curve in curves], np.int64),
         np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
         np.array([row.shape[1] for row in rows], np.int64),
-        np.array(padded, np.float32).reshape(len(rows), 3, widest),
-        np.array([1 if np.all(row == row[0]) else 3 for row in rows], np.int64),
+        np.array(padded, np.float32).reshape(len(rows), highest, widest),
+        np.array([len(row) for row in rows], np.int64),
         np.array([np.inf if k == free else _support(row) for k, row in enumerate(rows)], np.float32),
         constant.astype(np.float32),
         free,
+        num_settings,
     )
 
 
@@ -130,14 +146,15 @@ class Projector:
         """Transport of points [start, stop) along the free curve, in its bands.
 
         Returns:
-            (stop - start, J, 3) float32; J = 1 where no curve is free.
+            (stop - start, J, 3) float32; with no free curve (stop - start, N, 3).
         """
-        num_columns = self._contraction.num_columns
-        out = np.zeros((stop - start, 3, num_columns + EIGHT), np.float32)
+        c = self._contraction
+        shape = (3, c.num_columns + EIGHT) if c.active >= 0 else (3 * c.num_settings, 1)
+        out = np.zeros((stop - start, *shape), np.float32)
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-        return out[:, :, :num_columns].transpose(0, 2, 1)
+        return out.reshape(stop - start, 3, -1)[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         r, lights, c = self._receivers, self._lights, self._contraction
@@ -173,7 +190,7 @@ class Projector:
             c.axes,
             c.num_bands,
             c.bands,
-            c.num_channels,
+            c.num_rows,
             c.support,
             c.active,
             start,
