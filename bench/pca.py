@@ -3,7 +3,8 @@
 Norm of `pca.blinn_phong_6`: √mean (linearised − exact)² ÷ √mean exact² over all bands and values of the parameter, the
 exponent evenly spaced over [3, 300] as in the paper, 256 bands; decomposed at 298 values, measured at those between.
 `pca.vectors` is the largest number of vectors, over all terms and sliders, that holds this norm to 1e-3; in its context
-are the errors of each slider with 2 to 16 vectors: over all values, and at the worst of them.
+are the errors of each slider with 2 to 16 vectors: over all values, and at the worst of them. `pca.slider_nodes` is the
+largest number of nodes of an operator along a slider (`relume.transfer.slider`), all of them in the context.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import bands_at, moved_curves, slider_values
 from relume.brdf.term import F64, Parameter, Term
+from relume.transfer.slider import linearise
 
 _NUM_VECTORS = (2, 4, 6, 8, 10, 12, 16)
 _BOUND = 1e-3
@@ -39,7 +41,19 @@ def measure(tiny: bool) -> list[Figure]:
     return [
         Figure("pca.blinn_phong_6", paper[6][0], "relative RMS", {"errors": _said(paper)}),
         Figure("pca.vectors", needed, "vectors", context),
+        _nodes([TERMS["lambert"], TERMS["cook_torrance"]] if tiny else list(TERMS.values())),
     ]
+
+
+def _nodes(terms: list[Term]) -> Figure:
+    """Nodes of every slider; "bands" where too many would be needed."""
+    found: dict[str, int | str] = {}
+    for term in terms:
+        for parameter in term.parameters:
+            if moved_curves(term, parameter.name):
+                linearised = linearise({"model": term.model, "params": {}}, parameter.name)
+                found[f"{term.model}.{parameter.name}"] = "bands" if linearised is None else linearised.num_nodes
+    return Figure("pca.slider_nodes", max(n for n in found.values() if isinstance(n, int)), "nodes", found)
 
 
 def _errors(term: Term, parameter: Parameter, num: int) -> dict[int, tuple[float, float]]:
