@@ -154,7 +154,7 @@ class Projector:
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-        return out.reshape(stop - start, 3, -1)[:, :, : c.num_columns].transpose(0, 2, 1)
+        return out.reshape(stop - start, 3, shape[0] * shape[1] // 3)[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         r, lights, c = self._receivers, self._lights, self._contraction

@@ -173,6 +173,11 @@ def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert len(err.splitlines()) == 1
 
 
+def hear_interrupts() -> None:
+    """Whoever runs the tests in the background of a script has them, and what they start, ignore SIGINT."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 LONG = ["bake", "quad", "--size", "640x480", "--lights", "300"]  # long enough for a cluster to start
 
 
@@ -188,7 +193,9 @@ def wait_for_state(data: Path, state: str) -> None:
 
 
 def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data: Path) -> None:
-    process = subprocess.Popen([*RELUME, *LONG], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [*RELUME, *LONG], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+    )
     wait_for_state(data, "running")
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=120)
@@ -202,7 +209,7 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
 
 def test_interrupt_at_a_terminal_asks_and_can_leave_the_bake_running(data: Path) -> None:
     controller, terminal = pty.openpty()
-    process = subprocess.Popen([*RELUME, *LONG], stdin=terminal, stdout=terminal, stderr=terminal, process_group=0)
+    process = subprocess.Popen([*RELUME, *LONG], stdin=terminal, stdout=terminal, stderr=terminal, process_group=0, preexec_fn=hear_interrupts)
     os.close(terminal)
     wait_for_state(data, "running")
     process.send_signal(signal.SIGINT)
