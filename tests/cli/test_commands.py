@@ -209,7 +209,9 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
 
 def test_interrupt_at_a_terminal_asks_and_can_leave_the_bake_running(data: Path) -> None:
     controller, terminal = pty.openpty()
-    process = subprocess.Popen([*RELUME, *LONG], stdin=terminal, stdout=terminal, stderr=terminal, process_group=0, preexec_fn=hear_interrupts)
+    process = subprocess.Popen(
+        [*RELUME, *LONG], stdin=terminal, stdout=terminal, stderr=terminal, process_group=0, preexec_fn=hear_interrupts
+    )
     os.close(terminal)
     wait_for_state(data, "running")
     process.send_signal(signal.SIGINT)
