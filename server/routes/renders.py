@@ -39,16 +39,21 @@ def baked_view(name: str, transfer: Transfer) -> Any:
     return transfer.views[name]
 
 
+def check_look(partial: dict[str, Any], transfer: Transfer, pointer: str) -> None:
+    """A look that stands at `pointer` of a body. Raises ParameterError."""
+    try:
+        looks.complete(partial, transfer.default_look)
+    except ParameterError as error:
+        raise ParameterError(f"{pointer}{error.name}", error.value, error.allowed) from None
+
+
 def _check(request: RenderRequest, transfer: Transfer) -> None:
     view = baked_view(request.view, transfer)
     if request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
     for index, partial in enumerate(request.looks):
-        try:
-            looks.complete(partial, transfer.default_look)
-        except ParameterError as error:
-            raise ParameterError(f"/looks/{index}{error.name}", error.value, error.allowed) from None
+        check_look(partial, transfer, f"/looks/{index}")
 
 
 @router.get("/{render}")

@@ -9,13 +9,11 @@ from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from relume import look as looks
-from relume.errors import ParameterError
 from server.bodies import Id, TruthBody, TruthFigures, TruthRequest
 from server.errors import NotReadyError
 from server.live.ports import Transfer
 from server.routes.bakes import ready_bake
-from server.routes.renders import baked_view
+from server.routes.renders import baked_view, check_look
 from server.services import Shared
 from server.truths import TruthStatus
 
@@ -35,10 +33,7 @@ async def submit_truth(request: TruthRequest, services: Shared, response: Respon
 
 def _check(request: TruthRequest, transfer: Transfer) -> None:
     baked_view(request.view, transfer)
-    try:
-        looks.complete(request.look, transfer.default_look)
-    except ParameterError as error:
-        raise ParameterError(f"/look{error.name}", error.value, error.allowed) from None
+    check_look(request.look, transfer, "/look")
 
 
 @router.get("/{truth}")
