@@ -20,8 +20,6 @@ from worker.scenes import register_scene
 NUM_LIGHTS, BAKE_S = 200, 300.0
 ARGUMENTS = [
     "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-background-networking",
 ]
