@@ -59,11 +59,11 @@ def _shares(builder: Any, band: Any, overlap: Any) -> Any:
     return builder.fsub(above, below, flags=_FAST)
 
 
-def _address(context: Any, builder: Any, array_type: Any, array: Any, channel: Any, band: Any) -> Any:
-    """Where the eight floats array[channel, band:] stand."""
+def _address(context: Any, builder: Any, array_type: Any, array: Any, *index: Any) -> Any:
+    """Where the eight floats from an index on stand, in the last dimension."""
     struct = context.make_array(array_type)(context, builder, array)
     shape, strides = _builders.unpack_tuple(builder, struct.shape), _builders.unpack_tuple(builder, struct.strides)
-    item = _builders.get_item_pointer2(context, builder, struct.data, shape, strides, "C", [channel, band])
+    item = _builders.get_item_pointer2(context, builder, struct.data, shape, strides, "C", index)
     return builder.bitcast(item, _VECTOR.as_pointer())
 
 
@@ -99,3 +99,27 @@ def mean_of_eight(typing_context, bands, channel, band, low, middle, high, rise,
         return builder.call(add_up, [ir.Constant(_FLOAT, 0.0), product], fastmath=_FAST)
 
     return types.float32(bands, types.int64, types.int64, *_OVERLAP), generate
+
+
+@_intrinsic
+def add_means_of_eight(typing_context, means, settings, first, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
+    """Add Σ Δ_j settings[j] over bands [band, band + 8) to the means, eight settings from the first on.
+
+    means: (settings,), settings: (bands padded by 8, settings); float32, a multiple of eight settings.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        means_array, array, first_setting, first_band, *overlap = arguments
+        shares = _shares(builder, first_band, overlap)
+        address = _address(context, builder, signature.args[0], means_array, first_setting)
+        total = builder.load(address, align=4)
+        for lane in range(NUM):
+            share = builder.extract_element(shares, ir.Constant(_INDEX, lane))
+            row = builder.add(first_band, ir.Constant(ir.IntType(64), lane))
+            values = builder.load(_address(context, builder, signature.args[1], array, row, first_setting), align=4)
+            part = builder.fmul(values, _spread(builder, share), flags=_FAST)
+            total = builder.fadd(total, part, flags=_FAST)
+        builder.store(total, address, align=4)
+        return context.get_dummy_value()
+
+    return types.void(means, settings, types.int64, types.int64, *_OVERLAP), generate

@@ -15,7 +15,7 @@ import numpy as np
 
 from relume.brdf.angles import angles_into
 from relume.transfer.eight_bands import NUM as EIGHT
-from relume.transfer.eight_bands import deposit_eight, mean_of_eight
+from relume.transfer.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight
 from relume.transfer.overlap import overlap_of
 
 _QUARTER = np.float32(0.25)
@@ -36,6 +36,7 @@ _BATCH = 16  # lights divided together
 _LANES = 32
 _MOST_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
 _MOST_LEAVES = _BATCH * 4**_MAX_DEPTH
+_LEAVES_AT_ONCE = 64  # multiplied by the settings of a curve
 
 
 @nb.njit(nogil=True, cache=True)
@@ -182,23 +183,24 @@ def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _multiply_means(overlap, bands, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights (R, n) of leaves by the mean of a dormant curve over each.
+    """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
 
     Args:
         overlap: from `_overlaps`. bands: of the curve, padded. (≥ num_rows, ≥ num_bands + 8)
-        num_rows: how many rows of `bands` differ; row r of the weights takes row r modulo this.
+        num_rows: 1 where the channels are alike, else 3.
     """
     last = num_bands - 1
-    mean = np.empty(num_rows, np.float32)
     for n in range(num):
         low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
-        mean[:] = 0
+        red = green = blue = np.float32(0)
         for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
-            for row in range(num_rows):
-                mean[row] += mean_of_eight(bands, row, band, low, middle, high, rise, fall)
-        for row in range(num_rows):
-            for alike in range(row, weight.shape[0], num_rows):
-                weight[alike, n] *= mean[row]
+            red += mean_of_eight(bands, 0, band, low, middle, high, rise, fall)
+            if num_rows == 3:
+                green += mean_of_eight(bands, 1, band, low, middle, high, rise, fall)
+                blue += mean_of_eight(bands, 2, band, low, middle, high, rise, fall)
+        weight[0, n] *= red
+        weight[1, n] *= green if num_rows == 3 else red
+        weight[2, n] *= blue if num_rows == 3 else red
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -216,45 +218,90 @@ def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-d
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
-    """Light of each leaf: power · q cos θi · its share of the triangle, in all rows of weight (3 N, n)."""
-    num_settings, blue_row = weight.shape[0] // 3, shading.shape[0] - 1
+def _multiply_settings(overlap, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
+    """Multiply each leaf's product (n, rows) by the means of a dormant curve at all its settings over that leaf.
+
+    Args:
+        overlap: from `_overlaps`. settings: of the curve, padded. (≥ num_bands + 8, rows)
+        mean: scratch. (rows,)
+    """
+    last = num_bands - 1
     for n in range(num):
-        entry = begin + of_entry[n]
-        m = np.uint64(light[entry])
-        for channel in range(3):
-            of_channel = power[m, channel] * (shading[blue_row * channel // 2, entry] * shares[n])
-            for row in range(channel * num_settings, (channel + 1) * num_settings):
-                weight[row, n] = of_channel
+        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
+        mean[:] = 0
+        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
+            for row in range(0, mean.shape[0], EIGHT):
+                add_means_of_eight(mean, settings, row, band, low, middle, high, rise, fall)
+        for row in range(mean.shape[0]):
+            product[n, row] *= mean[row]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out):  # type: ignore[no-untyped-def]
+def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out):  # type: ignore[no-untyped-def]
+    """Add the leaves' weights (3, n) times their curves at all settings. out: (3, N)
+
+    A handful of leaves at a time, whose products stay in a core's first-level cache.
+    """
+    num_settings = out.shape[1]
+    offset = num_settings if mean.shape[0] > num_settings else 0
+    for begin in range(0, num, product.shape[0]):
+        count = min(product.shape[0], num - begin)
+        product[:count] = 1
+        for k in range(leaves.shape[0]):
+            if setting_of[k] >= 0:
+                _overlaps(leaves[k, :, begin : begin + count], num_bands[k], count, overlap)
+                _multiply_settings(overlap, settings[setting_of[k]], num_bands[k], count, mean, product)
+        for n in range(count):
+            for channel in range(3):
+                of_channel = weight[channel, begin + n]
+                for row in range(num_settings):
+                    out[channel, row] += of_channel * product[n, offset * channel + row]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _weigh(power, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
+    """Light of each leaf: power · q cos θi · its share of the triangle. weight: (3, n), written."""
+    blue_row = shading.shape[0] - 1
+    for n in range(num):
+        entry = begin + of_entry[n]
+        m = np.uint64(light[entry])
+        weight[0, n] = power[m, 0] * (shading[0, entry] * shares[n])
+        weight[1, n] = power[m, 1] * (shading[blue_row // 2, entry] * shares[n])
+        weight[2, n] = power[m, 2] * (shading[blue_row, entry] * shares[n])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _spend(  # type: ignore[no-untyped-def]
+    leaves, num, num_bands, bands, num_rows, settings, setting_of, active, overlap, weight, mean, product, out
+):  # fmt: skip
     """Weigh the leaves by the dormant curves and share them out."""
     for k in range(leaves.shape[0]):
-        if k != active:
+        if k != active and setting_of[k] < 0:
             _overlaps(leaves[k], num_bands[k], num, overlap)
             _multiply_means(overlap, bands[k], num_bands[k], num_rows[k], num, weight)
     if active >= 0:
         _overlaps(leaves[active], num_bands[active], num, overlap)
         _deposit(overlap, num_bands[active], num, weight, out)
-        return
-    for row in range(weight.shape[0]):
-        total = np.float32(0)
-        for n in range(num):
-            total += weight[row, n]
-        out[row, 0] += total
+    elif settings.shape[0] > 0:
+        _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out)
+    else:
+        for channel in range(3):
+            total = np.float32(0)
+            for n in range(num):
+                total += weight[channel, n]
+            out[channel, 0] += total
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, power,
-    kinds, axes, num_bands, bands, num_rows, support, active, start, stop, out,
+    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, start, stop, out,
 ):  # fmt: skip
     """Project points [start, stop); `first`, `light`, `shading` (q · cos θi) and `local_wo` list their lights.
 
     shading: one row for all channels, or three. (1 or 3, K)
-    out: (points, 3, J padded by 8) float32, added to; with no free curve (points, 3 N, 1) for N settings of the others.
+    bands, settings, setting_of: see `Contraction`.
+    out: (points, 3, J padded by 8) float32, added to; with no free curve (points, 3, N) for N settings of the others.
     """
     num_curves, num_lights = kinds.shape[0], nodes.shape[2]
     scale = np.empty(num_curves, np.float32)
@@ -273,7 +320,8 @@ def project_points(  # type: ignore[no-untyped-def]
     capacity = 4 * num_lights + _MOST_LEAVES
     leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
     of_entry = np.empty(capacity, np.int64)
-    overlap, weight = np.empty((5, capacity), np.float32), np.empty((out.shape[1], capacity), np.float32)
+    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
+    mean, product = np.empty(settings.shape[2], np.float32), np.empty((_LEAVES_AT_ONCE, settings.shape[2]), np.float32)
     scaled_wo = np.empty((num_curves, 3), np.float32)
     for p in range(start, stop):
         row = p - start
@@ -292,7 +340,10 @@ def project_points(  # type: ignore[no-untyped-def]
         for batch in range(0, num_divided, _BATCH):
             if num + _MOST_LEAVES > capacity:
                 _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-                _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out[row])
+                _spend(
+                    leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+                    overlap, weight, mean, product, out[row],
+                )  # fmt: skip
                 num = 0
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
@@ -307,4 +358,7 @@ def project_points(  # type: ignore[no-untyped-def]
                 )
                 of_local, of_gamma, of_origin = to_local, to_gamma, to_origin
         _weigh(power, light, shading, begin, of_entry, shares, num, weight)
-        _spend(leaves, num, num_bands, bands, num_rows, active, overlap, weight, out[row])
+        _spend(
+            leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+            overlap, weight, mean, product, out[row],
+        )  # fmt: skip

@@ -8,7 +8,7 @@ linear (near its pole) are divided into four until it is (appendix A).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,9 +50,11 @@ class Contraction:
         kinds: `Angle` of each curve that depends on wi. (C,) int64
         axes: `Curve.axes` of each. (C, 3) float32
         num_bands: (C,) int64
-        bands: padded with the last band; rows are the N settings of each channel, as far as they differ, channel by
-            channel. (C, at most 3 N, max J + 8) float32
-        num_rows: how many rows of each curve differ: 1, N or 3 N. (C,) int64
+        bands: padded with the last band. (C, 3, max J + 8) float32
+        num_rows: 1 where a curve is the same in all channels, else 3. (C,) int64
+        settings: the curves that have several, settings last: N, padded with zeros to a multiple of eight, or three
+            times as many where channels differ. (V, max J + 8, 8 n or 24 n) float32
+        setting_of: row of each curve in `settings`, -1 for none. (C,) int64
         support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
         constant: product of the curves, where all are flat and none is listed. (3,) float32
         active: index of the free curve, -1 for none.
@@ -64,6 +66,8 @@ class Contraction:
     num_bands: NDArray[np.int64]
     bands: F32
     num_rows: NDArray[np.int64]
+    settings: F32
+    setting_of: NDArray[np.int64]
     support: F32
     constant: F32
     active: int
@@ -76,8 +80,9 @@ class Contraction:
 
 
 def _support(rows: NDArray[np.float64]) -> float:
-    """Number of bands after which each of a curve's rows stays below a billionth of its own peak. rows: (R, J)"""
-    seen = np.nonzero((rows > _NOTHING * rows.max(axis=1, keepdims=True)).any(axis=0))[0]
+    """Number of bands after which each of a curve's rows stays below a billionth of its own peak. rows: (..., J)"""
+    above = rows > _NOTHING * rows.max(axis=-1, keepdims=True)
+    seen = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
     return float(seen[-1] + 1) if len(seen) else 0.0
 
 
@@ -86,11 +91,16 @@ def _is_flat(bands: NDArray[np.float64]) -> bool:
     return bands.ndim == 2 and bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
 
 
-def _rows(bands: NDArray[np.float64], num_settings: int) -> NDArray[np.float64]:
-    """A curve's rows as far as they differ, see `Contraction.bands`. (3, J) or (3, N, J) -> (1, N or 3 N, J)"""
-    if np.all(bands == bands[0]):
-        return np.atleast_2d(bands[0])
-    return bands.reshape(-1, bands.shape[-1]) if bands.ndim == 3 else np.repeat(bands, num_settings, axis=0)
+def _settings(several: Sequence[NDArray[np.float64]], widest: int) -> F32:
+    """`Contraction.settings` of curves (3, N, J) each."""
+    if not several:
+        return np.empty((0, widest, 0), np.float32)
+    num_channels = 1 if all(np.all(bands == bands[0]) for bands in several) else 3
+    num_padded = -(-several[0].shape[1] // EIGHT) * EIGHT
+    laid_out = np.zeros((len(several), widest, num_channels, num_padded), np.float32)
+    for rows, bands in zip(laid_out, several, strict=True):
+        rows[: bands.shape[2], :, : bands.shape[1]] = bands[:num_channels].transpose(2, 0, 1)
+    return laid_out.reshape(len(several), widest, -1)
 
 
 def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
@@ -107,25 +117,25 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
         # divided, and a curve that becomes flat must not change that
         constant = np.prod([bands[curve.name].mean(axis=1) for curve in curves], axis=0)
         curves = []
-    num_settings = max((bands[curve.name].shape[1] for curve in curves if bands[curve.name].ndim == 3), default=1)
-    rows = [_rows(bands[curve.name], num_settings) for curve in curves]
+    given = [bands[curve.name] for curve in curves]
+    several = [rows for rows in given if rows.ndim == 3]
     free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
-    widest = max((row.shape[1] for row in rows), default=1) + EIGHT
-    highest = max((len(row) for row in rows), default=1)
-    padded = [
-        np.pad(np.pad(row, ((0, 0), (0, widest - row.shape[1])), mode="edge"), ((0, highest - len(row)), (0, 0)))
-        for row in rows
-    ]
+    widest = max((rows.shape[-1] for rows in given), default=1) + EIGHT
+    alone = [rows if rows.ndim == 2 else np.zeros((3, rows.shape[2])) for rows in given]
+    padded = [np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), mode="edge") for rows in alone]
+    varies = np.array([rows.ndim == 3 for rows in given], bool)
     return Contraction(
-        np.array([int(curve.angle) for curve in curves], np.int64),
-        np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
-        np.array([row.shape[1] for row in rows], np.int64),
-        np.array(padded, np.float32).reshape(len(rows), highest, widest),
-        np.array([len(row) for row in rows], np.int64),
-        np.array([np.inf if k == free else _support(row) for k, row in enumerate(rows)], np.float32),
-        constant.astype(np.float32),
-        free,
-        num_settings,
+        kinds=np.array([int(curve.angle) for curve in curves], np.int64),
+        axes=np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
+        num_bands=np.array([rows.shape[-1] for rows in given], np.int64),
+        bands=np.array(padded, np.float32).reshape(len(curves), 3, widest),
+        num_rows=np.array([1 if np.all(rows == rows[0]) else 3 for rows in alone], np.int64),
+        settings=_settings(several, widest),
+        setting_of=np.where(varies, np.cumsum(varies) - 1, -1),
+        support=np.array([np.inf if k == free else _support(rows) for k, rows in enumerate(given)], np.float32),
+        constant=constant.astype(np.float32),
+        active=free,
+        num_settings=several[0].shape[1] if several else 1,
     )
 
 
@@ -149,12 +159,12 @@ class Projector:
             (stop - start, J, 3) float32; with no free curve (stop - start, N, 3).
         """
         c = self._contraction
-        shape = (3, c.num_columns + EIGHT) if c.active >= 0 else (3 * c.num_settings, 1)
-        out = np.zeros((stop - start, *shape), np.float32)
+        num_padded = c.num_columns + EIGHT if c.active >= 0 else -(-c.num_settings // EIGHT) * EIGHT
+        out = np.zeros((stop - start, 3, num_padded), np.float32)
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-        return out.reshape(stop - start, 3, shape[0] * shape[1] // 3)[:, :, : c.num_columns].transpose(0, 2, 1)
+        return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         r, lights, c = self._receivers, self._lights, self._contraction
@@ -191,6 +201,8 @@ class Projector:
             c.num_bands,
             c.bands,
             c.num_rows,
+            c.settings,
+            c.setting_of,
             c.support,
             c.active,
             start,

@@ -139,7 +139,10 @@ def freeze_slider(
     progress: Callable[[float], None],
     cancelled: Callable[[], bool],
 ) -> FrozenSlider:
-    """Contract all curves at all nodes of a parameter at once.
+    """Contract all curves at all nodes of a parameter in one pass.
+
+    Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
+    share light out to.
 
     Args:
         document: the term; its value of the parameter does not matter.
@@ -149,7 +152,9 @@ def freeze_slider(
     """
     term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-    contraction = contract(term, {**bands, **linearised.bands(document)}, None)
+    at_nodes = linearised.bands(document)
+    alone = linearised.curves[0].name if len(linearised.curves) == 1 else None
+    contraction = contract(term, bands if alone else {**bands, **at_nodes}, alone)
     num_samples = len(receivers.normal)
     tiles, samples = tiles_of(num_samples)
     rows = np.zeros((tiles * samples, linearised.num_nodes, 3), np.float32)
@@ -158,7 +163,11 @@ def freeze_slider(
     def step(start: int, stop: int) -> None:
         if cancelled():
             raise CancelledError("freezing was cancelled")
-        rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)
+        projected = Projector(term, contraction, lights, receivers).project(start, stop)
+        if alone is not None:
+            matrices = at_nodes[alone].astype(np.float32)
+            projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
+        rows[start:stop] = projected
         with lock:
             done[0] += stop - start
             progress(done[0] / num_samples)
