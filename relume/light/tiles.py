@@ -34,7 +34,9 @@ _RELIGHTABLE_UNIFORM_SHARE = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
 # counter-clockwise seen from outside, and so are all their descendants; in the order of the signs of x, y, z
-_OCTANTS = ((5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 3, 0), (5, 2, 0), (0, 2, 4))
+_OCTANTS = np.array([(5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 3, 0), (5, 2, 0), (0, 2, 4)])
+# corners of the children at a, b, c and in the middle, of a, b, c and the middles of ab, bc, ca
+_CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 
 
 def unit(v: F64) -> F64:
@@ -64,7 +66,7 @@ class Tiles:
     @cached_property
     def corners(self) -> F64:
         """Unit corners of each, counter-clockwise seen from outside. (M, 3, 3)"""
-        return np.array([_corners(int(code)) for code in self.codes])
+        return _corners(self.codes)
 
     @cached_property
     def centroids(self) -> F64:
@@ -90,32 +92,40 @@ class Tiles:
         nodes = roots + sorted(inner.difference(roots))
         index.update((node, k) for k, node in enumerate(nodes) if node not in index)
         children = np.zeros((len(nodes), 4), np.int32)
-        edges = np.zeros((len(nodes), 3, 3))
         for k, node in enumerate(nodes):
             if index[node] < 0:  # an octant that is a tile itself
                 children[k] = index[node]
             else:
                 children[k] = [index[4 * node + child] for child in range(4)]
-            edges[k] = _middle_edges(_corners(node))
-        return edges, children
+        return _middle_edges(_corners(np.array(nodes, np.uint64))), children
 
 
-def _corners(code: int) -> F64:
-    """Corners of a node of the hierarchy. (3, 3)"""
-    levels = (code.bit_length() - 4) // 2
-    corners = _OCTAHEDRON[list(_OCTANTS[(code >> 2 * levels) - 8])]
-    for level in reversed(range(levels)):
-        a, b, c = corners
-        ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
-        corners = np.stack(((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))[(code >> 2 * level) & 3])
+def _corners(codes: NDArray[np.uint64]) -> F64:
+    """Corners of n nodes of the hierarchy. (n, 3, 3)"""
+    levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, codes)], np.uint64)
+    corners = _OCTAHEDRON[_OCTANTS[(codes >> 2 * levels) - 8]]
+    for level in range(int(levels.max(initial=0))):
+        deeper = np.nonzero(levels > level)[0]
+        child = (codes[deeper] >> 2 * (levels[deeper] - level - 1)) & 3
+        corners[deeper] = _children(corners[deeper])[np.arange(len(deeper)), child]
     return corners
 
 
+def _children(corners: F64) -> F64:
+    """Corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
+    six = np.concatenate([corners, _middles(corners)], axis=1)
+    return np.asarray(six[:, _CHILDREN], np.float64)
+
+
+def _middles(corners: F64) -> F64:
+    """Directions to the middles of the edges ab, bc, ca of triangles (n, 3, 3). (n, 3, 3)"""
+    return unit(corners + corners[:, (1, 2, 0)])
+
+
 def _middle_edges(corners: F64) -> F64:
-    """Normals of the edges of a triangle's middle child, each towards the corner that it cuts off. (3, 3)"""
-    a, b, c = corners
-    ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
-    return np.stack([np.cross(ab, ca), np.cross(bc, ab), np.cross(ca, bc)])
+    """Normals of the edges of triangles' middle children, each towards the corner that it cuts off. (n, 3, 3)"""
+    middles = _middles(corners)
+    return np.cross(middles, middles[:, (2, 0, 1)])
 
 
 @nb.njit(nogil=True, cache=True)
@@ -156,31 +166,31 @@ class _Subdivision:
         self.solid_angles = np.repeat(texel_solid_angles(height, width), width)
         self.luminous = luminance(radiance.reshape(-1, 3)).astype(np.float64) * self.solid_angles
         self.uniform = uniform_share * float(self.luminous.sum()) / (4 * np.pi)
-        self.heap: list[tuple[float, int, int, NDArray[np.int64]]] = []
+        self.heap: list[tuple[float, int, int, F64, NDArray[np.int64]]] = []
         self.count = 0
         sign = (self.directions >= 0).astype(np.int64)
         octant = sign[:, 0] * 4 + sign[:, 1] * 2 + sign[:, 2]
         for k in range(8):
-            self._push(8 + k, np.nonzero(octant == k)[0])
+            self._push(8 + k, _OCTAHEDRON[_OCTANTS[k]], np.nonzero(octant == k)[0])
 
-    def _push(self, code: int, texels: NDArray[np.int64]) -> None:
+    def _push(self, code: int, corners: F64, texels: NDArray[np.int64]) -> None:
         light = float(self.luminous[texels].sum())
         extent = float(self.solid_angles[texels].sum())
         metric = light * max(extent, 1e-12) ** _SOLID_ANGLE_EXPONENT + self.uniform * extent
         # fewer than two texels hold nothing more to resolve: last in the queue
         can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
-        heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, texels))
+        heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, corners, texels))
         self.count += 1
 
     def split_largest(self) -> bool:
         """Replace the leaf of largest metric by its four children; False where nothing is left to split."""
         if self.heap[0][0] == 0.0:
             return False
-        _, _, code, texels = heapq.heappop(self.heap)
+        _, _, code, corners, texels = heapq.heappop(self.heap)
         child_of = np.empty(len(texels), np.int8)
-        _split(texels, self.directions, _middle_edges(_corners(code)), child_of)
-        for child in range(4):
-            self._push(4 * code + child, texels[child_of == child])
+        _split(texels, self.directions, _middle_edges(corners[None])[0], child_of)
+        for child, its_corners in enumerate(_children(corners[None])[0]):
+            self._push(4 * code + child, its_corners, texels[child_of == child])
         return True
 
 

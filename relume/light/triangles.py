@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,49 +52,95 @@ class TriangleLights:
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
 
 
-def _tangent_frame(normal: F64) -> F64:
-    """Two unit vectors across a unit vector and across each other. (2, 3)"""
-    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = unit(np.cross(normal, aside))
-    return np.stack([first, np.cross(normal, first)])
+def _sums(place: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
+    """Sums of the values (n,) that have the same place (n,), in [0, num). (num,)"""
+    return np.asarray(np.bincount(place, values, num), np.float64)
 
 
-def _on_tangent_plane(directions: F64, normal: F64, frame: F64) -> F64:
-    """Gnomonic projection of directions (n, 3) onto the plane that touches the sphere at `normal`. (n, 2)"""
-    return np.asarray(directions @ frame.T / (directions @ normal)[:, None])
+@dataclass(frozen=True)
+class _Texels:
+    """The texels of an environment and the tiles they lie in.
+
+    Attributes:
+        tile: that each lies in. (n,) luminous: luminance × solid angle. (n,) directions: unit. (n, 3)
+        solid_angles: (n,)
+    """
+
+    tile: NDArray[np.int32]
+    luminous: F64
+    directions: F64
+    solid_angles: F64
+
+    def sums(self, values: F64, num_tiles: int) -> F64:
+        """Sums of values (n,) over the texels of each tile. (M,)"""
+        return _sums(self.tile, values, num_tiles)
 
 
-def _power_of(moment: F64, exponent: float) -> F64:
-    """A symmetric positive 2 × 2 matrix to a power; a vanishing extent is held above rounding."""
-    values, vectors = np.linalg.eigh(moment)
-    return np.asarray((vectors * np.maximum(values, 1e-14) ** exponent) @ vectors.T)
+def _tangent_frames(normals: F64) -> F64:
+    """For each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
+    aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = unit(np.cross(normals, aside))
+    return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def _matched(corners: F64, luminous: F64, directions: F64, solid_angles: F64) -> tuple[F64, F64]:
-    """The triangle (3, 3) whose light, uniform, has the moments of a tile's, and the mean direction (3,).
+def _on_tangent_plane(directions: F64, normals: F64, frames: F64) -> F64:
+    """Gnomonic projection of directions (n, 3), each onto the plane that touches the sphere at its normal. (n, 2)"""
+    height = np.einsum("ni,ni->n", directions, normals)
+    return np.asarray(np.einsum("ni,nki->nk", directions, frames) / height[:, None])
+
+
+def _power_of(moments: F64, exponent: float) -> F64:
+    """Symmetric positive 2 × 2 matrices (M, 2, 2) to a power; a vanishing extent is held above rounding."""
+    values, vectors = np.linalg.eigh(moments)
+    powers = np.maximum(values, 1e-14) ** exponent
+    return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
+
+
+def _matched(corners: F64, texels: _Texels) -> tuple[F64, F64]:
+    """The triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
 
     Args:
-        corners: of the tile. luminous, directions, solid_angles: of the texels in it.
+        corners: of the tiles. (M, 3, 3)
     """
-    total = float(luminous.sum())
-    towards = luminous @ directions
-    if total <= 0 or not towards.any():
-        return corners, unit(corners.mean(axis=0))
-    mean = unit(towards)
-    if float((corners @ mean).min()) < _TANGENT_COSINE:
-        return corners, mean
-    frame = _tangent_frame(mean)
-    position = _on_tangent_plane(directions, mean, frame)
-    centre = luminous @ position / total
-    position -= centre
+    num_tiles = len(corners)
+    total = texels.sums(texels.luminous, num_tiles)
+    towards = np.stack([texels.sums(texels.luminous * axis, num_tiles) for axis in texels.directions.T], axis=1)
+    is_lit = (total > 0) & towards.any(axis=1)
+    mean = unit(np.where(is_lit[:, None], towards, corners.mean(axis=1)))
+    is_small = np.einsum("mci,mi->mc", corners, mean).min(axis=1) >= _TANGENT_COSINE
+    fitted = np.nonzero(is_lit & is_small)[0]
+    matched = corners.copy()
+    centre, spread = _moments(texels, total, mean, fitted)
+    frames = _tangent_frames(mean[fitted])
+    corner = np.stack([_on_tangent_plane(corners[fitted, c], mean[fitted], frames) for c in range(3)], axis=1)
+    corner -= corner.mean(axis=1, keepdims=True)
+    uniform = corner.transpose(0, 2, 1) @ corner / 12  # second moment of a uniform triangle about its centroid
+    placed = corner @ _power_of(uniform, -0.5) @ _power_of(spread, 0.5) + centre[:, None]
+    matched[fitted] = unit(mean[fitted, None] + placed @ frames)
+    return matched, mean
+
+
+def _moments(texels: _Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
+    """First (F, 2) and second central (F, 2, 2) moments of the light of some tiles in the planes that touch at `mean`.
+
+    Args:
+        total: luminous light of all tiles. (M,) mean: its directions. (M, 3) fitted: the tiles in question. (F,)
+    """
+    is_fitted = np.isin(texels.tile, fitted)
+    chosen = _Texels(*(values[is_fitted] for values in vars(texels).values()))
+    place = np.searchsorted(fitted, chosen.tile)
+    frames, weight = _tangent_frames(mean[fitted]), chosen.luminous / total[chosen.tile]
+
+    def summed(values: F64) -> F64:
+        return _sums(place, weight * values, len(fitted))
+
+    position = _on_tangent_plane(chosen.directions, mean[chosen.tile], frames[place])
+    centre = np.stack([summed(position[:, i]) for i in range(2)], axis=1)
+    position -= centre[place]
     # a texel is no point: its own extent counts, as that of a square of its solid angle
-    extent = float(luminous @ solid_angles) / total / 12
-    spread = np.einsum("n,ni,nj->ij", luminous, position, position) / total + extent * np.eye(2)
-    corner = _on_tangent_plane(corners, mean, frame)
-    corner -= corner.mean(axis=0)
-    uniform = corner.T @ corner / 12  # second moment of a uniform triangle about its centroid
-    placed = corner @ _power_of(uniform, -0.5) @ _power_of(spread, 0.5) + centre
-    return unit(mean + placed @ frame), mean
+    extent = summed(chosen.solid_angles) / 12
+    xx, xy, yy = (summed(position[:, i] * position[:, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
+    return centre, np.stack([xx + extent, xy, xy, yy + extent], axis=1).reshape(-1, 2, 2)
 
 
 def nodes_of(corners: F64) -> F32:
@@ -113,18 +160,12 @@ def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
     height, width, _ = radiance.shape
     directions = turned(texel_directions(height, width).reshape(-1, 3).astype(np.float64), rotation)
     solid_angles = np.repeat(texel_solid_angles(height, width), width)
-    tile = tiles.locate(directions)
-    order = np.argsort(tile, kind="stable")
-    ends = np.cumsum(np.bincount(tile, minlength=len(tiles.codes)))
-    matched, power = [], np.zeros((len(ends), 3), np.float32)
-    for m, (start, stop) in enumerate(zip(np.concatenate([[0], ends[:-1]]), ends, strict=True)):
-        texels = order[start:stop]
-        light = radiance.reshape(-1, 3)[texels].astype(np.float64) * solid_angles[texels, None]
-        power[m] = light.sum(axis=0)
-        luminous = luminance(light.astype(np.float32)).astype(np.float64)
-        matched.append(_matched(tiles.corners[m], luminous, directions[texels], solid_angles[texels]))
-    direction = np.array([mean for _, mean in matched], np.float32)
-    return TriangleLights(nodes_of(np.array([corners for corners, _ in matched])), direction, power)
+    light = radiance.reshape(-1, 3).astype(np.float64) * solid_angles[:, None]
+    luminous = luminance(light.astype(np.float32)).astype(np.float64)
+    texels = _Texels(tiles.locate(directions), luminous, directions, solid_angles)
+    power = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
+    corners, mean = _matched(tiles.corners, texels)
+    return TriangleLights(nodes_of(corners), mean.astype(np.float32), power.astype(np.float32))
 
 
 def subdivide(radiance: F32, num_lights: int) -> TriangleLights:
