@@ -23,7 +23,7 @@ export type {
   TruthBody,
   TruthRequest,
 } from "./protocol.gen";
-export { MAX_MESSAGE_BYTES, SUBPROTOCOL } from "./protocol.gen";
+export { MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type ParamValue = number | Rgb;

@@ -120,12 +120,23 @@ describe("terms", () => {
 });
 
 test("a place survives the URL", () => {
-  const place = { scene: "ab12", bake: "cd34", view: "front & left", material: "a/b~c", term: 2, curve: "theta_h" };
+  const place = {
+    scene: "ab12",
+    bake: "cd34",
+    view: "front & left",
+    beside: [],
+    material: "a/b~c",
+    term: 2,
+    curve: "theta_h",
+  };
   expect(placeFromUrl(placeToUrl(place))).toEqual(place);
+  const several = { ...place, beside: ["front & left", "a, b", "c=d"] };
+  expect(placeFromUrl(placeToUrl(several))).toEqual(several);
   expect(placeFromUrl("?term=-3")).toEqual({
     scene: null,
     bake: null,
     view: null,
+    beside: [],
     material: null,
     term: 0,
     curve: null,

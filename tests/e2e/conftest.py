@@ -43,7 +43,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     server = Server(data)
     server.start()
     try:
-        recipe = {"scene": scene.id, "views": ["front"], "size": SIZE, "lights": NUM_LIGHTS}
+        recipe = {"scene": scene.id, "views": ["front", "left"], "size": SIZE, "lights": NUM_LIGHTS}
         bake = server.call("/api/bakes", recipe)
         deadline = time.monotonic() + BAKE_S
         while bake["state"] in ("queued", "running") and time.monotonic() < deadline:

@@ -1,18 +1,20 @@
 /** A library material dragged over the picture: the object below is outlined, and takes it when it is dropped. */
 import { hitAt } from "../picture/hit";
+import type { Screen } from "../picture/screen";
 import { hoveredMaterial } from "../state/store";
 import { DRAG_TYPE, putOn } from "./library";
 
-export function acceptMaterials(canvas: HTMLCanvasElement): () => void {
+export function acceptMaterials(screen: Screen): () => void {
+  const { canvas } = screen;
   const over = (event: DragEvent) => {
     if (!event.dataTransfer?.types.includes(DRAG_TYPE)) return;
-    const { material } = hitAt(canvas, event);
+    const { material } = hitAt(screen, event);
     hoveredMaterial.value = material;
     if (material !== null) event.preventDefault(); // the browser's word for "may be dropped here"
   };
   const drop = (event: DragEvent) => {
     const id = event.dataTransfer?.getData(DRAG_TYPE);
-    const { material } = hitAt(canvas, event);
+    const { material } = hitAt(screen, event);
     hoveredMaterial.value = null;
     if (!id || material === null) return;
     event.preventDefault();

@@ -3,15 +3,15 @@ import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
-import { fetchPicture } from "../state/live";
-import { defaultLook, exact, look, scene, viewName, wipe } from "../state/store";
+import { withPicturesOf } from "../state/live";
+import { connection, defaultLook, exact, held, look, scene, showBefore, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
 import { freeName } from "./names";
 import { addLook, keepThumbnail, shelf } from "./shelf";
 
 /** The look whose picture is kept as A, and what it is called. */
-export const sideA = signal<{ look: Look; label: string; view: string } | null>(null);
+export const sideA = signal<{ look: Look; label: string } | null>(null);
 
 /** Missing parts of a saved look are the scene's own. */
 export function completed(partial: Partial<Look>): Look {
@@ -25,17 +25,17 @@ export function completed(partial: Partial<Look>): Look {
 }
 
 export function markA(): void {
-  if (look.value === null || !stage.hasPicture) return;
-  sideA.value = { look: look.value, label: "kept", view: viewName.value };
-  stage.setReference(stage.capture());
+  if (look.value === null || !stage.active.isThere) return;
+  sideA.value = { look: look.value, label: "kept" };
+  stage.keepReference();
   note("This picture is A now. W wipes between A and the live picture.");
 }
 
 /** Keep the picture of another look as A; it is fetched from the server. */
 export async function markLook(of: Look, label: string): Promise<void> {
   await attempt(async () => {
-    stage.setReference(await fetchPicture(of));
-    sideA.value = { look: of, label, view: viewName.value };
+    await withPicturesOf(of, () => stage.keepReference());
+    sideA.value = { look: of, label };
   });
 }
 
@@ -43,25 +43,20 @@ export async function markLook(of: Look, label: string): Promise<void> {
 export function swapA(): void {
   const [a, live] = [sideA.value, look.value];
   if (a === null || live === null) return;
-  const picture = stage.capture();
+  stage.keepReference();
   commit("Swap A and live", a.look);
-  stage.setReference(picture);
-  sideA.value = { look: live, label: "swapped", view: viewName.value };
+  sideA.value = { look: live, label: "swapped" };
 }
 
 export function toggleWipe(): void {
-  const on = !wipe.value.on;
-  const a = sideA.value;
-  wipe.value = { ...wipe.value, on };
-  // the view has changed since A was kept: its picture from here is another one
-  if (on && a !== null && a.view !== viewName.value) void markLook(a.look, a.label);
+  wipe.value = { ...wipe.value, on: !wipe.value.on };
 }
 
 export async function saveLook(): Promise<void> {
   const current = look.value;
   if (current === null) return;
   const name = freeName(shelf.value.map((entry) => entry.name));
-  keepThumbnail(name, thumbnail(stage.capture(), current.display));
+  keepThumbnail(name, thumbnail(stage.active.pixels, current.display));
   await addLook(name, current);
 }
 
@@ -71,6 +66,14 @@ effect(() => {
   const id = scene.value?.id ?? null;
   if (!exact.value || id === null || id === openedScene) return;
   openedScene = id;
-  sideA.value = { look: look.peek() as Look, label: "as opened", view: viewName.peek() };
-  stage.setReference(stage.capture());
+  sideA.value = { look: look.peek() as Look, label: "as opened" };
+  stage.keepReference();
+});
+
+// a view that was not shown when A was kept has no picture of it yet
+effect(() => {
+  const a = sideA.value;
+  const isCompared = wipe.value.on || showBefore.value;
+  if (a === null || !isCompared || !exact.value || held.value || connection.value !== "open") return;
+  if (stage.shown.some((picture) => picture.reference === null)) void markLook(a.look, a.label);
 });

@@ -23,10 +23,10 @@ function download(href: string, name: string): void {
 
 export async function exportPng(): Promise<void> {
   const current = look.value;
-  if (current === null || !stage.hasPicture) return;
+  if (current === null || !stage.active.isThere) return;
   await attempt(async () => {
     await whenExact();
-    const url = URL.createObjectURL(await pngBlob(stage.capture(), current.display));
+    const url = URL.createObjectURL(await pngBlob(stage.active.pixels, current.display));
     download(url, fileName("png"));
     window.setTimeout(() => URL.revokeObjectURL(url), 10_000);
   });

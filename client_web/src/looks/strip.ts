@@ -2,7 +2,7 @@
 import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
-import { drawn, exact, look } from "../state/store";
+import { drawn, exact, held, look } from "../state/store";
 import { completed } from "./compare";
 import { thumbnail } from "./image";
 import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
@@ -34,8 +34,8 @@ effect(() => {
   clearTimeout(timer);
   if (!exact.value || current === null || images.has(current)) return;
   timer = window.setTimeout(() => {
-    if (look.peek() !== current || !exact.peek() || stage.held) return;
-    const image = thumbnail(stage.capture(), current.display);
+    if (look.peek() !== current || !exact.peek() || held.peek()) return;
+    const image = thumbnail(stage.active.pixels, current.display);
     images.set(current, image);
     giveToSaved(current, image);
     thumbnailsMade.value += 1;

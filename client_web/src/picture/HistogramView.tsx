@@ -62,7 +62,8 @@ function useHistogram(): Histogram | null {
   const held = useRef<Histogram | null>(null);
   const rest = settled.value;
   return useMemo(() => {
-    if (rest && stage.hasPicture) held.current = histogramOf(stage.words, exposure.value);
+    const { isThere, pixels } = stage.active;
+    if (rest && isThere) held.current = histogramOf(pixels.words, exposure.value);
     return held.current;
   }, [rest, exposure.value, bake.value, viewName.value]);
 }

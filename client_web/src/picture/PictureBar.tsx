@@ -8,10 +8,11 @@ import { zoomActual, zoomBy, zoomFactor, zoomFit } from "./zoom";
 function Probe() {
   drawn.value;
   const at = probe.value;
-  const radiance = at === null ? null : stage.radiance(at.x, at.y);
+  const picture = at === null ? null : stage.of(at.view);
+  const radiance = at === null ? null : (picture?.radiance(at.x, at.y) ?? null);
   if (at === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
   const shown = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
-  const material = stage.material(at.x, at.y);
+  const material = picture?.material(at.x, at.y);
   return (
     <span class="probe">
       <i class="chip" style={{ background: `rgb(${shown.join(" ")})` }} />

@@ -1,7 +1,7 @@
 /** Before the first picture: what is waited for, and for how long. */
 import { bake, coming, connection, drawn } from "../state/store";
 import { formatSeconds } from "../ui/scale";
-import { stage } from "./stage";
+import type { Picture } from "./picture";
 
 function words(): { text: string; progress: number | null } {
   const next = coming.value;
@@ -19,9 +19,9 @@ function words(): { text: string; progress: number | null } {
   return { text: text[connection.value], progress: null };
 }
 
-export function Waiting() {
+export function Waiting({ picture }: { picture: Picture }) {
   drawn.value;
-  if (stage.hasPicture) return null;
+  if (picture.isThere) return null;
   const { text, progress } = words();
   return (
     <div class="waiting" role="status">

@@ -1,7 +1,8 @@
 /** The line between A (left) and the live picture (right): drag it, or move it by keys. */
-import { drawn, transform, wipe } from "../state/store";
-import { stage } from "./stage";
+import { drawn, wipe } from "../state/store";
+import type { Screen } from "./screen";
 import { shownWidth, toScreen } from "./transform";
+import { transformOf } from "./zoom";
 
 const STEP = 0.02;
 
@@ -9,15 +10,16 @@ function moveTo(at: number): void {
   wipe.value = { on: true, at: Math.min(1, Math.max(0, at)) };
 }
 
-export function WipeHandle() {
+export function WipeHandle({ screen }: { screen: Screen }) {
   drawn.value;
-  const canvas = stage.canvasSize();
+  const size = screen.size();
   const { at } = wipe.value;
-  const [x] = toScreen(transform.value, canvas, at, 0);
+  const transform = transformOf(screen.picture.view);
+  const [x] = toScreen(transform, size, at, 0);
   const move = (event: PointerEvent) => {
     const element = event.currentTarget as HTMLElement;
     if (!element.hasPointerCapture(event.pointerId)) return;
-    moveTo(wipe.peek().at + event.movementX / shownWidth(transform.peek(), canvas));
+    moveTo(wipe.peek().at + event.movementX / shownWidth(transform, size));
   };
   const key = (event: KeyboardEvent) => {
     const step = STEP * (event.shiftKey ? 0.1 : 1);

@@ -1,7 +1,7 @@
 /** What lies under the pointer. */
-import { transform } from "../state/store";
-import { stage } from "./stage";
+import type { Screen } from "./screen";
 import { toPicture } from "./transform";
+import { transformOf } from "./zoom";
 
 export interface Hit {
   /** In the canvas, CSS pixels. */
@@ -13,11 +13,11 @@ export interface Hit {
   material: string | null;
 }
 
-export function hitAt(canvas: HTMLCanvasElement, event: MouseEvent): Hit {
-  const box = canvas.getBoundingClientRect();
+export function hitAt(screen: Screen, event: MouseEvent): Hit {
+  const box = screen.canvas.getBoundingClientRect();
+  const { picture } = screen;
   const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-  const [u, v] = toPicture(transform.peek(), stage.canvasSize(), x, y);
-  const [width, height] = stage.size;
-  const [px, py] = [Math.floor(u * width), Math.floor(v * height)];
-  return { x, y, px, py, material: stage.material(px, py) };
+  const [u, v] = toPicture(transformOf(picture.view), screen.size(), x, y);
+  const [px, py] = [Math.floor(u * picture.pixels.width), Math.floor(v * picture.pixels.height)];
+  return { x, y, px, py, material: picture.material(px, py) };
 }

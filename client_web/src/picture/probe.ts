@@ -1,8 +1,8 @@
 /** Pixel → curve: asks the server what a pixel is made of, one question at a time, the newest pixel first. */
 import { effect } from "@preact/signals";
 import { send } from "../state/live";
-import { drawn, probe, viewName } from "../state/store";
-import { stage } from "./stage";
+import { drawn, probe } from "../state/store";
+import type { Picture } from "./picture";
 
 const EVERY_MS = 40;
 const GIVE_UP_MS = 1000;
@@ -18,7 +18,7 @@ function ask(): void {
   const at = probe.peek();
   if (at === null) return;
   asked = performance.now();
-  send({ type: "probe", view: viewName.peek(), x: at.x, y: at.y });
+  send({ type: "probe", view: at.view, x: at.x, y: at.y });
 }
 
 function schedule(): void {
@@ -26,12 +26,13 @@ function schedule(): void {
 }
 
 /** The pointer is over this pixel; outside the picture nothing is probed. */
-export function probeAt(x: number, y: number): void {
-  if (stage.radiance(x, y) === null) return leavePicture();
+export function probeAt(picture: Picture, x: number, y: number): void {
+  if (picture.radiance(x, y) === null) return leavePicture();
+  const { view } = picture;
   const last = probe.peek();
-  if (last?.x === x && last.y === y) return;
+  if (last?.view === view && last.x === x && last.y === y) return;
   // the last answer stays until the next one, so that the plot does not flicker
-  probe.value = { x, y, answer: last?.answer ?? null };
+  probe.value = { view, x, y, answer: last?.answer ?? null };
   schedule();
 }
 

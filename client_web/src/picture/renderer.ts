@@ -54,6 +54,11 @@ export class Renderer {
     this.setDisplay(new ImageData(1, 1));
   }
 
+  /** Give the context back: a browser has few of them. */
+  release(): void {
+    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
   private use(features: Features): Program {
     const key = JSON.stringify(features);
     let program = this.programs.get(key);

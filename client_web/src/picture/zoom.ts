@@ -1,25 +1,40 @@
-/** Zoom as buttons and keys know it. */
-import { transform } from "../state/store";
+/** Zoom as buttons and keys know it. Each view has its own, and another one beside others. */
+import { alonePlaces, besidePlaces, sideBySide } from "../state/store";
 import { stage } from "./stage";
-import { FIT, shownWidth, zoomAt } from "./transform";
+import { FIT, shownWidth, zoomAt, type Canvas, type Transform } from "./transform";
+
+const places = () => (sideBySide.value ? besidePlaces : alonePlaces);
+const NOWHERE: Canvas = { width: 1, height: 1, aspect: 1 };
+
+export function transformOf(view: string): Transform {
+  return places().value.get(view) ?? FIT;
+}
+
+export function moveTo(view: string, transform: Transform): void {
+  const table = places();
+  table.value = new Map(table.peek()).set(view, transform);
+}
+
+/** The canvas of the view that keys mean. */
+const canvas = () => stage.active.screen?.size() ?? NOWHERE;
 
 export function zoomBy(factor: number): void {
-  const canvas = stage.canvasSize();
-  transform.value = zoomAt(transform.peek(), canvas, factor, canvas.width / 2, canvas.height / 2);
+  const { view } = stage.active;
+  const size = canvas();
+  moveTo(view, zoomAt(transformOf(view), size, factor, size.width / 2, size.height / 2));
 }
 
 export function zoomFit(): void {
-  transform.value = FIT;
-}
-
-/** One pixel of the picture on one pixel of the screen. */
-export function zoomActual(): void {
-  const width = stage.size[0] / (window.devicePixelRatio || 1);
-  zoomBy(width / shownWidth(transform.peek(), stage.canvasSize()));
+  moveTo(stage.active.view, FIT);
 }
 
 /** Screen pixels per picture pixel. */
 export function zoomFactor(): number {
-  const width = shownWidth(transform.value, stage.canvasSize());
-  return (width * (window.devicePixelRatio || 1)) / stage.size[0];
+  const { view, pixels } = stage.active;
+  return (shownWidth(transformOf(view), canvas()) * (window.devicePixelRatio || 1)) / pixels.width;
+}
+
+/** One pixel of the picture on one pixel of the screen. */
+export function zoomActual(): void {
+  zoomBy(1 / zoomFactor());
 }

@@ -1,16 +1,18 @@
-/** The live session: connects the look to the server and the frames to the stage; swaps to a finer bake. */
-import { effect } from "@preact/signals";
+/** The live session: connects the look to the server and the frames to the pictures; swaps to a finer bake. */
+import { batch, effect } from "@preact/signals";
 import { problemText, request } from "../net/api";
 import type { Frame } from "../net/frame";
 import { Session, type SessionHandlers } from "../net/session";
 import { decodeIds } from "../picture/png16";
+import type { Picture } from "../picture/picture";
 import { stage } from "../picture/stage";
 import type { ClientMessage, HelloMessage, Look } from "../protocol";
 import { attempt, note, showError } from "../ui/toasts";
 import { onLook } from "./edit";
 import { forgetShape, showShape } from "./shape";
 import * as store from "./store";
-import { editSent, forgetWaiting } from "./stats";
+import { editSent, forgetDrawn, forgetWaiting } from "./stats";
+import { availableOf } from "./views";
 
 let session: Session | null = null;
 /** A session on a finer bake, until its first picture is there. */
@@ -53,25 +55,49 @@ export function connect(bake: string): void {
   opened.connect();
 }
 
-async function loadIds(bake: string, view: string): Promise<void> {
+async function loadIds(bake: string, picture: Picture): Promise<void> {
+  picture.idsOf = bake;
   await attempt(async () => {
-    const path = `/api/bakes/${encodeURIComponent(bake)}/views/${encodeURIComponent(view)}/materials.png`;
-    stage.setIds(await decodeIds(await (await request(path)).arrayBuffer()));
+    const path = `/api/bakes/${encodeURIComponent(bake)}/views/${encodeURIComponent(picture.view)}/materials.png`;
+    const ids = await decodeIds(await (await request(path)).arrayBuffer());
+    if (picture.idsOf === bake) picture.setIds(ids);
   });
 }
 
-/** What a new connection needs to know: which view, how to stream, and the look where it has another one. */
+/** The views that each connection was asked to show. */
+const told = new WeakMap<Session, string>();
+
+/** Say which views are shown, where that is news, and which of them goes first. */
+function tellViews(of: Session, shown: string[], focus: string): void {
+  const names = JSON.stringify(shown);
+  if (told.get(of) !== names) {
+    if (!of.send({ type: "views", names: shown })) return;
+    told.set(of, names);
+    // they are sent whole again
+    for (const view of shown) stage.of(view).exactRevision = -1;
+    if (of === session) store.exact.value = false;
+  }
+  if (shown.length > 1 && shown.includes(focus)) of.send({ type: "focus", view: focus });
+}
+
+/** Of a bake's views, those that the user wants to see. */
+function shownOf(views: HelloMessage["views"], fallback: string): string[] {
+  const names = views.map((view) => view.name);
+  return availableOf(store.shownViews.peek(), names, names.includes(fallback) ? fallback : (names[0] ?? fallback));
+}
+
+/** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function welcome(of: Session, message: HelloMessage): void {
-  const known = message.views.some((view) => view.name === store.viewName.peek());
-  const name = known ? store.viewName.peek() : message.view;
   store.defaultLook.value ??= message.look as unknown as Look;
   if (store.look.peek() === null) store.look.value = message.look as unknown as Look;
   of.want(store.look.peek() as Look, performance.now());
-  if (of === session) store.freezing.value = null;
-  if (of === session) showViews(of, message.views, name);
-  else pendingViews = message.views;
-  const view = message.views.find((v) => v.name === name);
-  if (view !== undefined) of.send({ type: "view", name, size: [view.width, view.height] });
+  told.delete(of);
+  const shown = shownOf(message.views, message.view);
+  tellViews(of, shown, store.focusedView.peek());
+  if (of === session) {
+    store.freezing.value = null;
+    showViews(of, message.views, message.view);
+  } else pendingViews = message.views;
   of.send({ type: "stream", format: "auto", quality: 80 });
   const curve = store.curvePath.peek();
   if (curve !== null) of.send({ type: "touch", curve });
@@ -79,20 +105,26 @@ function welcome(of: Session, message: HelloMessage): void {
 
 let pendingViews: HelloMessage["views"] = [];
 
-function showViews(of: Session, views: HelloMessage["views"], name: string): void {
-  store.views.value = views;
-  store.viewName.value = name;
-  store.bake.value = of.bake;
-  void loadIds(of.bake, name);
+function showViews(of: Session, views: HelloMessage["views"], fallback: string): void {
+  const shown = shownOf(views, fallback);
+  batch(() => {
+    store.views.value = views;
+    store.shownViews.value = shown;
+    if (!shown.includes(store.viewName.peek())) store.viewName.value = shown[0] as string;
+    store.bake.value = of.bake;
+  });
 }
 
 async function takeFrame(from: Session, frame: Frame): Promise<void> {
   if (from === incoming && frame.header.kind !== "brush") swap(from);
   if (store.coming.peek()?.id === from.bake) store.coming.value = null;
-  if (from !== session || frame.header.view !== store.viewName.peek()) return;
-  await stage.show(frame).catch(showError);
-  if (frame.header.kind === "brush" || from !== session) return;
-  store.exact.value = frame.header.exact && frame.header.revision >= from.revision;
+  const { view, kind, exact, revision } = frame.header;
+  if (from !== session || !store.shownViews.peek().includes(view)) return;
+  const picture = stage.of(view);
+  await picture.show(frame).catch(showError);
+  if (kind === "brush" || from !== session) return;
+  picture.exactRevision = exact ? revision : -1;
+  store.exact.value = stage.shown.every((each) => each.exactRevision >= from.revision);
   if (!store.exact.value) return;
   for (const done of exactWaiters.splice(0)) done();
 }
@@ -104,6 +136,7 @@ function swap(to: Session): void {
   old?.close();
   store.freezing.value = null;
   forgetWaiting();
+  for (const picture of stage.shown) picture.exactRevision = -1;
   showViews(to, pendingViews, store.viewName.peek());
   store.coming.value = null;
   store.connection.value = "open";
@@ -136,7 +169,7 @@ function handlersOf(self: () => Session): SessionHandlers {
     },
     probe(message) {
       const at = store.probe.peek();
-      if (current() && at !== null) store.probe.value = { ...at, answer: message };
+      if (current() && at?.view === message.view) store.probe.value = { ...at, answer: message };
     },
     curve(message) {
       if (current() && message.curve === store.curvePath.peek()) showShape(message);
@@ -166,34 +199,37 @@ export function whenExact(): Promise<void> {
   return new Promise((done) => exactWaiters.push(done));
 }
 
-/** Fetch the exact picture of another look while the canvas keeps what it shows. */
-export async function fetchPicture(of: Look): Promise<ReturnType<typeof stage.capture>> {
+/** Fetch the exact pictures of another look and take them, while the screens keep what they show. */
+export async function withPicturesOf(of: Look, take: () => void): Promise<void> {
   if (store.connection.peek() !== "open") throw new Error("There is no connection; try again when it is back.");
   const back = store.look.peek() as Look;
-  stage.held = true;
+  store.held.value = true;
   try {
     session?.want(of, performance.now());
     await new Promise((done) => requestAnimationFrame(done));
     await whenExact();
-    return stage.capture();
+    take();
   } finally {
     session?.want(store.look.peek() ?? back, performance.now());
     await new Promise((done) => requestAnimationFrame(done));
     await whenExact();
-    stage.held = false;
-    stage.redraw();
+    store.held.value = false;
   }
 }
 
-export function chooseView(name: string): void {
-  const view = store.views.peek().find((v) => v.name === name);
-  if (view === undefined || session === null) return;
-  store.viewName.value = name;
-  stage.setIds(null);
-  stage.setReference(null);
-  session.send({ type: "view", name, size: [view.width, view.height] });
-  void loadIds(session.bake, name);
-}
+effect(() => {
+  const [shown, focus] = [store.shownViews.value, store.focusedView.value];
+  if (session !== null && shown.length > 0) tellViews(session, shown, focus);
+});
+
+// revisions that the view has already drawn while another one was counted tell nothing about the time they took
+effect(() => forgetDrawn(stage.of(store.focusedView.value).revision));
+
+effect(() => {
+  const bake = store.bake.value;
+  if (bake === null) return;
+  for (const picture of stage.shown) if (picture.idsOf !== bake) void loadIds(bake, picture);
+});
 
 effect(() => {
   const curve = store.curvePath.value;

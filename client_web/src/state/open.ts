@@ -1,7 +1,6 @@
 /** Opening a scene: the finest bake there is, or a preview at once and the full bake behind it. */
 import * as api from "../net/api";
 import { bakeEnd, followBake } from "../net/events";
-import { FIT } from "../picture/transform";
 import { stage } from "../picture/stage";
 import type { BakeBody, SceneBody } from "../protocol";
 import { attempt, showError } from "../ui/toasts";
@@ -9,6 +8,7 @@ import { connect, disconnect, whenBakeIsReady } from "./live";
 import { recall } from "./place";
 import * as store from "./store";
 import { placeFromUrl, type Place } from "./url";
+import { availableOf } from "./views";
 
 export type Preset = "preview" | "good" | "final";
 
@@ -33,7 +33,8 @@ function reset(scene: SceneBody): void {
   store.look.value = store.defaultLook.value = null;
   store.bake.value = store.coming.value = null;
   store.selectedMaterial.value = store.selectedCurve.value = store.solo.value = null;
-  store.transform.value = FIT;
+  store.alonePlaces.value = store.besidePlaces.value = new Map();
+  store.pointedView.value = null;
   store.connection.value = "connecting";
   store.freezing.value = null;
   store.page.value = "editor";
@@ -43,9 +44,14 @@ function restorePlace(scene: SceneBody, place: Place): void {
   const kept = recall(scene.id);
   if (kept !== null) {
     store.look.value = kept.look;
-    store.transform.value = kept.transform;
+    store.alonePlaces.value = new Map(kept.alone);
+    store.besidePlaces.value = new Map(kept.beside);
   }
-  store.viewName.value = place.view ?? scene.views[0]?.name ?? "";
+  const names = scene.views.map((view) => view.name);
+  const active = place.view ?? names[0] ?? "";
+  const shown = availableOf(place.beside.length > 1 ? place.beside : [active], names, active);
+  store.shownViews.value = shown;
+  store.viewName.value = shown.includes(active) ? active : (shown[0] as string);
   if (scene.materials.some((material) => material.name === place.material)) {
     store.selectedMaterial.value = place.material;
     store.selectedTerm.value = place.term;

@@ -1,4 +1,4 @@
-/** Where the user is, kept so that a reload comes back to it: scene, bake, view and selection in the URL; look and zoom
+/** Where the user is, kept so that a reload comes back to it: scene, bake, views and selection in the URL; look and zoom
  * in the tab's own storage. */
 import { effect } from "@preact/signals";
 import type { Transform } from "../picture/transform";
@@ -8,7 +8,9 @@ import { placeToUrl } from "./url";
 
 interface Kept {
   look: Look;
-  transform: Transform;
+  /** Where each view's picture lies, alone and beside others. */
+  alone: [view: string, transform: Transform][];
+  beside: [view: string, transform: Transform][];
 }
 
 const keptKey = (scene: string) => `relume.scene.${scene}`;
@@ -24,7 +26,7 @@ export function recall(scene: string): Kept | null {
 function remember(): void {
   const [scene, look] = [store.scene.value, store.look.value];
   if (store.page.value !== "editor" || scene === null || look === null) return;
-  const kept: Kept = { look, transform: store.transform.value };
+  const kept: Kept = { look, alone: [...store.alonePlaces.value], beside: [...store.besidePlaces.value] };
   try {
     sessionStorage.setItem(keptKey(scene.id), JSON.stringify(kept));
   } catch {
@@ -40,6 +42,7 @@ export function followPlace(): void {
       scene: store.scene.value.id,
       bake: store.bake.value,
       view: store.viewName.value,
+      beside: store.sideBySide.value ? store.shownViews.value : [],
       material: store.selectedMaterial.value,
       term: store.selectedTerm.value,
       curve: store.selectedCurve.value,

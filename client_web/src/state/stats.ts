@@ -31,6 +31,11 @@ export function forgetWaiting(): void {
   waiting.length = 0;
 }
 
+/** These revisions are drawn, nobody saw when. */
+export function forgetDrawn(revision: number): void {
+  while (waiting[0] !== undefined && waiting[0].revision <= revision) waiting.shift();
+}
+
 let shownTime = -Infinity;
 
 function show(ms: number, now: number): void {
@@ -39,7 +44,7 @@ function show(ms: number, now: number): void {
   latencyMs.value = ms;
 }
 
-/** A frame of this revision is on the canvas. */
+/** A frame of this revision is on the focused view's canvas. */
 export function frameDrawn(revision: number): void {
   const drawnTime = performance.now();
   while (waiting[0] !== undefined && waiting[0].revision <= revision) {

@@ -1,7 +1,7 @@
 /** What the editor knows, as signals. Functions that change it live beside it, one concern per file. */
 import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
-import { FIT, type Transform } from "../picture/transform";
+import type { Transform } from "../picture/transform";
 import type { BakeBody, CurveMessage, HelloMessage, Look, ModelInfo, ProbeAnswer, SceneBody, Term } from "../protocol";
 import { History } from "./history";
 import { pointer } from "./pointer";
@@ -16,7 +16,17 @@ export const coming = signal<Pick<BakeBody, "id" | "state" | "progress" | "secon
 export const bakes = signal<BakeBody[]>([]);
 
 export const views = signal<HelloMessage["views"]>([]);
+/** The active view: what buttons and keys mean. It is one of those that are shown. */
 export const viewName = signal("");
+export const shownViews = signal<string[]>([]);
+export const sideBySide = computed(() => shownViews.value.length > 1);
+/** The view that the pointer is over. */
+export const pointedView = signal<string | null>(null);
+/** The view whose frames go first. */
+export const focusedView = computed(() => {
+  const pointed = pointedView.value;
+  return pointed !== null && shownViews.value.includes(pointed) ? pointed : viewName.value;
+});
 export const view = computed(() => views.value.find((v) => v.name === viewName.value) ?? null);
 
 export const look = signal<Look | null>(null);
@@ -50,23 +60,28 @@ export const curveShape = signal<CurveMessage | null>(null);
 /** A stretch of the open curve whose pixels are tinted, degrees. */
 export const brushed = signal<[from: number, to: number] | null>(null);
 
-export const transform = signal<Transform>(FIT);
+/** Where each view's picture lies when it is alone, and when it is beside others; fitted where nothing is said. */
+export const alonePlaces = signal<ReadonlyMap<string, Transform>>(new Map());
+export const besidePlaces = signal<ReadonlyMap<string, Transform>>(new Map());
 export const falseColour = signal(false);
 export const histogramOpen = signal(false);
 /** The material that is shown alone, the others in dim grey; display only, no edit. */
 export const solo = signal<string | null>(null);
 export const wipe = signal<{ on: boolean; at: number }>({ on: false, at: 0.5 });
 export const showBefore = signal(false);
-export const probe = signal<{ x: number; y: number; answer: ProbeAnswer | null } | null>(null);
+export const probe = signal<{ view: string; x: number; y: number; answer: ProbeAnswer | null } | null>(null);
 
 export const connection = signal<Connection>("connecting");
 export const retryInMs = signal(0);
 /** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
 export const freezing = signal<{ state: "freezing" | "shading"; what: string; progress: number } | null>(null);
+/** Whether every shown picture equals the look. */
 export const exact = signal(false);
 /** Exact, and for a moment: what the status bar says, so that it stands still while a hand drags. */
 export const settled = signal(false);
 export const latencyMs = signal<number | null>(null);
+/** While frames of another look are fetched, the screens keep what they show. */
+export const held = signal(false);
 /** Counts up with every frame that is drawn. */
 export const drawn = signal(0);
 

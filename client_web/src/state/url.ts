@@ -4,6 +4,8 @@ export interface Place {
   scene: string | null;
   bake: string | null;
   view: string | null;
+  /** The views that are shown side by side; empty where one is shown alone. */
+  beside: string[];
   material: string | null;
   term: number;
   curve: string | null;
@@ -15,6 +17,7 @@ export function placeFromUrl(search: string): Place {
     scene: query.get("scene"),
     bake: query.get("bake"),
     view: query.get("view"),
+    beside: query.getAll("beside"),
     material: query.get("material"),
     term: Math.max(0, Math.trunc(Number(query.get("term") ?? 0)) || 0),
     curve: query.get("curve"),
@@ -26,6 +29,7 @@ export function placeToUrl(place: Place): string {
   for (const key of ["scene", "bake", "view", "material", "curve"] as const) {
     if (place[key] !== null && place[key] !== "") query.set(key, place[key]);
   }
+  for (const view of place.beside) query.append("beside", view);
   if (place.material !== null && place.term > 0) query.set("term", String(place.term));
   return query.size > 0 ? `?${query.toString()}` : "/";
 }

@@ -13,6 +13,7 @@ const PATHS = {
   left: "M2.5 3h11v10h-11zM6 3v10",
   right: "M2.5 3h11v10h-11zM10 3v10",
   bottom: "M2.5 3h11v10h-11zM2.5 10h11",
+  grid: "M2.5 3h11v10h-11zM8 3v10M2.5 8h11",
   trash: "M3.5 4.5h9M6.5 4.5v-2h3v2M5 4.5l.5 9h5l.5-9",
   draw: "M3 13c1-5 2.5-7 4-7s1 4 2.5 4S12 6 13 3",
   points: "M2.5 12.5c3 0 3-9 5.5-9s2.5 6 5.5 6M8 2.2a1.3 1.3 0 1 0 .01 0",

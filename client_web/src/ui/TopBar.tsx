@@ -3,7 +3,6 @@ import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
 import { exportExr, exportPng, share } from "../looks/export";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
-import { chooseView } from "../state/live";
 import { leave } from "../state/open";
 import {
   filmstripOpen,
@@ -14,11 +13,13 @@ import {
   outlineOpen,
   scene,
   showBefore,
+  sideBySide,
   viewName,
   views,
   wipe,
 } from "../state/store";
 import { redo, undo } from "../state/undo";
+import { showAlone, toggleSideBySide } from "../state/views";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
 import { Slider } from "./Slider";
@@ -29,12 +30,29 @@ function Views() {
   return (
     <div class="group" role="group" aria-label="Views">
       {views.value.map((view) => (
-        <button key={view.name} aria-pressed={view.name === viewName.value} onClick={() => chooseView(view.name)}>
+        <button
+          key={view.name}
+          aria-pressed={!sideBySide.value && view.name === viewName.value}
+          title={`Show “${view.name}” alone`}
+          onClick={() => showAlone(view.name)}
+        >
           {view.name}
         </button>
       ))}
+      <IconButton
+        icon="grid"
+        label="Views side by side"
+        keys="V"
+        pressed={sideBySide.value}
+        onClick={toggleSideBySide}
+      />
     </div>
   );
+}
+
+/** What an export is of: with several views shown it must be said. */
+function whichView(): string {
+  return sideBySide.value ? `the view “${viewName.value}”` : "the picture";
 }
 
 function Compare() {
@@ -129,10 +147,10 @@ export function TopBar() {
       <span class="spacer" />
       <Display />
       <div class="group" role="group" aria-label="Export">
-        <button title="Export as displayed (Ctrl+Shift+S)" onClick={() => void exportPng()}>
+        <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)`} onClick={() => void exportPng()}>
           PNG
         </button>
-        <button title="Export linear radiance" onClick={() => void exportExr()}>
+        <button title={`Export the linear radiance of ${whichView()}`} onClick={() => void exportExr()}>
           EXR
         </button>
       </div>

@@ -6,6 +6,7 @@ import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
 import { edit } from "../state/edit";
 import { toggleSolo } from "../state/solo";
 import { redo, undo } from "../state/undo";
+import { toggleSideBySide } from "../state/views";
 import {
   falseColour,
   filmstripOpen,
@@ -49,6 +50,7 @@ export const ACTIONS: readonly Action[] = [
   { group: "Picture", label: "Zoom out", keys: ["-"], run: () => zoomBy(1 / 1.25) },
   { group: "Picture", label: "Fit", keys: ["f"], run: zoomFit },
   { group: "Picture", label: "One to one", keys: ["1"], run: zoomActual },
+  { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
   { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
   { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
   { group: "Picture", label: "Selected material alone", keys: ["s"], run: toggleSolo },
@@ -86,6 +88,7 @@ export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Curve point: delete, reset", "Delete  R"],
   ["Stretch: scale, shift", "↑ ↓  ← →"],
   ["Picture: pan", "← → ↑ ↓"],
+  ["One of several views: show it alone", "Enter, double-click"],
 ];
 
 export function onWipeKey(key: string): void {

@@ -1,0 +1,115 @@
+/** One view's picture: takes the frames of a session, keeps them, and says what lies where. The screen it is on draws
+ * it; a picture that is on no screen keeps what it has. */
+import type { Frame } from "../net/frame";
+import type { Rgb } from "../protocol";
+import { brushed, materialNames } from "../state/store";
+import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, type Pixels } from "./pixels";
+import type { Ids } from "./png16";
+import { decodeRgb9e5 } from "./rgb9e5";
+import type { Screen } from "./screen";
+
+const BACKGROUND = 65535;
+
+export class Picture {
+  pixels = emptyPixels(1, 1);
+  /** The A side of a comparison. */
+  reference: Pixels | null = null;
+  ids: Ids | null = null;
+  /** The bake that the ids are of, or will be when they have come. */
+  idsOf: string | null = null;
+  /** Share of each pixel that a stretch of the curve lights, 255 = the most of all. */
+  brush: Uint8Array | null = null;
+  /** What the server has tone-mapped already, where that is what was sent last. */
+  display: ImageBitmap | null = null;
+  revision = 0;
+  /** The revision for which it is exact; −1 while it is not. */
+  exactRevision = -1;
+  screen: Screen | null = null;
+
+  constructor(readonly view: string) {}
+
+  /** Take a frame and draw it; a picture of another size replaces what was there. Resolves when it is drawn. */
+  async show(frame: Frame): Promise<void> {
+    const { width, height, kind, format, revision } = frame.header;
+    if (kind === "brush") return this.showBrush(frame);
+    if (format === "jpeg") return this.showJpeg(frame);
+    if (this.pixels.width !== width || this.pixels.height !== height) {
+      this.pixels = emptyPixels(width, height);
+      this.brush = null;
+      this.screen?.renderer.setPicture(this.pixels);
+    }
+    if (frame.header.tiles.length > 0) {
+      this.display = null;
+      this.takeTiles(frame);
+    }
+    this.revision = revision;
+    return this.screen?.present();
+  }
+
+  private takeTiles(frame: Frame): void {
+    const tiles = applyFrame(this.pixels, frame);
+    // one big upload is quicker than many small ones of the same size
+    const area = tiles.reduce((sum, { words }) => sum + words.length, 0);
+    if (area > this.pixels.words.length / 2) this.screen?.renderer.updatePicture(this.pixels);
+    else this.screen?.renderer.uploadTiles(tiles);
+  }
+
+  private showBrush(frame: Frame): void {
+    if (brushed.peek() === null) return;
+    this.brush = normalised(brushImage(frame));
+    this.screen?.renderer.setBrush(frame.header.width, frame.header.height, this.brush);
+    this.screen?.redraw();
+  }
+
+  private async showJpeg(frame: Frame): Promise<void> {
+    const blob = new Blob([frame.payload as BlobPart], { type: "image/jpeg" });
+    this.display = await createImageBitmap(blob, { colorSpaceConversion: "none" });
+    this.screen?.renderer.setDisplay(this.display);
+    this.revision = frame.header.revision;
+    return this.screen?.present();
+  }
+
+  get aspect(): number {
+    return this.pixels.width / this.pixels.height;
+  }
+
+  get isThere(): boolean {
+    return this.pixels.width > 1 || this.display !== null;
+  }
+
+  setIds(ids: Ids): void {
+    this.ids = ids;
+    this.screen?.renderer.setIds(ids.width, ids.height, ids.values);
+    this.screen?.redraw();
+  }
+
+  /** Keep it as it is now as the A side of comparisons. */
+  keepAsReference(): void {
+    this.setReference(this.capture());
+  }
+
+  setReference(pixels: Pixels | null): void {
+    this.reference = pixels;
+    if (pixels !== null) this.screen?.renderer.setReference(pixels);
+    this.screen?.redraw();
+  }
+
+  /** A copy of the picture as it is. */
+  capture(): Pixels {
+    return copyPixels(this.pixels);
+  }
+
+  /** Linear radiance of a pixel; null outside. */
+  radiance(x: number, y: number): Rgb | null {
+    if (x < 0 || y < 0 || x >= this.pixels.width || y >= this.pixels.height) return null;
+    return decodeRgb9e5(this.pixels.words[y * this.pixels.width + x] ?? 0);
+  }
+
+  /** Name of the material at a pixel; null for the background. */
+  material(x: number, y: number): string | null {
+    const { ids } = this;
+    if (ids === null || x < 0 || y < 0 || x >= ids.width || y >= ids.height) return null;
+    const id = ids.values[y * ids.width + x] ?? BACKGROUND;
+    return id === BACKGROUND ? null : (materialNames.peek()[id] ?? null);
+  }
+}

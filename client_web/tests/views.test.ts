@@ -1,0 +1,36 @@
+import { describe, expect, test } from "vitest";
+import { columnsFor } from "../src/picture/grid";
+import { availableOf, sideBySideOf } from "../src/state/views";
+
+describe("views side by side", () => {
+  const all = ["a", "b", "c", "d", "e", "f"];
+
+  test("at most four are shown, the active one among them", () => {
+    expect(sideBySideOf(["a", "b"], "b")).toEqual(["a", "b"]);
+    expect(sideBySideOf(all, "c")).toEqual(["a", "b", "c", "d"]);
+    expect(sideBySideOf(all, "f")).toEqual(["a", "b", "c", "f"]);
+    expect(sideBySideOf(all, "gone")).toEqual(["a", "b", "c", "d"]);
+  });
+
+  test("what an address or another bake asks for is shown as far as it is there", () => {
+    expect(availableOf(["c", "gone", "a"], all, "b")).toEqual(["c", "a"]);
+    expect(availableOf(["gone"], all, "b")).toEqual(["b"]);
+    expect(availableOf([...all], all, "b")).toHaveLength(4);
+  });
+});
+
+describe("arrangement", () => {
+  test.each([
+    ["one", 1, 740, 560, 4 / 3, 1],
+    ["two on a wide space", 2, 1380, 840, 4 / 3, 2],
+    ["two of the same size either way", 2, 800, 800, 1, 2],
+    ["two on a high space", 2, 500, 900, 4 / 3, 1],
+    ["two wide ones", 2, 740, 560, 2, 1],
+    ["three", 3, 1000, 700, 4 / 3, 2],
+    ["three on a band", 3, 1600, 400, 4 / 3, 3],
+    ["four", 4, 740, 560, 4 / 3, 2],
+    ["four on a band", 4, 2400, 500, 4 / 3, 4],
+  ])("%s", (_, count, width, height, aspect, columns) => {
+    expect(columnsFor(count, width, height, aspect)).toBe(columns);
+  });
+});
