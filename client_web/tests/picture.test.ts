@@ -27,7 +27,7 @@ describe("tone maps", () => {
 });
 
 describe("transform", () => {
-  const canvas = { width: 800, height: 600, aspect: 4 / 3 };
+  const canvas = { width: 800, height: 600, aspect: 4 / 3, margin: 16 };
 
   test("fit leaves a margin and keeps the aspect", () => {
     expect(fitWidth(canvas)).toBeLessThan(800);

@@ -5,7 +5,7 @@ import { frameDrawn } from "../state/stats";
 import * as store from "../state/store";
 import type { Picture } from "./picture";
 import { Renderer } from "./renderer";
-import { shownWidth, toScreen, type Canvas } from "./transform";
+import { MARGIN_ALONE, MARGIN_BESIDE, shownWidth, toScreen, type Canvas } from "./transform";
 import { transformOf } from "./zoom";
 
 const MAX_WAIT_MS = 250;
@@ -106,7 +106,8 @@ export class Screen {
 
   size(): Canvas {
     const [width, height] = this.box;
-    return { width, height, aspect: this.shown.aspect };
+    const margin = store.sideBySide.value ? MARGIN_BESIDE : MARGIN_ALONE;
+    return { width, height, aspect: this.shown.aspect, margin };
   }
 
   private settings() {

@@ -12,16 +12,19 @@ export interface Canvas {
   height: number;
   /** Width ÷ height of the picture. */
   aspect: number;
+  /** Left free around a fitted picture. */
+  margin: number;
 }
 
 export const FIT: Transform = { width: null, centre: [0.5, 0.5] };
-const MARGIN = 16;
+export const MARGIN_ALONE = 16;
+export const MARGIN_BESIDE = 5;
 const MIN_WIDTH = 48;
 const MAX_WIDTH = 65_536;
 
 export function fitWidth(canvas: Canvas): number {
-  const width = Math.max(1, canvas.width - 2 * MARGIN);
-  const height = Math.max(1, canvas.height - 2 * MARGIN);
+  const width = Math.max(1, canvas.width - 2 * canvas.margin);
+  const height = Math.max(1, canvas.height - 2 * canvas.margin);
   return Math.min(width, height * canvas.aspect);
 }
 

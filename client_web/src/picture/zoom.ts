@@ -4,7 +4,7 @@ import { stage } from "./stage";
 import { FIT, shownWidth, zoomAt, type Canvas, type Transform } from "./transform";
 
 const places = () => (sideBySide.value ? besidePlaces : alonePlaces);
-const NOWHERE: Canvas = { width: 1, height: 1, aspect: 1 };
+const NOWHERE: Canvas = { width: 1, height: 1, aspect: 1, margin: 0 };
 
 export function transformOf(view: string): Transform {
   return places().value.get(view) ?? FIT;

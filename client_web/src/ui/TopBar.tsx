@@ -28,7 +28,7 @@ import { Switch } from "./Switch";
 function Views() {
   if (views.value.length < 2) return null;
   return (
-    <div class="group" role="group" aria-label="Views">
+    <div class="group views" role="group" aria-label="Views">
       {views.value.map((view) => (
         <button
           key={view.name}
