@@ -103,7 +103,7 @@ class Tiles:
 def _corners(codes: NDArray[np.uint64]) -> F64:
     """Corners of n nodes of the hierarchy. (n, 3, 3)"""
     levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, codes)], np.uint64)
-    corners = _OCTAHEDRON[_OCTANTS[(codes >> 2 * levels) - 8]]
+    corners = np.asarray(_OCTAHEDRON[_OCTANTS[(codes >> 2 * levels) - 8]], np.float64)
     for level in range(int(levels.max(initial=0))):
         deeper = np.nonzero(levels > level)[0]
         child = (codes[deeper] >> 2 * (levels[deeper] - level - 1)) & 3

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from relume.errors import StoreError
 from relume.scene.model import Scene
 from relume.store.publish import publish
-from relume.store.reader import open_staging
+from relume.store.reader import Reader, open_staging
 from relume.store.writer import StoreWriter, create_store
 from relume.transfer.base import Recipe, Task, TransferMethod, Written
 
@@ -28,9 +29,15 @@ def begin_stage(method: TransferMethod, scene: Scene, recipe: Recipe, staging: P
     return method.tasks(stage, scene, recipe, reader)
 
 
+@lru_cache(maxsize=4)
+def _reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
+    """One for all tasks of a stage that a process does: what they read is complete, and so read only once."""
+    return open_staging(staging)
+
+
 def run_task(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
     """Compute a task and write its rows; doing it twice leaves the same bytes."""
-    reader = open_staging(staging)
+    reader = _reader_of(staging, task.stage, scene.id, recipe)
     written = method.compute(scene, recipe, task, reader)
     announced = {spec.path for spec in method.arrays(task.stage, scene, recipe, reader)}
     writer = StoreWriter(staging)

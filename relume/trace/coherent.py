@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,26 +61,47 @@ class Coherent:
     trace_s: float
 
 
-def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, directions: F32, power: F32) -> Coherent:
+class Targets(NamedTuple):
+    """What shadow rays are sent to.
+
+    Attributes:
+        directions: unit, towards the lights. (m, 3) float32
+        first, beside: `relume.light.neighbours.Neighbours` of them.
+        is_strong: so much of the light that nothing is predicted. (m,)
+    """
+
+    directions: F32
+    first: NDArray[np.int32]
+    beside: NDArray[np.int32]
+    is_strong: NDArray[np.bool_]
+
+
+def targets_of(directions: F32, power: F32) -> Targets:
+    """Lights as `trace_coherent` wants them.
+
+    Args:
+        directions: unit. (m, 3) float32. power: what each light gives, per colour. (m, 3) float32
+    """
+    luminous = luminance(power)
+    return Targets(directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
+
+
+def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targets) -> Coherent:
     """Find what samples see, tracing where it changes and predicting where it does not.
 
     Args:
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
-        directions: unit, towards the lights. (m, 3) float32
-        power: what each light gives, per colour; where it is much, nothing is predicted. (m, 3) float32
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
-    bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
+    bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
     arguments = packet_arguments(coherent=True)
-    luminous = luminance(power)
-    lights = (directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
     found = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
         trace_blocks(
-            occluded16, scene.handle, arguments.ctypes.data, origins, normals, lights, start, stop, bits, counts
+            occluded16, scene.handle, arguments.ctypes.data, origins, normals, targets, start, stop, bits, counts
         )
         found.append(counts)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import weigh
 from relume.look import default_look
 from relume.scene.model import Scene
-from relume.trace.coherent import trace_coherent
+from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
@@ -38,6 +38,18 @@ _SAMPLES_A_PIXEL = 1.5  # upper bound over the scenes measured; edges have two o
 _SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
 
 
+class _Sampled(NamedTuple):
+    """What every task of the second stage needs of the first.
+
+    Attributes:
+        store: it was read from. targets: of shadow rays. num_surface_samples: of each view.
+    """
+
+    store: StoreReader
+    targets: Targets
+    num_surface_samples: tuple[int, ...]
+
+
 class DirectMethod:
     """Implements `relume.transfer.base.TransferMethod`."""
 
@@ -47,9 +59,10 @@ class DirectMethod:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._geometry: tuple[str, Geometry] | None = None
+        self._sampled: _Sampled | None = None
 
     def __reduce__(self) -> tuple[type[DirectMethod], tuple[()]]:
-        return DirectMethod, ()  # travels to workers without its geometry
+        return DirectMethod, ()  # travels to workers without what it keeps
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
@@ -95,7 +108,7 @@ class DirectMethod:
         ranges = [
             (view, start, min(start + SHARD_ROWS, rows))
             for k, view in enumerate(recipe.views)
-            for rows in [self._num_surface_samples(k, store)]
+            for rows in [self._sampled_of(store).num_surface_samples[k]]
             for start in range(0, rows, SHARD_ROWS)
         ]
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
@@ -105,10 +118,11 @@ class DirectMethod:
         if stage == 0:
             return []
         bits = (store.shape("lights/power")[0] + 7) // 8
+        num_surface_samples = self._sampled_of(store).num_surface_samples
         return [
             ArraySpec(
                 f"views/{k}/visibility",
-                (self._num_surface_samples(k, store), bits),
+                (num_surface_samples[k], bits),
                 "uint8",
                 (CHUNK_ROWS, bits),
                 (SHARD_ROWS, bits),
@@ -141,15 +155,10 @@ class DirectMethod:
         return {**arrays, "lights/tiles": tiles.codes, "lights/environment": radiance}
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
-        # light that may come to any part of a tile is asked for in its middle
-        relightable = bool(store.attributes["relightable"])
-        lights = read_lights(store)
-        towards = read_tiles(store).centroids.astype(np.float32) if relightable else lights.direction
-        geometry = self._geometry_of(scene)
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        found = trace_coherent(geometry.embree, position, normal, towards, lights.power)
+        found = trace_coherent(self._geometry_of(scene).embree, position, normal, self._sampled_of(store).targets)
         rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
         arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
         return Written(arrays, found.rays.traced, found.trace_s)
@@ -160,6 +169,18 @@ class DirectMethod:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
 
-    @staticmethod
-    def _num_surface_samples(k: int, store: StoreReader) -> int:
-        return int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND))
+    def _sampled_of(self, store: StoreReader) -> _Sampled:
+        with self._lock:
+            if self._sampled is None or self._sampled.store is not store:
+                views = range(len(store.attributes["views"]))
+                rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
+                self._sampled = _Sampled(store, _targets(store), rows)
+            return self._sampled
+
+
+def _targets(store: StoreReader) -> Targets:
+    """Light that may come to any part of a tile is asked for in its middle."""
+    lights = read_lights(store)
+    is_relightable = bool(store.attributes["relightable"])
+    towards = read_tiles(store).centroids.astype(np.float32) if is_relightable else lights.direction
+    return targets_of(towards, lights.power)

@@ -10,7 +10,7 @@ from relume.color import luminance
 from relume.light.neighbours import neighbours_of
 from relume.light.triangles import TriangleLights, subdivide
 from relume.scene.demo import demo_scene
-from relume.trace.coherent import trace_coherent
+from relume.trace.coherent import targets_of, trace_coherent
 from relume.trace.geometry import merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
@@ -38,7 +38,7 @@ def both(scene, size, num_lights):
     geometry, position, normal = samples_of(scene, size)
     lights = subdivide(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
-    found = trace_coherent(geometry.embree, position, normal, lights.direction, lights.power)
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
     count = lights.num_lights
     assert found.rays.full == full.num_rays
     cosine = np.maximum(normal @ lights.direction.T, 0)
@@ -155,7 +155,7 @@ def test_kernel_does_what_its_twin_does():
     geometry, position, normal = samples_of(still_life(), (24, 18))
     lights = subdivide(studio(), 300)
     seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
-    found = trace_coherent(geometry.embree, position, normal, lights.direction, lights.power)
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
     assert found.rays.wrong == 0  # the twin does not mend
     bits, rays = twin(seen, normal @ lights.direction.T > 0, position, lights)
     np.testing.assert_array_equal(bits_of(found.visible, lights.num_lights), bits)
@@ -168,7 +168,7 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
     geometry, position, normal = samples_of(still_life(), (48, 36))
     position, normal = position[:num_samples], normal[:num_samples]
     lights = first_of(subdivide(studio(), 50), num_lights)
-    found = trace_coherent(geometry.embree, position, normal, lights.direction, lights.power)
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
     assert found.visible.shape == full.visible.shape
     assert found.rays.traced <= found.rays.full == full.num_rays
@@ -180,7 +180,7 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
 def test_nothing_to_trace_is_no_error():
     geometry, position, normal = samples_of(still_life(), (24, 18))
     lights = subdivide(studio(), 50)
-    found = trace_coherent(geometry.embree, position[:0], normal[:0], lights.direction, lights.power)
+    found = trace_coherent(geometry.embree, position[:0], normal[:0], targets_of(lights.direction, lights.power))
     assert found.visible.shape == (0, 7)
     assert found.rays.traced == found.rays.full == 0
     assert found.rays.wrong_share == 0
@@ -192,6 +192,6 @@ def test_threads_change_neither_bits_nor_counts(monkeypatch):
     results = []
     for threads in ("1", "3"):
         monkeypatch.setenv("RELUME_THREADS", threads)
-        results.append(trace_coherent(geometry.embree, position, normal, lights.direction, lights.power))
+        results.append(trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power)))
     np.testing.assert_array_equal(results[0].visible, results[1].visible)
     assert results[0].rays == results[1].rays
