@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.parallel import for_ranges
 from relume.scene.model import Material
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
 from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
+
+_RAYS_A_RANGE = 16_384
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,25 @@ def surface_at(
     Returns:
         Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
     """
+    parts: dict[int, Surface] = {}
+
+    def interpolate(start: int, stop: int) -> None:
+        some = Hits(hits.face[start:stop], hits.uv[start:stop], hits.distance[start:stop])
+        parts[start] = _surface_at(geometry, some, directions[start:stop], materials, pixel_angle, origin)
+
+    for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
+    ordered = [vars(parts[start]) for start in sorted(parts)]
+    return Surface(**{name: np.concatenate([part[name] for part in ordered]) for name in ordered[0]})
+
+
+def _surface_at(
+    geometry: Geometry,
+    hits: Hits,
+    directions: F32,
+    materials: Sequence[Material],
+    pixel_angle: float,
+    origin: F32 | None,
+) -> Surface:
     hit = hits.face >= 0
     corners = geometry.faces[np.maximum(hits.face, 0)]
     b = np.stack([1 - hits.uv.sum(axis=1), hits.uv[:, 0], hits.uv[:, 1]], axis=1).astype(np.float32)[:, :, None]
