@@ -14,9 +14,9 @@ from bench.figure import Figure
 from bench.points import freeze_along, lit_points
 from bench.scenes import cook_torrance, teapot_on_table
 from bench.timing import in_turn
+from relume.environments.studio import studio
 from relume.look.terms import complete_term
 from relume.parallel import num_threads
-from relume.scene.demo.studio import studio
 
 
 def measure(tiny: bool) -> list[Figure]:

@@ -21,8 +21,8 @@ from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
+from relume.environments.studio import studio
 from relume.look import Look, validate
-from relume.scene.demo.studio import studio
 from relume.store import bake_here
 from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache

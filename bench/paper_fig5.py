@@ -20,8 +20,8 @@ from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
+from relume.environments.studio import studio
 from relume.look.terms import complete_term
-from relume.scene.demo.studio import studio
 from relume.transfer.frozen import Frozen
 from relume.transfer.term_image import TermImage
 

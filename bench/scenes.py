@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from relume.environments.studio import studio
 from relume.light.environment import read_environment, texel_directions
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
-from relume.scene.demo.studio import studio
 from relume.scene.demo.surfaces import Surface
 from relume.scene.demo.teapot import teapot
 from relume.scene.model import Environment, Material, Scene

@@ -16,7 +16,7 @@ from bench.figure import Figure
 from bench.house import SessionClient, baked_house, serving, session
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from bench.timing import percentiles
-from relume.scene.demo.studio import studio
+from relume.environments.studio import studio
 from relume.transfer.base import Recipe
 from relume.transfer.opened import open_transfer
 from worker.paths import bake_path

@@ -17,17 +17,18 @@ if TYPE_CHECKING:
 
 
 def open_settings(data: Path | None, **others: Any) -> Settings:
-    """Settings from the environment, with what the command line says in their place; its materials can be named.
+    """Settings from the environment, with what the command line says in their place; what was imported can be named.
 
     Raises:
         ParameterError: a setting cannot be what it is.
     """
     from pydantic import ValidationError
 
+    from relume.environments.shelf import SHELF as ENVIRONMENTS
     from relume.errors import ParameterError
-    from relume.measured.shelf import use_shelf
+    from relume.measured.shelf import SHELF as MATERIALS
     from server.settings import Settings
-    from worker.paths import materials_path
+    from worker.paths import environments_path, materials_path
 
     given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
     try:
@@ -37,7 +38,8 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         name = ".".join(map(str, first["loc"]))
         raise ParameterError(name, first["input"], first["msg"].lower()) from None
     settings.data.mkdir(parents=True, exist_ok=True)
-    use_shelf(materials_path(settings.data))
+    MATERIALS.use(materials_path(settings.data))
+    ENVIRONMENTS.use(environments_path(settings.data))
     return settings
 
 

@@ -10,7 +10,20 @@ from collections.abc import Sequence
 import typer
 from typer.exceptions import TyperException
 
-from cli import bake, bench, demo, import_scene, material_export, material_import, reference, render, serve, worker
+from cli import (
+    bake,
+    bench,
+    demo,
+    environment_import,
+    environment_list,
+    import_scene,
+    material_export,
+    material_import,
+    reference,
+    render,
+    serve,
+    worker,
+)
 from cli.sentence import sentence
 
 app = typer.Typer(
@@ -35,6 +48,10 @@ materials = typer.Typer(help="Measured materials in MERL files.", no_args_is_hel
 materials.command("import")(material_import.material_import)
 materials.command("export")(material_export.material_export)
 app.add_typer(materials, name="material")
+environments = typer.Typer(help="Light that a look may name.", no_args_is_help=True, rich_markup_mode=None)
+environments.command("import")(environment_import.environment_import)
+environments.command("list")(environment_list.environment_list)
+app.add_typer(environments, name="environment")
 
 INTERRUPTED = 130
 

@@ -19,7 +19,8 @@ def material_import(
     import json
 
     from cli.house import open_settings
-    from relume.measured.shelf import check_name, keep
+    from relume.measured.shelf import keep
+    from relume.shelf import check_name
     from worker.paths import materials_path
 
     record = keep(materials_path(open_settings(data).data), file, check_name(name or file.stem))

@@ -9,18 +9,32 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
-from relume.measured.shelf import shelf_at
+from relume.environments.shelf import SHELF as ENVIRONMENTS
+from relume.measured.shelf import SHELF as MATERIALS
 from server import errors
 from server.guard import Guard
 from server.live.library import open_library
 from server.metrics import Metrics
 from server.protocol import MAX_MESSAGE_BYTES
-from server.routes import bakes, client, health, library, looks, materials, models, renders, scenes, session, truths
+from server.routes import (
+    bakes,
+    client,
+    environments,
+    health,
+    library,
+    looks,
+    materials,
+    models,
+    renders,
+    scenes,
+    session,
+    truths,
+)
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
-from worker.paths import materials_path
+from worker.paths import environments_path, materials_path
 
-ROUTE_GROUPS = (scenes, models, materials, library, bakes, renders, truths, looks, session, health)
+ROUTE_GROUPS = (scenes, models, materials, library, environments, bakes, renders, truths, looks, session, health)
 
 
 def create_app(
@@ -40,7 +54,7 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with shelf_at(materials_path(settings.data)):
+        with MATERIALS.at(materials_path(settings.data)), ENVIRONMENTS.at(environments_path(settings.data)):
             async with open_services(settings, metrics, open_library, open_bakes) as services:
                 app.state.services = services
                 yield

@@ -149,6 +149,20 @@ class MeasuredBody(Body):
     homomorphic_error: tuple[float, float, float]
 
 
+class EnvironmentBody(Body):
+    """An environment that looks may name, by `map`, in place of the scene's own; `created` is null for a built-in one.
+
+    `warnings`: what was changed when its file was read.
+    """
+
+    id: str
+    map: str
+    name: str
+    created: str | None
+    warnings: list[str]
+    thumbnail: str
+
+
 class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 

@@ -1,7 +1,7 @@
-"""Imports an uploaded scene in a process of its own, with limits: a hostile file can end that process, not the server.
+"""Imports an uploaded file in a process of its own, with limits: a hostile file can end that process, not the server.
 
 `python -m server.importing` reads one `Order` as JSON from stdin and writes one line of JSON to stdout:
-{"scene": id} or {"problem": sentence}.
+{"id": id} or {"problem": sentence}.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 from relume.errors import RelumeError, SceneError
 
@@ -28,14 +29,16 @@ class Order:
     """What to import.
 
     Attributes:
-        environment: path of the environment map, or None.
-        name: of the scene.
+        kind, file: what it is, and its path.
+        environment: path of a scene's environment map, or None.
+        name: what people will call it.
         seconds: of processor and wall. max_bytes: of address space.
     """
 
     data: str
     database: str
-    scene: str
+    kind: Literal["scene", "environment"]
+    file: str
     environment: str | None
     name: str
     seconds: int
@@ -43,7 +46,7 @@ class Order:
 
 
 def import_in_process(order: Order) -> str:
-    """Import and register; returns the scene's id. Blocks.
+    """Import and register; returns the id. Blocks.
 
     Raises:
         SceneError: the file cannot be used, or reading it took too much.
@@ -59,10 +62,10 @@ def import_in_process(order: Order) -> str:
         )
         answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
     except (subprocess.TimeoutExpired, ValueError, IndexError):
-        raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the scene") from None
+        raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file") from None
     if "problem" in answer:
         raise SceneError(answer["problem"])
-    return str(answer["scene"])
+    return str(answer["id"])
 
 
 def remove_stray_uploads(data: Path, older_than_s: float) -> None:
@@ -80,16 +83,27 @@ def main() -> int:
     resource.setrlimit(resource.RLIMIT_CPU, (order.seconds, order.seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        answer = {"scene": _import(order)}
+        answer = {"id": _import(order)}
     except RelumeError as error:
         answer = {"problem": str(error)}
     except MemoryError:
-        answer = {"problem": f"the import needs more than {order.max_bytes / 1e9:.1f} GB; simplify the scene"}
+        answer = {"problem": f"the import needs more than {order.max_bytes / 1e9:.1f} GB; simplify the file"}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
     return 0
 
 
 def _import(order: Order) -> str:
+    return _import_scene(order) if order.kind == "scene" else _import_environment(order)
+
+
+def _import_environment(order: Order) -> str:
+    from relume.environments.shelf import keep
+    from worker.paths import environments_path
+
+    return keep(environments_path(Path(order.data)), Path(order.file), order.name).id
+
+
+def _import_scene(order: Order) -> str:
     from relume.light.environment import read_environment
     from relume.scene.importer import import_scene, read_file
     from worker.database import open_database
@@ -97,7 +111,7 @@ def _import(order: Order) -> str:
     from worker.scenes import register_scene
 
     environment = None if order.environment is None else read_environment(order.environment, "Environment")
-    scene = import_scene(read_file(order.scene), order.name, environment)  # bytes: what lies beside it is not its own
+    scene = import_scene(read_file(order.file), order.name, environment)  # bytes: what lies beside it is not its own
     return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
 
 

@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from relume import look as looks
 from relume.imageio import write_image
+from relume.shrink import shrink
 from server.backlog import Backlog, Work
 from server.bodies import RenderRequest
 from server.live.ports import Library, Transfer
-from server.shrink import shrink
 from server.tables import RenderRow
 
 

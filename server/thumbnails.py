@@ -7,9 +7,9 @@ from pathlib import Path
 
 from relume import look as looks
 from relume.imageio import write_image
+from relume.shrink import shrink
 from server.live.ports import Transfer
 from server.services import Services
-from server.shrink import shrink
 
 MAX_WIDTH = 320
 

@@ -50,6 +50,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.ModelBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
+    bodies.EnvironmentBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

@@ -26,6 +26,11 @@ def materials_path(data_dir: Path) -> Path:
     return data_dir / "materials"
 
 
+def environments_path(data_dir: Path) -> Path:
+    """Folder of the imported environments; `relume.environments.shelf` names what is in it."""
+    return data_dir / "environments"
+
+
 def bake_path(data_dir: Path, bake_id: str) -> Path:
     """The published store of a bake."""
     return data_dir / "bakes" / f"{_checked(bake_id)}.zarr"

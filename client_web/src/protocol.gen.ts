@@ -157,6 +157,16 @@ export interface DryRunBody {
   plan: PlanBody;
 }
 
+/** An environment that looks may name, by `map`, in place of the scene's own; `created` is null for a built-in one. `warnings`: what was changed when its file was read. */
+export interface EnvironmentBody {
+  id: string;
+  map: string;
+  name: string;
+  created: string | null;
+  warnings: string[];
+  thumbnail: string;
+}
+
 /** Header of a binary frame. */
 export interface FrameHeader {
   frame: number;

@@ -51,7 +51,7 @@ export interface MaterialLook {
 }
 export interface Look {
   materials: Record<string, MaterialLook>;
-  environment: { scale: number; color: Rgb; rotation: number };
+  environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
   lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
   display: { exposure: number; tone_map: string };
 }

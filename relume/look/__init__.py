@@ -1,7 +1,17 @@
 """The look: the JSON document that users edit. Documents are values: nothing here changes one, new ones share parts."""
 
 from relume.look.document import complete, default_look, validate
-from relume.look.model import Look, MaterialLook, TermLook
+from relume.look.model import BAKED_ENVIRONMENT, EnvironmentKey, Look, MaterialLook, TermLook
 from relume.look.patch import apply_patch
 
-__all__ = ["Look", "MaterialLook", "TermLook", "apply_patch", "complete", "default_look", "validate"]
+__all__ = [
+    "BAKED_ENVIRONMENT",
+    "EnvironmentKey",
+    "Look",
+    "MaterialLook",
+    "TermLook",
+    "apply_patch",
+    "complete",
+    "default_look",
+    "validate",
+]

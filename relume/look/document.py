@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
+from relume import environments
 from relume.errors import ParameterError
 from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_rgb, fail, names_text
 from relume.look.model import Look, ToneMap
@@ -15,6 +16,7 @@ MAX_TERMS = 16
 MAX_SCALE = 1e4
 MAX_EXPOSURE = 20.0
 _SECTIONS = ("materials", "environment", "lights", "display")
+_DEFAULT_ENVIRONMENT: dict[str, Any] = {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
 
 
 def default_look(scene_materials: Sequence[Material], light_names: Sequence[str] = ()) -> dict[str, Any]:
@@ -28,7 +30,7 @@ def default_look(scene_materials: Sequence[Material], light_names: Sequence[str]
             material.name: {"terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ())}
             for material in scene_materials
         },
-        "environment": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+        "environment": dict(_DEFAULT_ENVIRONMENT),
         "lights": {name: {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True} for name in light_names},
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
@@ -59,7 +61,9 @@ def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[st
     check_object((), partial, _SECTIONS)
     return {
         "materials": _complete_materials(partial.get("materials", {}), default["materials"], known["materials"]),
-        "environment": _complete_environment(partial.get("environment", {}), default["environment"]),
+        "environment": _complete_environment(
+            partial.get("environment", {}), default["environment"], known["environment"]
+        ),
         "lights": _complete_lights(partial.get("lights", {}), default["lights"]),
         "display": _complete_display(partial.get("display", {}), default["display"]),
     }
@@ -89,12 +93,20 @@ def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[
     ]
 
 
-def _complete_environment(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    merged = _merged(("environment",), given, default)
+def _complete_environment(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
+    merged = _merged(("environment",), given, {**_DEFAULT_ENVIRONMENT, **default})  # older stores name no map
+    if merged["map"] != known.get("map"):
+        _check_map(("environment", "map"), merged["map"])
     check_number(("environment", "scale"), merged["scale"], 0.0, MAX_SCALE)
     check_rgb(("environment", "color"), merged["color"], 0.0, MAX_COLOR)
     check_number(("environment", "rotation"), merged["rotation"], -360.0, 360.0)
     return merged
+
+
+def _check_map(pointer: Pointer, name: Any) -> None:
+    if name is not None and not (isinstance(name, str) and environments.is_known(name)):
+        known = names_text(environments.known_names())
+        raise fail(pointer, name, f"null for the scene's own, or an environment that is here: {known}")
 
 
 def _complete_lights(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ Terms stay dictionaries, so that `relume.brdf.curves` reads the same thing from 
 
 from __future__ import annotations
 
-from typing import Literal, NotRequired
+from typing import Literal, NamedTuple, NotRequired
 
 from pydantic import BaseModel, ConfigDict
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
@@ -46,13 +46,33 @@ class MaterialLook(_Frozen):
     terms: tuple[TermLook, ...]
 
 
+class EnvironmentKey(NamedTuple):
+    """What a picture's light depends on, brightness and tint apart: pictures of equal keys are lit alike.
+
+    Attributes:
+        map: as in `EnvironmentLook`. rotation: degrees in [0, 360).
+    """
+
+    map: str | None
+    rotation: float
+
+
+BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
+
+
 class EnvironmentLook(_Frozen):
     """The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
-    seen from above."""
+    seen from above. `map` names it, see `relume.environments`; None: the scene's own."""
 
+    map: str | None
     scale: float
     color: Rgb
     rotation: float
+
+    @property
+    def key(self) -> EnvironmentKey:
+        """Which light it is."""
+        return EnvironmentKey(self.map, self.rotation % 360)
 
     @property
     def gain(self) -> Rgb:

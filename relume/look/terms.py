@@ -21,7 +21,7 @@ from relume.look.checks import (
     fail,
     names_text,
 )
-from relume.measured.shelf import is_known, known_names
+from relume.measured.shelf import SHELF
 
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
@@ -65,8 +65,8 @@ def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dic
         if "data" in given:
             raise fail(pointer, name, f"nothing: {term.model!r} has no data")
         return {}
-    if not isinstance(name, str) or not is_known(name):
-        known = names_text(known_names())
+    if not isinstance(name, str) or not SHELF.is_known(name):
+        known = names_text(SHELF.known_names())
         raise fail(pointer, name, f"the data of a measured material that was imported here: {known}")
     return {"data": name}
 

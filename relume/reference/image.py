@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume import environments
 from relume.light.environment import lookup, turned
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look
@@ -46,11 +47,13 @@ def reference_image(
     Raises:
         PlanError: the scene has no such view, or a bake of this size would be refused.
         CancelledError: `cancelled` said so.
+        NotFoundError: the look names an environment that is not here.
     """
     DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
     geometry = merge(scene)
     samples = sample_view(scene, geometry, view, size)
-    texels = texels_of(scene.environment, look.environment.rotation)
+    light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
+    texels = texels_of(light, look.environment.rotation)
     camera = next(camera for camera in scene.cameras if camera.name == view)
     points = points_of(samples, camera.to_world[:3, 3])
     radiance = np.empty((len(samples.pixel), 3))
@@ -67,7 +70,7 @@ def reference_image(
         )[0]  # fmt: skip
     outside = samples.material == BACKGROUND
     towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
-    radiance[outside] = lookup(scene.environment.radiance, towards.astype(np.float32))
+    radiance[outside] = lookup(light.radiance, towards.astype(np.float32))
     return _resolve(samples, np.array(look.environment.gain) * radiance, size)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.environments.studio import studio
 from relume.light.triangles import TriangleLights, subdivide
-from relume.scene.demo.studio import studio
 from relume.transfer.projector import Receivers
 from relume.transfer.shade import shade
 from relume.transfer.term_image import TermImage

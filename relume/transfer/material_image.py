@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.compose import add_term
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import View
@@ -26,7 +27,7 @@ class MaterialImage:
         self._cos_theta_o = view.cos_theta_o[rows]
         self._textures = {name: texture[rows] for name, texture in view.textures.items()}
         self.documents = list(documents)
-        self._rotation = 0.0
+        self._environment = BAKED_ENVIRONMENT
         self.terms = [TermImage(document, self._cos_theta_o) for document in documents]
         self._is_current = False
 
@@ -37,18 +38,18 @@ class MaterialImage:
         kept = len(self.terms)
         for k, document in enumerate(documents):
             if k >= kept:
-                self.terms.append(TermImage(document, self._cos_theta_o, self._rotation))
+                self.terms.append(TermImage(document, self._cos_theta_o, self._environment))
             elif document != self.documents[k]:
                 self.terms[k].set_document(document)
         del self.terms[len(documents) :]
         self.documents = list(documents)
         self._is_current = False
 
-    def set_rotation(self, rotation: float) -> None:
-        """The environment is turned by so many degrees."""
-        self._rotation = rotation
+    def set_environment(self, environment: EnvironmentKey) -> None:
+        """It is lit by this from now on."""
+        self._environment = environment
         for term in self.terms:
-            term.set_rotation(rotation)
+            term.set_environment(environment)
 
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""

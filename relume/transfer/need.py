@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.frozen import Frozen, freeze, frozen_bytes
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.projector import contract
@@ -29,7 +30,7 @@ class Need:
     Attributes:
         what: in words. key: its name in the cache; equal keys are the same need.
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
-        rotation: of the environment.
+        environment: what lights it.
         is_default: the term is one of the scene's own look, whose images are kept beside the store.
     """
 
@@ -43,7 +44,7 @@ class Need:
     bands: Mapping[str, NDArray[np.float64]]
     active: str | None
     num_bytes: int
-    rotation: float
+    environment: EnvironmentKey
     is_default: bool
 
     @property
@@ -60,7 +61,7 @@ class Need:
             CancelledError: `cancelled` said so.
         """
         images, active = self.images, self.active
-        lights = images.transfer.lights_at(self.rotation)
+        lights = images.transfer.lights_in(self.environment)
 
         def frozen(curve: str) -> Frozen:
             receivers = images.view.receivers(self.material.index)
@@ -155,6 +156,6 @@ def _need(images: ViewImages, candidate: Candidate) -> Need:
         bands=image.target,
         active=curve,
         num_bytes=_num_bytes(candidate),
-        rotation=images.rotation,
-        is_default=images.rotation == 0 and image.document in images.default.materials[name].terms,
+        environment=images.environment,
+        is_default=images.environment == BAKED_ENVIRONMENT and image.document in images.default.materials[name].terms,
     )

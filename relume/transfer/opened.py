@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import StoreError
+from relume import environments
+from relume.errors import ParameterError, StoreError
 from relume.light.environment import lookup, turned
 from relume.light.triangles import TriangleLights, weigh
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
 from relume.store import open_store
 from relume.transfer.base import StoreReader
 from relume.transfer.derived import DerivedImages
@@ -52,25 +54,32 @@ class Transfer:
         return read_lights(self.store)
 
     @cached_property
-    def environment(self) -> NDArray[np.float32]:
-        """Radiance of the environment. (height, width, 3) float32"""
+    def _own_radiance(self) -> NDArray[np.float32]:
         return np.asarray(self.store.read("lights/environment"), np.float32)
 
-    def lights_at(self, rotation: float) -> TriangleLights:
-        """The triangles of the environment turned about +Y by some degrees: the same tiles, weighed again."""
-        return self.lights if rotation == 0 else self._weighed(rotation)
+    def radiance_of(self, name: str | None) -> NDArray[np.float32]:
+        """Radiance of an environment, None for the scene's own. (height, width, 3) float32
+
+        Raises:
+            NotFoundError: it is not here. SceneError: its files are damaged.
+        """
+        return self._own_radiance if name is None else environments.find(name).radiance
+
+    def lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+        """The triangles of an environment: the tiles of the bake, weighed again."""
+        return self.lights if environment == BAKED_ENVIRONMENT else self._weighed(environment)
 
     @cached_property
-    def _weighed(self) -> Callable[[float], TriangleLights]:
+    def _weighed(self) -> Callable[[EnvironmentKey], TriangleLights]:
         tiles = read_tiles(self.store)
-        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda rotation: weigh(tiles, self.environment, rotation))
+        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(tiles, self.radiance_of(key.map), key.rotation))
 
-    def background_at(self, view: View, rotation: float) -> NDArray[np.float32]:
-        """Radiance of a view's samples of the turned environment. (n, 3) float32"""
-        if rotation == 0:
+    def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
+        """Radiance of a view's samples of an environment. (n, 3) float32"""
+        if environment == BAKED_ENVIRONMENT:
             return view.background()
-        towards = turned(view.background_directions(), -rotation)
-        return lookup(self.environment, towards.astype(np.float32))
+        towards = turned(view.background_directions(), -environment.rotation)
+        return lookup(self.radiance_of(environment.map), towards.astype(np.float32))
 
 
 def open_transfer(path: Path) -> Transfer:
@@ -88,11 +97,11 @@ def open_transfer(path: Path) -> Transfer:
             scene_id=found["scene"],
             method=found["method"],
             num_lights=found["num_lights"],
-            default_look=found["look"],
+            default_look=complete({}, found["look"]),
             material_names=tuple(found["materials"]),
             views={view["name"]: open_view(store, k) for k, view in enumerate(found["views"])},
         )
-    except (KeyError, TypeError, IndexError) as error:
+    except (KeyError, TypeError, IndexError, ParameterError) as error:
         raise StoreError(
             f"the store's description is not of this form ({error}); delete the bake, bake again"
         ) from error

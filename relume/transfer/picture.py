@@ -53,14 +53,14 @@ class Picture:
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._shown_rotation = self._images.rotation
+        self._shown_environment = self._images.environment
         self._touched: CurvePointer | None = None
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
-        before = self._images.rotation
+        before = self._images.environment
         self._images.set_look(look)
-        if self._images.rotation != before:
+        if self._images.environment != before:
             self._touched = None  # the hand has moved on to the environment
         self._look = look
 
@@ -128,11 +128,11 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        rotation = images.rotation
-        if rotation != self._shown_rotation or not np.array_equal(self._gain, self._look.environment.gain):
-            self._gain, self._shown_rotation = np.array(self._look.environment.gain), rotation
+        environment = images.environment
+        if environment != self._shown_environment or not np.array_equal(self._gain, self._look.environment.gain):
+            self._gain, self._shown_environment = np.array(self._look.environment.gain), environment
             first = self._view.num_surface_samples
-            self._radiance[:, first:] = self._transfer.background_at(self._view, rotation).T
+            self._radiance[:, first:] = self._transfer.background_in(environment, self._view).T
             tiles.update(self._view.all_tiles)
         return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
 

@@ -16,6 +16,7 @@ from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.errors import EditError
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
@@ -37,8 +38,10 @@ class TermImage:
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
 
-    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, rotation: float = 0.0) -> None:
-        self._rotation = rotation
+    def __init__(
+        self, document: Mapping[str, Any], cos_theta_o: F64, environment: EnvironmentKey = BAKED_ENVIRONMENT
+    ) -> None:
+        self._environment = environment
         self._theta_o = np.arccos(cos_theta_o)
         self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
         self.effective: dict[str, F64] | None = None
@@ -51,7 +54,7 @@ class TermImage:
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
         model: str = document["model"]
-        kind = (model, TERMS[model].fixed_values(document), self._rotation)
+        kind = (model, TERMS[model].fixed_values(document), self._environment)
         if kind != self.kind:
             self.effective = self.active = self.shown = None
         self.kind = kind
@@ -61,9 +64,9 @@ class TermImage:
         self.outgoing = self._outgoing()
         self.is_composed = False
 
-    def set_rotation(self, rotation: float) -> None:
-        """The environment is turned: what the image shows counts for nothing, but stands until there is a new one."""
-        self._rotation = rotation
+    def set_environment(self, environment: EnvironmentKey) -> None:
+        """Other light: what the image shows counts for nothing, but stands until there is a new one."""
+        self._environment = environment
         self.set_document(self.document)
 
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:

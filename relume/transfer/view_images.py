@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from relume.errors import ParameterError
-from relume.look import Look, validate
+from relume.look import BAKED_ENVIRONMENT, Look, validate
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
 from relume.transfer.material_image import MaterialImage
@@ -19,26 +19,27 @@ class ViewImages:
 
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
-        rotation: of the environment, degrees in [0, 360); 0 is as it was baked.
+        environment: what lights them.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
         self.default = validate(transfer.default_look, transfer.default_look)
-        self.rotation = 0.0
+        self.environment = BAKED_ENVIRONMENT
         self.by_name = {
             name: MaterialImage(self.view, index, self.default.materials[name].terms)
             for index, name in enumerate(transfer.material_names)
         }
 
     def set_look(self, look: Look) -> None:
-        """A new target for every term."""
-        rotation = look.environment.rotation % 360
-        if rotation != self.rotation:
-            self.rotation = rotation
+        """A new target for every term. Raises what `Transfer.radiance_of` raises; then nothing has changed."""
+        environment = look.environment.key
+        if environment != self.environment:
+            self.transfer.radiance_of(environment.map)
+            self.environment = environment
             for material in self.by_name.values():
-                material.set_rotation(rotation)
+                material.set_environment(environment)
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
 

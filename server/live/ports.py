@@ -39,6 +39,9 @@ class Transfer(Protocol):
     def material_names(self) -> Sequence[str]: ...
     @property
     def views(self) -> Mapping[str, Any]: ...
+    def radiance_of(self, name: str | None) -> F32:
+        """(height, width, 3); None: of the scene's own environment."""
+        ...
 
 
 class Advance(Protocol):

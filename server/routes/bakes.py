@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse
 from PIL import Image
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
+from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, ParameterError
 from relume.transfer.base import Plan, Recipe
 from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
@@ -98,6 +99,15 @@ def _png(view: Any) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(view.material_ids()).save(buffer, "PNG")
     return buffer.getvalue()
+
+
+@router.get("/{bake}/environment.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+async def own_environment(bake: Id, services: Shared) -> Response:
+    """The light that the scene came with, as small as those of /api/environments."""
+    await run_in_threadpool(ready_bake, services, bake)
+    async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
+        png = await run_in_threadpool(lambda: thumbnail(transfer.radiance_of(None)))
+    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=31536000, immutable"})
 
 
 def ready_bake(services: Services, bake: str) -> BakeStatus:

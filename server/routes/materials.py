@@ -10,8 +10,8 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.measured import shelf
-from relume.measured.shelf import MaterialRecord
+from relume.measured.shelf import SHELF, MaterialRecord, get_record, keep, records
+from relume.shelf import check_name
 from server.bodies import Id, MeasuredBody
 from server.importing import UPLOAD_PREFIX
 from server.services import Services, Shared
@@ -35,28 +35,28 @@ async def import_measured(
 
 
 def _import(material: UploadFile, name: str, services: Services) -> MaterialRecord:
-    name = shelf.check_name(name or plain_stem(material.filename) or "Material")
+    name = check_name(name or plain_stem(material.filename) or "Material")
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(material, Path(folder) / "material.binary")
-        return shelf.keep(materials_path(services.settings.data), path, name)
+        return keep(materials_path(services.settings.data), path, name)
 
 
 @router.get("")
 def list_measured(services: Shared) -> list[MeasuredBody]:
     """All measured materials, newest first."""
-    return [_body(record) for record in shelf.records(materials_path(services.settings.data))]
+    return [_body(record) for record in records(materials_path(services.settings.data))]
 
 
 @router.get("/{material}")
 def get_measured(material: Id, services: Shared) -> MeasuredBody:
     """One measured material."""
-    return _body(shelf.get_record(materials_path(services.settings.data), material))
+    return _body(get_record(materials_path(services.settings.data), material))
 
 
 @router.delete("/{material}", status_code=204)
 def delete_measured(material: Id, services: Shared) -> Response:
     """Delete a measured material; looks that name it are refused from then on."""
-    shelf.remove(materials_path(services.settings.data), material)
+    SHELF.remove(materials_path(services.settings.data), material)
     return Response(status_code=204)
 
 

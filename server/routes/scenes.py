@@ -49,20 +49,14 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
         order = Order(
             data=str(settings.data.resolve()),
             database=settings.database_url,
-            scene=str(keep_upload(scene, Path(folder) / "scene")),
-            environment=None if environment is None else _keep_environment(environment, Path(folder)),
+            kind="scene",
+            file=str(keep_upload(scene, Path(folder) / "scene")),
+            environment=None if environment is None else str(keep_upload(environment, Path(folder) / "environment")),
             name=name.strip() or plain_stem(scene.filename) or "Scene",
             seconds=settings.import_seconds,
             max_bytes=settings.import_bytes,
         )
         return import_in_process(order)
-
-
-def _keep_environment(upload: UploadFile, folder: Path) -> str:
-    """Kept under the suffix that its content says; the uploaded name becomes no part of a path."""
-    start = upload.file.read(4)
-    upload.file.seek(0)
-    return str(keep_upload(upload, folder / ("environment.exr" if start == b"\x76\x2f\x31\x01" else "environment.hdr")))
 
 
 @router.get("")

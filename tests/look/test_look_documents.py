@@ -43,7 +43,7 @@ def test_default_look_has_every_field(default):
         "curves": {},
     }
     assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
-    assert default["environment"] == {"scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+    assert default["environment"] == {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
     assert default["lights"] == {"Key": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}}
     assert default["display"] == {"exposure": 0.0, "tone_map": "agx"}
     assert json.loads(json.dumps(default)) == default
@@ -79,7 +79,7 @@ def test_the_contract_s_example_is_valid(default):
                 ]
             }
         },
-        "environment": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+        "environment": {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
         "lights": {"Key": {"scale": 1.0, "color": [1, 1, 1], "on": True}},
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
@@ -169,6 +169,9 @@ def points(count):
         ("/environment/color", [1, -1, 1], "/environment/color/1", "[0, 10000]"),
         ("/environment/color", 0.5, "/environment/color", "three numbers"),
         ("/environment/rotation", 1e9, "/environment/rotation", "[-360, 360]"),
+        ("/environment/map", "env:0123456789abcdef", "/environment/map", "'studio'"),
+        ("/environment/map", "../studio", "/environment/map", "null for the scene's own"),
+        ("/environment/map", ["studio"], "/environment/map", "'sunset'"),
         ("/environment/tilt", 1, "/environment/tilt", "'rotation'"),
         ("/lights/Moon", {}, "/lights", "'Key'"),
         ("/lights/Key/on", 1, "/lights/Key/on", "true or false"),
@@ -283,7 +286,7 @@ def test_empty_path_replaces_the_whole_look(default):
     edited = apply_patch(default, replace("/display/exposure", 3), default)
     assert apply_patch(edited, replace("", {}), default) == default
     whole = apply_patch(default, replace("", {"environment": {"scale": 2}}), default)
-    assert whole["environment"] == {"scale": 2, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+    assert whole["environment"] == {"map": None, "scale": 2, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
 
 
 def test_term_may_be_added_moved_down_and_changed_in_model(default):

@@ -12,7 +12,7 @@ from relume.errors import MaterialError
 from relume.measured.export import sample_terms
 from relume.measured.lookup import measured_brdf, table_of
 from relume.measured.merl import grid_directions, is_measured, read_merl, write_merl
-from relume.measured.shelf import keep, remove
+from relume.measured.shelf import SHELF, keep
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_an_edited_material_is_the_same_when_it_is_imported_again(shelf, edited,
         value = sum(eval_brdf(term, wi, wo) for term in again.terms())
         np.testing.assert_allclose(value, sum(eval_brdf(t, wi, wo) for t in edited), rtol=1e-6, atol=1e-8)
     finally:
-        remove(shelf, again.id)
+        SHELF.remove(shelf, again.id)
 
 
 def test_between_the_nodes_an_edited_export_is_near_the_edit(edited):

@@ -12,7 +12,7 @@ from relume.brdf.registry import TERMS
 from relume.look import default_look, validate
 from relume.measured.lookup import measured_brdf
 from relume.measured.merl import write_merl
-from relume.measured.shelf import keep, remove
+from relume.measured.shelf import SHELF, keep
 from relume.reference import reference_image
 from relume.store import bake_here
 from relume.transfer.base import Recipe
@@ -187,4 +187,4 @@ def test_another_material_is_another_operator(transfer, shelf, data, tmp_path):
         assert picture.image()[inside, 0].all()
         assert not picture.image()[inside, 1:].any()
     finally:
-        remove(shelf, red.id)
+        SHELF.remove(shelf, red.id)

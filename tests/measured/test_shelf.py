@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from relume.errors import MaterialError, NotFoundError, ParameterError
 from relume.look.terms import complete_term
 from relume.measured import shelf as shelves
 from relume.measured.merl import write_merl
-from relume.measured.shelf import get_record, is_known, keep, known_names, material, records, remove, shelf_at
+from relume.measured.shelf import SHELF, get_record, keep, material, records
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
 
 
 def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
-    monkeypatch.setattr(shelves, "MAX_MATERIALS", 1)
+    monkeypatch.setattr(shelves, "SHELF", replace(SHELF, max_entries=1))
     other = planes.copy()
     other[0, 0, 0, 0] += 1
     write_merl(tmp_path / "other.binary", other)
@@ -64,8 +65,8 @@ def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
 def test_what_is_removed_is_known_no_more(copied):
     folder, identity = copied
     with pytest.raises(NotFoundError):
-        remove(folder, "0" * 16)
-    remove(folder, identity)
+        SHELF.remove(folder, "0" * 16)
+    SHELF.remove(folder, identity)
     assert records(folder) == []
     with pytest.raises(NotFoundError, match="import it first"):
         get_record(folder, identity)
@@ -75,7 +76,7 @@ def test_what_is_removed_is_known_no_more(copied):
     "name", ["", "merl:", "merl:../../../etc/passwd", "merl:0000000000000000", "0000000000000000", "merl:" + "G" * 16]
 )
 def test_only_names_of_imported_materials_are_known(shelf, name):
-    assert not is_known(name)
+    assert not SHELF.is_known(name)
     with pytest.raises(NotFoundError):
         material(name)
 
@@ -84,11 +85,11 @@ def test_names_are_known_while_their_folder_is_in_use(shelf, data, copied):
     folder, identity = copied
     (folder / identity).rename(folder / "fedcba9876543210")
     name = "merl:fedcba9876543210"
-    assert not is_known(name)
-    with shelf_at(folder):
-        assert is_known(name)
-        assert set(known_names()) >= {name, data}
-    assert not is_known(name)
+    assert not SHELF.is_known(name)
+    with SHELF.at(folder):
+        assert SHELF.is_known(name)
+        assert set(SHELF.known_names()) >= {name, data}
+    assert not SHELF.is_known(name)
 
 
 def change(document, key, value):
@@ -113,7 +114,7 @@ def test_damaged_files_are_named(copied, file, content):
     path = folder / identity / file
     path.write_bytes(content(json.loads((folder / identity / "material.json").read_text())))
     (folder / identity).rename(folder / "fedcba9876543210")
-    with shelf_at(folder), pytest.raises(MaterialError, match="import it again"):
+    with SHELF.at(folder), pytest.raises(MaterialError, match="import it again"):
         material("merl:fedcba9876543210")
 
 

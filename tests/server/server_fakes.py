@@ -87,6 +87,9 @@ class FakeTransfer:
     default_look: dict[str, Any] = field(default_factory=lambda: default_look(tiny_scene().materials))
     material_names: list[str] = field(default_factory=lambda: ["Paper"])
 
+    def radiance_of(self, name: str | None) -> np.ndarray:
+        return np.ones((4, 8, 3), np.float32)
+
 
 @dataclass(frozen=True)
 class FakeNeed:

@@ -151,7 +151,7 @@ def stream(transport, change, image):
 def radiance_of(transfer, view: View, look):
     """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
     out = np.zeros((view.num_view_samples, 3))
-    lights = transfer.lights_at(look.environment.rotation % 360)
+    lights = transfer.lights_in(look.environment.key)
     for index, name in enumerate(transfer.material_names):
         rows = view.rows(index)
         if rows.start == rows.stop:
@@ -168,7 +168,7 @@ def radiance_of(transfer, view: View, look):
                 if curve.outgoing:
                     image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
             out[rows] += image
-    out[view.num_surface_samples :] = transfer.background_at(view, look.environment.rotation % 360)
+    out[view.num_surface_samples :] = transfer.background_in(look.environment.key, view)
     return np.array(look.environment.gain) * out
 
 

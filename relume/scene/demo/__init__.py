@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
+from relume.environments.studio import studio
 from relume.scene.archive import make_scene
 from relume.scene.demo.materials import materials
 from relume.scene.demo.still_life import cameras, meshes
-from relume.scene.demo.studio import studio
 from relume.scene.model import Scene
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.environments.studio import studio
 from relume.errors import SceneError
 from relume.scene.checks import MAX_TRIANGLES
 from relume.scene.companions import Alone, Companions
-from relume.scene.demo.studio import studio
 from relume.scene.finish import finished_scene
 from relume.scene.gltf.accessors import AccessorReader
 from relume.scene.gltf.cameras import framing_camera, rigid, slug

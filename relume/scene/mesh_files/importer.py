@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from relume.environments.studio import studio
 from relume.errors import SceneError
 from relume.scene.companions import Alone, Companions
-from relume.scene.demo.studio import studio
 from relume.scene.finish import finished_scene
 from relume.scene.gltf.cameras import framing_camera
 from relume.scene.gltf.names import unique_name

@@ -1,0 +1,40 @@
+"""Small pictures of environments, as a list shows them."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.color import luminance
+from relume.imageio import to_bytes, tone_map
+from relume.replacing import Replacing
+from relume.shrink import shrink
+
+WIDTH, HEIGHT = 192, 96
+_GREY = 0.18  # what the geometric mean becomes: a sun does not darken the rest
+
+
+def thumbnail(radiance: NDArray[np.float32]) -> bytes:
+    """A tone-mapped PNG, exposed for what most of the map shows.
+
+    Args:
+        radiance: equirectangular. (height, width, 3) float32
+    """
+    height, width, _ = radiance.shape
+    small = shrink(radiance, (min(WIDTH, width), min(HEIGHT, height)))
+    light = luminance(small)
+    mean = float(np.exp(np.mean(np.log(light[light > 0], dtype=np.float64))))
+    buffer = io.BytesIO()
+    shown = Image.fromarray(to_bytes(tone_map(small, float(np.log2(_GREY / mean)), "agx")))
+    shown.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def write_thumbnail(path: Path, radiance: NDArray[np.float32]) -> None:
+    """The same as a file."""
+    with Replacing(path) as file:
+        file.write(thumbnail(radiance))

@@ -1,0 +1,112 @@
+"""/api/environments: import, list, show and delete environments that looks may name in place of a scene's own."""
+
+from __future__ import annotations
+
+import tempfile
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi import Path as PathPart
+from fastapi.concurrency import run_in_threadpool
+
+from relume.environments.built_in import BUILT_IN, built_in
+from relume.environments.shelf import SHELF, EnvironmentRecord, get_record, records, thumbnail_path
+from relume.environments.thumbnail import thumbnail
+from relume.shelf import check_name
+from server.bodies import EnvironmentBody, Id
+from server.importing import UPLOAD_PREFIX, Order, import_in_process
+from server.services import Services, Shared
+from server.uploads import keep_upload, plain_stem
+from worker.paths import environments_path
+
+router = APIRouter(prefix="/api/environments", tags=["environments"])
+MapFile = Annotated[UploadFile, File(description="equirectangular environment map, .hdr or .exr")]
+MapName = Annotated[str, Form(max_length=200)]
+AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported environment, or name of a built-in one")]
+PNG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/png": {}}}}
+
+
+@router.post("", status_code=201)
+async def import_environment(
+    environment: MapFile, services: Shared, response: Response, name: MapName = ""
+) -> EnvironmentBody:
+    """Import an environment, in a process of its own; the body says how look documents name it."""
+    async with services.import_slots:
+        identity = await run_in_threadpool(_import, environment, name, services)
+    response.headers["Location"] = f"/api/environments/{identity}"
+    return await run_in_threadpool(get_environment, identity, services)
+
+
+def _import(environment: UploadFile, name: str, services: Services) -> str:
+    settings = services.settings
+    name = check_name(name or plain_stem(environment.filename) or "Environment")
+    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
+        order = Order(
+            data=str(settings.data.resolve()),
+            database=settings.database_url,
+            kind="environment",
+            file=str(keep_upload(environment, Path(folder) / "environment")),
+            environment=None,
+            name=name,
+            seconds=settings.import_seconds,
+            max_bytes=settings.import_bytes,
+        )
+        return import_in_process(order)
+
+
+@router.get("")
+def list_environments(services: Shared) -> list[EnvironmentBody]:
+    """The built-in ones, then the imported ones, newest first."""
+    imported = records(environments_path(services.settings.data))
+    return [*map(_built_in_body, BUILT_IN), *map(_body, imported)]
+
+
+@router.get("/{environment}")
+def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
+    """One environment."""
+    if environment in BUILT_IN:
+        return _built_in_body(environment)
+    return _body(get_record(environments_path(services.settings.data), environment))
+
+
+@router.get("/{environment}/thumbnail.png", response_class=Response, responses=PNG)
+def get_thumbnail(environment: AnyId, services: Shared) -> Response:
+    """A small tone-mapped picture, 192 × 96."""
+    if environment in BUILT_IN:
+        png = _built_in_thumbnail(environment)
+    else:
+        png = thumbnail_path(environments_path(services.settings.data), environment).read_bytes()
+    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+
+
+@router.delete("/{environment}", status_code=204)
+def delete_environment(environment: Id, services: Shared) -> Response:
+    """Delete an imported environment; looks that name it are refused from then on."""
+    SHELF.remove(environments_path(services.settings.data), environment)
+    return Response(status_code=204)
+
+
+@lru_cache(maxsize=len(BUILT_IN))
+def _built_in_thumbnail(name: str) -> bytes:
+    return thumbnail(built_in(name).radiance)
+
+
+def _built_in_body(name: str) -> EnvironmentBody:
+    label, _ = BUILT_IN[name]
+    return EnvironmentBody(
+        id=name, map=name, name=label, created=None, warnings=[], thumbnail=f"/api/environments/{name}/thumbnail.png"
+    )
+
+
+def _body(record: EnvironmentRecord) -> EnvironmentBody:
+    return EnvironmentBody(
+        id=record.id,
+        map=record.map,
+        name=record.name,
+        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        warnings=list(record.warnings),
+        thumbnail=f"/api/environments/{record.id}/thumbnail.png",
+    )

@@ -1,0 +1,20 @@
+"""An environment file as tests need one."""
+
+import numpy as np
+import OpenImageIO
+from tiny_scenes import studio
+
+
+def dusk():
+    """Radiance unlike the studio's: from the other side, and red. (32, 64, 3)"""
+    return np.ascontiguousarray(np.roll(studio(32), 25, axis=1) * [1.0, 0.4, 0.2], np.float32)
+
+
+def write_map(path, pixels):
+    """An equirectangular image as the file that its name ends in."""
+    height, width, channels = pixels.shape
+    output = OpenImageIO.ImageOutput.create(str(path))
+    assert output.open(str(path), OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT))
+    assert output.write_image(np.ascontiguousarray(pixels, np.float32))
+    output.close()
+    return path

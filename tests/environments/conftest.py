@@ -1,0 +1,19 @@
+"""A shelf with one environment; its file."""
+
+import pytest
+from environment_files import dusk, write_map
+
+from relume.environments.shelf import SHELF, keep
+
+
+@pytest.fixture(scope="session")
+def dusk_file(tmp_path_factory):
+    return write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk())
+
+
+@pytest.fixture(scope="session")
+def shelf(dusk_file, tmp_path_factory):
+    """A folder with one imported environment, in use."""
+    with SHELF.at(tmp_path_factory.mktemp("shelf") / "environments") as folder:
+        keep(folder, dusk_file, "Dusk")
+        yield folder

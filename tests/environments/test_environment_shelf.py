@@ -1,0 +1,136 @@
+"""Imported and built-in environments: what is kept, what it is called, what damaged files do."""
+
+import io
+import json
+import shutil
+
+import numpy as np
+import pytest
+from environment_files import dusk, write_map
+from PIL import Image
+
+from relume import environments
+from relume.color import luminance
+from relume.environments import shelf as shelves
+from relume.environments.built_in import BUILT_IN, built_in
+from relume.environments.shelf import SHELF, get_record, keep, records, thumbnail_path
+from relume.environments.thumbnail import thumbnail
+from relume.errors import NotFoundError, SceneError
+from relume.light.environment import texel_directions, texel_solid_angles
+
+
+def test_an_import_is_listed_and_found_by_its_name(shelf):
+    (record,) = records(shelf)
+    assert (record.name, record.map, record.warnings) == ("Dusk", f"env:{record.id}", ())
+    found = environments.find(record.map)
+    assert found.name == "Dusk"
+    np.testing.assert_array_equal(found.radiance, dusk())
+    assert not found.radiance.flags.writeable
+    assert environments.is_known(record.map)
+    assert environments.known_names() == [*BUILT_IN, record.map]
+    with Image.open(thumbnail_path(shelf, record.id)) as picture:
+        assert (picture.size, picture.mode) == ((192, 96), "RGB")
+
+
+def test_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
+    first = keep(tmp_path / "shelf", dusk_file, "One")
+    again = keep(tmp_path / "shelf", dusk_file, "Two")
+    assert (again.id, again.name, again.created) == (first.id, "Two", first.created)
+    assert len(records(tmp_path / "shelf")) == 1
+
+
+def test_a_bad_file_leaves_nothing_behind(tmp_path):
+    (tmp_path / "bad.hdr").write_bytes(b"#?RADIANCE\n\n-Y 4 +X 8\n")
+    with pytest.raises(SceneError, match="bad"):
+        keep(tmp_path / "shelf", tmp_path / "bad.hdr", "bad")
+    assert not (tmp_path / "shelf").exists()
+
+
+def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):
+    monkeypatch.setattr(shelves, "MAX_WIDTH", 32)
+    pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
+    path = write_map(tmp_path / "large.exr", pixels)
+    with SHELF.at(tmp_path / "shelf") as folder:
+        record = keep(folder, path, "Large")
+        assert record.warnings == ("environment 'Large' is 96×48; it is kept as 32×16",)
+        found = environments.find(record.map).radiance
+    np.testing.assert_allclose(found, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["", "env:", "env:../../etc", "env:0123456789abcdef", "Studio", "0123456789abcdef"])
+def test_other_names_are_unknown(shelf, name):
+    assert not environments.is_known(name)
+    with pytest.raises(NotFoundError, match="import its file again"):
+        environments.find(name)
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("environment.json", b"{"),
+        ("environment.json", json.dumps({"format": 1, "name": 3, "created": 1.0}).encode()),
+        ("radiance.npy", b""),
+        ("radiance.npy", b"\x93NUMPY\x01\x00"),
+    ],
+)
+def test_damaged_files_are_named(shelf, tmp_path, file, content):
+    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+    (tmp_path / "fedcba9876543210" / file).write_bytes(content)
+    with SHELF.at(tmp_path), pytest.raises(SceneError, match="import it again"):
+        environments.find("env:fedcba9876543210")
+
+
+def test_arrays_of_other_shapes_are_damage(shelf, tmp_path):
+    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+    for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
+        np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
+        with SHELF.at(tmp_path), pytest.raises(SceneError, match="damaged"):
+            environments.find("env:fedcba9876543210")
+
+
+def test_a_record_without_warnings_is_damage(shelf, tmp_path):
+    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+    (tmp_path / "fedcba9876543210" / "environment.json").write_text('{"format": 1, "name": "x", "created": 1.0}')
+    with pytest.raises(SceneError, match="damaged"):
+        get_record(tmp_path, "fedcba9876543210")
+
+
+def mean_luminance(radiance):
+    height, width, _ = radiance.shape
+    return (luminance(radiance) * texel_solid_angles(height, width)[:, None]).sum() / (4 * np.pi)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_built_in_ones_are_sound_and_as_bright_as_the_studio(name):
+    radiance = built_in(name).radiance
+    assert radiance.dtype == np.float32
+    assert radiance.shape == (256, 512, 3)
+    assert np.isfinite(radiance).all()
+    assert radiance.min() > 0
+    assert mean_luminance(radiance) == pytest.approx(mean_luminance(built_in("studio").radiance), rel=0.01)
+    assert built_in(name) is built_in(name)
+
+
+def test_overcast_zenith_is_three_times_the_horizon():
+    light = luminance(built_in("overcast").radiance)
+    assert light[0].mean() / light[127].mean() == pytest.approx(3.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "elevation"), [("clear_sky", 48.0), ("sunset", 5.0)])
+def test_the_sun_stands_where_it_is_said_to(name, elevation):
+    light = luminance(built_in(name).radiance)
+    y = texel_directions(256, 512)[..., 1]
+    assert np.degrees(np.arcsin(y.ravel()[light.argmax()])) == pytest.approx(elevation, abs=0.7)
+
+
+def test_a_thumbnail_shows_a_dim_map_as_a_bright_one():
+    one = np.random.default_rng(2).uniform(0.5, 1.0, (32, 64, 3)).astype(np.float32)
+    pictures = [np.asarray(Image.open(io.BytesIO(thumbnail(one * scale))), int) for scale in (1e-3, 1.0, 1e3)]
+    for picture in pictures:
+        assert np.abs(picture - pictures[1]).max() <= 1
+
+
+def test_a_thumbnail_of_a_map_with_black_in_it():
+    black = np.zeros((16, 32, 3), np.float32)
+    black[3, 4] = 5.0
+    assert thumbnail(black).startswith(b"\x89PNG")

@@ -1,0 +1,175 @@
+"""Environments by the command line and over HTTP, and a baked scene shown in one."""
+
+import json
+import time
+
+import numpy as np
+import OpenImageIO
+import pytest
+from environment_files import dusk, write_map
+from fastapi.testclient import TestClient
+from session_client import open_session
+from tiny_scenes import still_life
+
+from cli.main import main
+from relume.environments.shelf import records
+from relume.transfer.base import Recipe
+from server.app import create_app
+from server.settings import Settings
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+URL = "/api/environments"
+RECIPE = Recipe("direct", ("front",), (64, 48), 200)
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory):
+    data = tmp_path_factory.mktemp("data")
+    with TestClient(create_app(Settings(data=data, allowed_hosts=["testserver"]))) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def imported(client, dusk_file):
+    response = client.post(URL, files={"environment": ("some/dusk.exr", dusk_file.read_bytes())})
+    assert response.status_code == 201, response.text
+    assert response.headers["Location"] == f"{URL}/{response.json()['id']}"
+    return response.json()
+
+
+@pytest.fixture(scope="module")
+def bake(client):
+    service: BakeService = client.app.state.services.bakes
+    scene = register_scene(service.data_dir, service.ledger, still_life())
+    identity = service.submit(scene, RECIPE)
+    wait(lambda: client.get(f"/api/bakes/{identity}").json()["state"] == "ready")
+    return identity
+
+
+def wait(is_done):
+    for _ in range(600):
+        if is_done():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it takes too long")
+
+
+def test_rest_lists_built_in_ones_first_and_shows_each(client, imported):
+    listed = client.get(URL).json()
+    assert [entry["map"] for entry in listed] == ["studio", "clear_sky", "sunset", "overcast", imported["map"]]
+    assert (imported["name"], imported["map"]) == ("dusk", f"env:{imported['id']}")
+    for entry in listed:
+        assert client.get(f"{URL}/{entry['id']}").json() == entry
+        picture = client.get(entry["thumbnail"])
+        assert picture.headers["content-type"] == "image/png"
+        assert picture.content.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"\x89PNG\r\n\x1a\n" + b"0" * 100, "neither Radiance .hdr nor OpenEXR"),
+        (b"#?RADIANCE\n\n-Y 100000 +X 200000\n", "at most 16384×8192"),
+        (b"#?RADIANCE\n\n-Y 4096 +X 8192\n", "claims 403 MB"),
+        (b"", "neither Radiance"),
+    ],
+)
+def test_hostile_files_are_refused_in_words_and_leave_nothing(client, imported, content, said):
+    response = client.post(URL, files={"environment": ("x.hdr", content)})
+    assert response.status_code == 422
+    assert response.json()["type"] == "urn:relume:problem:scene"
+    assert said in response.json()["detail"]
+    assert len(client.get(URL).json()) == 5
+    assert not list(client.app.state.services.settings.data.glob("upload-*"))
+
+
+def test_names_are_checked(client, dusk_file):
+    files = {"environment": ("x.exr", dusk_file.read_bytes())}
+    assert client.post(URL, files=files, data={"name": "\x07"}).status_code == 422
+    for bad in ("0000000000000000", "..", "nothing"):
+        assert client.get(f"{URL}/{bad}").status_code == 404
+        assert client.get(f"{URL}/{bad}/thumbnail.png").status_code == 404
+    assert client.delete(f"{URL}/studio").status_code == 422
+
+
+def test_a_session_shows_what_a_batch_renders_in_an_imported_light(client, imported, bake, tmp_path):
+    look = {"environment": {"map": imported["map"]}}
+    with open_session(client, bake) as session:
+        session.exact(0)
+        session.edit(1, "/environment/map", imported["map"])
+        shown = session.exact(1)
+        session.edit(2, "/environment/map", "env:0000000000000000")
+        problem = session.text("problem")["problem"]
+        assert "'studio'" in problem["detail"]
+        session.edit(3, "/environment/map", None)
+        session.exact(3)
+    assert shown.header["exact"]
+    rendered = render(client, bake, look, tmp_path / "dusk.exr")
+    own = render(client, bake, {}, tmp_path / "own.exr")
+    assert rendered[..., 2].mean() < 0.5 * rendered[..., 0].mean() < 0.5 * own[..., 0].max()
+    unknown = {"bake": bake, "view": "front", "looks": [{"environment": {"map": "env:x"}}], "format": "png"}
+    assert client.post("/api/renders", json=unknown).json()["parameter"] == "/looks/0/environment/map"
+
+
+def render(client, bake, look, path):
+    request = {"bake": bake, "view": "front", "looks": [look], "format": "exr"}
+    url = client.post("/api/renders", json=request).headers["location"]
+    wait(lambda: client.get(url).json()["state"] == "ready")
+    path.write_bytes(client.get(f"{url}/frames/0").content)
+    return OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.FLOAT)
+
+
+def test_a_frame_in_another_light_is_judged_in_that_light(client, imported, bake):
+    request = {"bake": bake, "view": "front", "look": {"environment": {"map": imported["map"]}}, "passes": 2}
+    url = client.post("/api/truths", json=request).headers["location"]
+    wait(lambda: client.get(url).json()["state"] == "ready")
+    assert client.get(url).json()["found"]["error"] < 0.25  # in the studio's light it would be above 1
+
+
+def test_what_was_deleted_is_known_no_more(client, bake):
+    bright = np.ascontiguousarray(dusk()[::-1])
+    path = write_map(client.app.state.services.settings.data / "bright.hdr", bright)
+    made = client.post(URL, files={"environment": ("bright.hdr", path.read_bytes())}, data={"name": "Bright"}).json()
+    assert made["name"] == "Bright"
+    assert client.delete(f"{URL}/{made['id']}").status_code == 204
+    assert client.get(f"{URL}/{made['id']}").status_code == 404
+    assert made["map"] not in [entry["map"] for entry in client.get(URL).json()]
+
+
+def test_the_scene_s_own_light_has_a_thumbnail(client, bake):
+    picture = client.get(f"/api/bakes/{bake}/environment.png")
+    assert picture.headers["content-type"] == "image/png"
+    assert picture.content.startswith(b"\x89PNG")
+
+
+def test_command_line_imports_lists_and_renders(tmp_path, dusk_file, capsys):
+    home = ["--data", str(tmp_path)]
+    assert main(["environment", "import", str(dusk_file), "--name", "Evening", *home]) == 0
+    name = capsys.readouterr().out.strip()
+    (record,) = records(tmp_path / "environments")
+    assert (record.map, record.name) == (name, "Evening")
+    assert main(["environment", "list", *home]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in listed] == ["studio", "clear_sky", "sunset", "overcast", name]
+    for path, said in ((tmp_path / "none.hdr", "file that exists"), (tmp_path / "bad.hdr", "neither Radiance")):
+        if "bad" in path.name:
+            path.write_bytes(b"bad")
+        assert main(["environment", "import", str(path), *home]) == 1
+        assert said in capsys.readouterr().err
+
+
+def test_a_look_from_a_file_names_the_map_on_the_command_line(tmp_path, dusk_file, capsys):
+    service = BakeService(tmp_path)
+    with service:
+        scene = register_scene(service.data_dir, service.ledger, still_life())
+        identity = service.submit(scene, RECIPE)
+        wait(lambda: service.get(identity).state == "ready")
+    home = ["--data", str(tmp_path)]
+    assert main(["environment", "import", str(dusk_file), *home]) == 0
+    (tmp_path / "look.json").write_text(json.dumps({"environment": {"map": capsys.readouterr().out.strip()}}))
+    output = tmp_path / "picture.exr"
+    assert main(["render", scene, "--look", str(tmp_path / "look.json"), "--output", str(output), *home]) == 0
+    assert "relightable" in capsys.readouterr().err
+    picture = OpenImageIO.ImageBuf(str(output)).get_pixels(OpenImageIO.FLOAT)
+    assert picture[..., 2].mean() < 0.5 * picture[..., 0].mean()
