@@ -1,14 +1,14 @@
 /** After an import, and on request: what a bake will cost. Not modal: the page stays usable. */
 import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
-import type { Preset } from "../state/open";
+import { viewsToBake, type BakeChoice } from "../state/open";
 import { IconButton } from "../ui/Button";
 import { PresetList } from "./PresetList";
 
 interface Props {
   scene: SceneBody;
   onClose(): void;
-  onOpen(preset: Preset): void;
+  onOpen(choice: BakeChoice): void;
 }
 
 export function BakeDialog({ scene, onClose, onOpen }: Props) {
@@ -39,7 +39,7 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
           ))}
         </ul>
       )}
-      <PresetList scene={scene.id} action="Open and bake" onChoose={onOpen} />
+      <PresetList key={scene.id} scene={scene} views={viewsToBake(scene)} action="Open and bake" onChoose={onOpen} />
     </section>
   );
 }

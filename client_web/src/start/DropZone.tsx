@@ -3,7 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
 import { attempt, showError } from "../ui/toasts";
-import { sortFiles, type Chosen } from "./files";
+import { ENVIRONMENT_SUFFIXES, SCENE_SUFFIXES, sortFiles, stem, type Chosen } from "./files";
 
 const NOTHING: Chosen = { scene: null, environment: null, refused: [] };
 
@@ -37,14 +37,16 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
   const take = (files: File[]) => {
     const next = sortFiles(files, chosen);
     if (next.refused.length > 0)
-      showError(`${next.refused.join(", ")}: give a scene as .glb and an environment as .hdr or .exr.`);
+      showError(
+        `${next.refused.join(", ")}: a scene is one of ${SCENE_SUFFIXES.join(" ")}, an environment one of ${ENVIRONMENT_SUFFIXES.join(" ")}. Put a scene of several files into a .zip.`,
+      );
     setChosen(next);
   };
   const over = useDrop(take);
   const send = async (scene: File) => {
     setSent(0);
-    const name = scene.name.replace(/\.glb$/i, "");
-    const imported = await attempt(() => uploadScene({ scene, environment: chosen.environment, name }, setSent));
+    const order = { scene, environment: chosen.environment, name: stem(scene.name) };
+    const imported = await attempt(() => uploadScene(order, setSent));
     setSent(null);
     if (imported === undefined) return;
     setChosen(NOTHING);
@@ -53,17 +55,21 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
   return (
     <section class={`drop ${over ? "over" : ""}`} aria-label="Import a scene">
       <p>
-        <b>Drop a .glb and an .hdr anywhere</b>, or{" "}
+        <b>Drop a scene and an environment anywhere</b>, or{" "}
         <label class="file">
           choose files
           <input
             type="file"
             multiple
-            accept=".glb,.hdr,.exr"
+            accept={[...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES].join(",")}
             onChange={(event) => take([...(event.currentTarget.files ?? [])])}
           />
         </label>
-        . Without an environment the scene is lit by a studio.
+        .
+      </p>
+      <p class="quiet">
+        Scene: .glb, .obj, .ply, or a .zip of .gltf or .obj with the files that belong to it. Environment: .hdr or .exr;
+        without one the scene is lit by a studio.
       </p>
       <div class="chosen">
         <span class={chosen.scene ? "" : "quiet"}>Scene: {chosen.scene?.name ?? "none"}</span>

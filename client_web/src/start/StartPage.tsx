@@ -2,15 +2,15 @@
 import { useEffect, useState } from "preact/hooks";
 import { deleteScene, listScenes } from "../net/api";
 import type { SceneBody } from "../protocol";
-import { openScene, type Preset } from "../state/open";
+import { openScene, type BakeChoice } from "../state/open";
 import { attempt, note } from "../ui/toasts";
 import { BakeDialog } from "./BakeDialog";
 import { DropZone } from "./DropZone";
 import { SceneCard } from "./SceneCard";
 
-function open(scene: SceneBody, preset?: Preset): void {
+function open(scene: SceneBody, choice?: BakeChoice): void {
   window.history.pushState(null, "", `?scene=${encodeURIComponent(scene.id)}`);
-  void openScene(scene.id, undefined, preset);
+  void openScene(scene.id, undefined, choice);
 }
 
 export function StartPage() {
@@ -35,11 +35,11 @@ export function StartPage() {
       </header>
       <DropZone onImported={imported} />
       {planned !== null && (
-        <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(preset) => open(planned, preset)} />
+        <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(choice) => open(planned, choice)} />
       )}
       <h2>Scenes</h2>
       {scenes === null && <p class="quiet">Looking for scenes…</p>}
-      {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop a .glb above, or run the demo.</p>}
+      {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop one above, or run the demo.</p>}
       <ul class="cards">
         {scenes?.map((scene) => (
           <SceneCard

@@ -2,7 +2,7 @@
 import * as api from "../net/api";
 import { bakeEnd, followBake } from "../net/events";
 import { stage } from "../picture/stage";
-import type { BakeBody, SceneBody } from "../protocol";
+import { MAX_VIEWS_SHOWN, type BakeBody, type SceneBody } from "../protocol";
 import { attempt, showError } from "../ui/toasts";
 import { connect, disconnect, whenBakeIsReady } from "./live";
 import { recall } from "./place";
@@ -11,6 +11,15 @@ import { placeFromUrl, type Place } from "./url";
 import { availableOf } from "./views";
 
 export type Preset = "preview" | "good" | "final";
+export interface BakeChoice {
+  preset: Preset;
+  views: string[];
+}
+
+/** The views that are baked where nobody chooses: as many as can be seen at once. */
+export function viewsToBake(scene: SceneBody): string[] {
+  return scene.views.slice(0, MAX_VIEWS_SHOWN).map((view) => view.name);
+}
 
 let stopFollowing: () => void = () => undefined;
 
@@ -91,17 +100,17 @@ whenBakeIsReady((id) => {
   });
 });
 
-async function bakePreview(scene: SceneBody): Promise<string> {
-  const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview" });
+async function bakePreview(scene: SceneBody, views: string[]): Promise<string> {
+  const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview", views });
   store.coming.value = preview;
   const end = preview.state === "ready" ? preview : await bakeEnd(preview.id, (news) => (store.coming.value = news));
   if (end.state === "ready") return end.id;
   throw new api.ApiError(`The preview could not be baked: ${api.problemText(end.problem, end.state)}`, 0);
 }
 
-/** Bake a scene at a preset and take the result over when it is ready. */
-export async function startFullBake(scene: SceneBody, preset: Preset): Promise<void> {
-  const full = await api.startBake({ scene: scene.id, method: "direct", preset });
+/** Bake a scene and take the result over when it is ready. */
+export async function startFullBake(scene: SceneBody, choice: BakeChoice): Promise<void> {
+  const full = await api.startBake({ scene: scene.id, method: "direct", ...choice });
   if (full.state === "ready") swapTo(full.id);
   else follow(full);
 }
@@ -109,7 +118,7 @@ export async function startFullBake(scene: SceneBody, preset: Preset): Promise<v
 export async function openScene(
   id: string,
   place: Place = placeFromUrl(`?scene=${id}`),
-  preset?: Preset,
+  choice?: BakeChoice,
 ): Promise<void> {
   await attempt(async () => {
     const [scene, models] = await Promise.all([api.getScene(id), api.listModels()]);
@@ -121,11 +130,11 @@ export async function openScene(
     const ready = bakes.filter((bake) => bake.state === "ready");
     const shown = ready.find((bake) => bake.id === place.bake) ?? ready[0];
     const running = bakes.find((bake) => bake.state === "running" || bake.state === "queued");
-    opened = shown?.id ?? (await bakePreview(scene));
+    opened = shown?.id ?? (await bakePreview(scene, choice?.views ?? viewsToBake(scene)));
     connect(opened);
-    if (preset !== undefined) await startFullBake(scene, preset);
+    if (choice !== undefined) await startFullBake(scene, choice);
     else if (running !== undefined) follow(running);
-    else if (shown === undefined) await startFullBake(scene, "good");
+    else if (shown === undefined) await startFullBake(scene, { preset: "good", views: viewsToBake(scene) });
   });
 }
 

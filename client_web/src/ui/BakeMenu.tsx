@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { PresetList } from "../start/PresetList";
 import { startFullBake } from "../state/open";
-import { scene, view } from "../state/store";
+import { scene, view, views } from "../state/store";
 import { attempt } from "./toasts";
 
 export function BakeMenu() {
@@ -23,11 +23,12 @@ export function BakeMenu() {
         <div class="menu-body">
           <p>Bake this scene again. The picture stays; the new bake takes its place when it is ready.</p>
           <PresetList
-            scene={current.id}
+            scene={current}
+            views={views.value.map((baked) => baked.name)}
             action="Bake"
-            onChoose={(preset) => {
+            onChoose={(choice) => {
               setOpen(false);
-              void attempt(() => startFullBake(current, preset));
+              void attempt(() => startFullBake(current, choice));
             }}
           />
         </div>
