@@ -1,4 +1,4 @@
-"""Camera rays: what each position of the image plane sees first."""
+"""First hits of rays, and the camera's rays: what each position of the image plane sees first."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ class Hits:
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(intersect, scene, arguments, origin, directions, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+def _trace(intersect, scene, arguments, origins, directions, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+    """Trace rays [start, stop). origins: (n, 3), or (1, 3) where all rays come from one point."""
+    last_origin = origins.shape[0] - 1
     packet = aligned(_FLOATS_A_PACKET)
     words = packet.view(np.uint32)
     valid = aligned(16).view(np.int32)
@@ -48,7 +50,7 @@ def _trace(intersect, scene, arguments, origin, directions, start, stop, face, u
             r = first + min(k, width - 1)
             valid[k] = -1 if k < width else 0
             for axis in range(3):
-                packet[axis * 16 + k] = origin[axis]
+                packet[axis * 16 + k] = origins[min(r, last_origin), axis]
                 packet[(_DIRECTION + axis) * 16 + k] = directions[r, axis]
             packet[_NEAR * 16 + k] = 0
             packet[_FAR * 16 + k] = np.inf
@@ -63,17 +65,19 @@ def _trace(intersect, scene, arguments, origin, directions, start, stop, face, u
 
 
 def trace_from(scene: EmbreeScene, origin: F32, directions: F32) -> Hits:
-    """First hits of rays from one point.
+    """First hits of rays from one point, or from a point each.
 
     Args:
-        origin: (3,) float32. directions: unit. (n, 3) float32
+        origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
     """
     n = len(directions)
+    origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
+    is_coherent = len(origins) == 1
     hits = Hits(np.empty(n, np.int32), np.empty((n, 2), np.float32), np.empty(n, np.float32))
-    arguments = packet_arguments(coherent=True)
+    arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(
-            intersect16, scene.handle, arguments.ctypes.data, origin, directions, start, stop,
+            intersect16, scene.handle, arguments.ctypes.data, origins, directions, start, stop,
             hits.face, hits.uv, hits.distance,
         ),
         n,

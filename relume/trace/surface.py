@@ -42,7 +42,7 @@ def _unit(v: F32, otherwise: F32) -> F32:
     return np.where(length > 1e-12, v / np.maximum(length, 1e-12), otherwise).astype(np.float32)
 
 
-def _any_tangent(normal: F32) -> F32:
+def any_tangent(normal: F32) -> F32:
     """A unit vector across each normal (Duff 2017)."""
     x, y, z = normal.T
     sign = np.where(z >= 0, 1.0, -1.0)
@@ -53,7 +53,7 @@ def _any_tangent(normal: F32) -> F32:
 def _across(vector: F32, normal: F32) -> F32:
     """The part of `vector` across `normal`, unit; any direction across it where there is none."""
     across = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
-    return _unit(across, _any_tangent(normal))
+    return _unit(across, any_tangent(normal))
 
 
 def surface_at(

@@ -1,0 +1,93 @@
+"""Reflected light on gather cells: direct light, then bounce after bounce along links; never a matrix, never inverted.
+
+    L_0 = ρ/π E,   L_{b+1}(g) = ρ(g) · mean over the gather rays r of g of L_b(link(g, r)),   L = Σ_b L_b
+
+with ρ the diffuse reflectance of a cell and E its irradiance from the environment. Rays of density cos θ / π make the
+mean an estimate of ∫ L cos θ dω / π; a ray that leaves the scene finds nothing, since what it would find is in E.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.triangles import TriangleLights
+from relume.parallel import for_ranges
+from relume.trace.cell_tree import NO_CELL
+
+F32 = NDArray[np.float32]
+
+_POINTS_A_RANGE, _CELLS_A_RANGE = 2048, 512
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _irradiance(normal, visible, directions, power, start, stop, out):  # type: ignore[no-untyped-def]
+    for p in range(start, stop):
+        red = green = blue = 0.0
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+        for m in range(directions.shape[0]):
+            if (visible[p, m >> 3] >> (m & 7)) & 1:
+                cosine = max(nx * directions[m, 0] + ny * directions[m, 1] + nz * directions[m, 2], np.float32(0))
+                red += cosine * power[m, 0]
+                green += cosine * power[m, 1]
+                blue += cosine * power[m, 2]
+        out[p, 0], out[p, 1], out[p, 2] = red, green, blue
+
+
+def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) -> F32:
+    """E of points, the cosine that of each light's mean direction.
+
+    Args:
+        normal: (n, 3) float32. visible: light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
+    Returns:
+        (n, 3) float32
+    """
+    out = np.empty((len(normal), 3), np.float32)
+    args = (normal, visible, lights.direction, lights.power)
+    for_ranges(lambda start, stop: _irradiance(*args, start, stop, out), len(normal), _POINTS_A_RANGE)
+    return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _bounce(links, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
+    share = 1.0 / links.shape[1]
+    for cell in range(start, stop):
+        red = green = blue = 0.0
+        for ray in range(links.shape[1]):
+            seen = links[cell, ray]
+            if seen != NO_CELL:
+                red += radiance[seen, 0]
+                green += radiance[seen, 1]
+                blue += radiance[seen, 2]
+        out[cell, 0] = reflectance[cell, 0] * red * share
+        out[cell, 1] = reflectance[cell, 1] * green * share
+        out[cell, 2] = reflectance[cell, 2] * blue * share
+
+
+def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
+    """L_{b+1} of L_b.
+
+    Args:
+        links: of the cells' rays. (C, rays) uint16. reflectance, radiance: (C, 3) float32
+    Returns:
+        (C, 3) float32
+    Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.
+    """
+    out = np.empty_like(radiance)
+    for_ranges(lambda start, stop: _bounce(links, reflectance, radiance, start, stop, out), len(links), _CELLS_A_RANGE)
+    return out
+
+
+def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
+    """Radiance that cells send out after at most `num_bounces` reflections between them, their direct light included.
+
+    Args:
+        direct: L_0. (C, 3) float32
+    """
+    total = direct.astype(np.float64)
+    radiance = direct
+    for _ in range(num_bounces):
+        radiance = bounce(links, reflectance, radiance)
+        total += radiance
+    return total.astype(np.float32)

@@ -1,0 +1,87 @@
+"""A Cornell box under the sky: white room, red and green walls, two blocks; sun and sky come in through its roof."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.environment import texel_directions
+from relume.scene.archive import make_scene
+from relume.scene.demo.still_life import look_at
+from relume.scene.demo.surfaces import Surface, merged, turn_y
+from relume.scene.model import Environment, Material, Scene
+
+F64 = NDArray[np.float64]
+
+WHITE, GREEN, RED = (0.73, 0.71, 0.68), (0.12, 0.45, 0.15), (0.63, 0.065, 0.05)
+SKYLIGHT = 0.45  # half the side of the opening in the roof; the room is 2 m wide, high and deep
+SUN = np.array([0.22, 1.0, 0.12])
+SUN_RADIUS = np.radians(4.0)
+
+
+@cache
+def cornell_box() -> Scene:
+    """The room from x, z = −1 to 1 and y = 0 to 2, open towards the viewer; view "front", for square pictures."""
+    parts: list[tuple[str, Surface, Sequence[float]]] = [
+        ("Floor", _rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
+        ("Walls", merged([_rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), _roof()]), WHITE),
+        ("Red wall", _rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0)), RED),
+        ("Green wall", _rectangle((1, 0, -1), (0, 0, 2), (0, 2, 0)), GREEN),
+        ("Tall block", _block(0.3, 1.2, 0.3).moved(turn_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
+        ("Short block", _block(0.3, 0.6, 0.3).moved(turn_y(-17.0), (0.34, 0.0, 0.38)), WHITE),
+    ]
+    meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(parts)]
+    materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in parts]
+    camera = look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
+    return make_scene("Cornell box", meshes, materials, [camera], sunny_sky())
+
+
+def sunny_sky() -> Environment:
+    """A sun nearly overhead, soft as through haze, in a blue sky; nothing from below."""
+    towards = texel_directions(256, 512).astype(np.float64)
+    cosine = towards @ (SUN / np.linalg.norm(SUN))
+    edge = np.clip((cosine - np.cos(1.2 * SUN_RADIUS)) / (np.cos(0.8 * SUN_RADIUS) - np.cos(1.2 * SUN_RADIUS)), 0, 1)
+    height = towards[..., 1:2]
+    sky = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
+    radiance = sky + (edge**2 * (3 - 2 * edge))[..., None] * np.array([1350.0, 1230.0, 1050.0])
+    return Environment("sunny sky", radiance.astype(np.float32))
+
+
+def _rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> Surface:
+    """corner + [0, 1] u + [0, 1] v, facing u × v."""
+    start, along, up = (np.asarray(a, np.float64) for a in (corner, u, v))
+    normal = np.cross(along, up)
+    return Surface(
+        start + np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) @ np.stack([along, up]),
+        np.tile(normal / np.linalg.norm(normal), (4, 1)),
+        np.tile(along / np.linalg.norm(along), (4, 1)),
+        np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+
+
+def _roof() -> Surface:
+    """Four strips round the skylight, facing down."""
+    s, strip = SKYLIGHT, 1 - SKYLIGHT
+    return merged(
+        [
+            _rectangle((-1, 2, -1), (2, 0, 0), (0, 0, strip)),
+            _rectangle((-1, 2, s), (2, 0, 0), (0, 0, strip)),
+            _rectangle((-1, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
+            _rectangle((s, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
+        ]
+    )
+
+
+def _block(half_width: float, height: float, half_depth: float) -> Surface:
+    """A block on y = 0 without its underside, which nothing sees."""
+    x, z = half_width, half_depth
+    corners = [(-x, z), (x, z), (x, -z), (-x, -z)]
+    sides = [
+        _rectangle((a[0], 0, a[1]), (b[0] - a[0], 0, b[1] - a[1]), (0, height, 0))
+        for a, b in zip(corners, corners[1:] + corners[:1], strict=True)
+    ]
+    return merged([*sides, _rectangle((-x, height, z), (2 * x, 0, 0), (0, 0, -2 * z))])

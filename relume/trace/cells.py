@@ -1,0 +1,91 @@
+"""Gather cells: the pieces of surfaces that reflected light is kept for (the gather samples of Nguyen 2010).
+
+A cell is a leaf of the tree over importance photons, so that cells are small where the picture's gather rays go, and a
+few of its photons stand for its area (its sub-area samples): light that changes across a cell is averaged over it, and
+no point of it lies where no ray arrives, such as on a floor below a box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.scene.model import Scene
+from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
+from relume.trace.geometry import Geometry
+from relume.trace.photons import shoot_photons
+from relume.trace.primary import Hits
+from relume.trace.surface import surface_at
+
+F32 = NDArray[np.float32]
+
+POINTS_A_CELL = 4
+_PHOTONS_A_CELL = 16
+_TEXTURE_ANGLE = 0.02  # textures are read blurred, as cells blur them
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells in the order of their tree.
+
+    Attributes:
+        position: of the points that stand for a cell, off the surface. (C, `POINTS_A_CELL`, 3) float32
+        normal: shading normals there. (C, `POINTS_A_CELL`, 3) float32
+        diffuse: texture channel, its mean over the cell's points. (C, 3) float32
+        material: index into the scene's materials. (C,) uint16
+    """
+
+    tree: CellTree
+    position: F32
+    normal: F32
+    diffuse: F32
+    material: NDArray[np.uint16]
+
+    @property
+    def num_cells(self) -> int:
+        """C."""
+        return len(self.material)
+
+
+def face_normals(geometry: Geometry) -> F32:
+    """Unit normals of the triangles, their corners counter-clockwise. (faces, 3) float32"""
+    a, b, c = geometry.positions[geometry.faces].astype(np.float64).transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
+
+
+def choose_cells(
+    scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_cells: int
+) -> Cells:
+    """Place about `num_cells` cells where gather rays of these views go; nothing but the scene seeds it.
+
+    Args:
+        size: of the pictures, pixels. num_cells: at most `MAX_CELLS` less two for each mesh.
+    """
+    most = min(num_cells, MAX_CELLS - 2 * len(scene.meshes))
+    photons = shoot_photons(scene, geometry, views, size, _PHOTONS_A_CELL * most)
+    hits, directions = photons.hits, photons.directions
+    normal = face_normals(geometry)[hits.face]
+    is_behind = np.einsum("nc,nc->n", normal, directions) > 0
+    normal[is_behind] *= -1
+    place = surface_at(geometry, hits, directions).position
+    side = 2 * geometry.face_mesh[hits.face] + is_behind.astype(np.int32)
+    tree, members = grow_tree(
+        np.concatenate([place, normal], axis=1), side.astype(np.int32), 2 * len(scene.meshes), most
+    )
+    # a cell's photons are in order along the axis that divided it last: every so many are far apart
+    evenly = (np.arange(POINTS_A_CELL) + 0.5) / POINTS_A_CELL
+    chosen = np.array([rows[(evenly * len(rows)).astype(np.int64)] for rows in members], np.int64).reshape(-1)
+    some = Hits(hits.face[chosen], hits.uv[chosen], hits.distance[chosen])
+    surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
+    shape = (len(members), POINTS_A_CELL, 3)
+    return Cells(
+        tree,
+        surface.position.reshape(shape),
+        surface.normal.reshape(shape),
+        surface.diffuse.reshape(shape).mean(axis=1),
+        geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),
+    )

@@ -1,0 +1,151 @@
+"""Gather cells and links, against first hits traced one by one, and against rooms where nothing may be lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, scene_of, sphere
+
+from relume.scene.cornell import cornell_box
+from relume.trace.cell_tree import NO_CELL, grow_tree, locate
+from relume.trace.cells import POINTS_A_CELL, choose_cells, face_normals
+from relume.trace.gather_rays import local_ray, make_pattern, shift_of
+from relume.trace.geometry import merge
+from relume.trace.links import Gatherers, trace_links
+from relume.trace.primary import trace_from
+from relume.trace.surface import any_tangent
+
+NUM_CELLS = 1200
+
+
+@pytest.fixture(scope="module")
+def box():
+    scene = cornell_box()
+    geometry = merge(scene)
+    return scene, geometry, choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+
+
+def points_of(cells, count):
+    normal = cells.normal.reshape(-1, 3)[:: POINTS_A_CELL * cells.num_cells // count][:count]
+    position = cells.position.reshape(-1, 3)[:: POINTS_A_CELL * cells.num_cells // count][:count]
+    return Gatherers(position, normal, any_tangent(normal), normal)
+
+
+def random_keys(num, num_sides, seed):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(num, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    keys = np.concatenate([rng.random((num, 3)), normal], axis=1).astype(np.float32)
+    return keys, rng.integers(0, num_sides, num).astype(np.int32)
+
+
+@pytest.mark.parametrize(("num_cells", "num_points"), [(1, 50), (7, 50), (300, 5000), (50, 50)])
+def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_points):
+    keys, side = random_keys(num_points, 4, seed=num_cells)
+    tree, members = grow_tree(keys, side, 6, num_cells)
+    assert sorted(np.concatenate(members)) == list(range(num_points))
+    assert len(members) == pytest.approx(num_cells, abs=4)
+    for cell, rows in enumerate(members):
+        assert len(set(side[rows])) == 1
+        assert {int(locate(tree, side[row], *keys[row])) for row in rows} == {cell}
+
+
+def test_a_side_without_points_has_no_cell():
+    keys, side = random_keys(100, 2, seed=1)
+    tree, _ = grow_tree(keys, side, 4, 10)
+    assert locate(tree, 3, *keys[0]) == NO_CELL
+
+
+def test_coinciding_points_end_in_one_cell():
+    keys, _ = random_keys(1, 1, seed=1)
+    tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.zeros(100, np.int32), 1, 10)
+    assert len(members) == 1
+    assert locate(tree, 0, *keys[0]) == 0
+
+
+def test_no_points_make_no_cells():
+    tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.int32), 2, 10)
+    assert members == []
+    assert locate(tree, 0, 0, 0, 0, 0, 0, 1) == NO_CELL
+
+
+def test_points_lie_where_light_can_arrive(box):
+    """None on the floor under a block, none inside one: a cell beside a block is not mixed with what it hides."""
+    scene, _, cells = box
+    for name in ("Tall block", "Short block"):
+        mesh = next(mesh for mesh in scene.meshes if mesh.name == name)
+        top = mesh.positions[mesh.positions[:, 1] == mesh.positions[:, 1].max()][:, [0, 2]].astype(float)
+        centre = top.mean(axis=0)
+        along = np.unique(np.round(top - centre, 5), axis=0)
+        u, v = along[0] + along[1], along[0] + along[2]
+        position = cells.position.reshape(-1, 3).astype(float)
+        at = np.abs((position[:, [0, 2]] - centre) @ np.linalg.inv(np.array([u, v]) / 2))
+        low = position[:, 1] < mesh.positions[:, 1].max() - 1e-3
+        assert not np.any(low & (at < 0.999).all(axis=1))
+
+
+def test_cells_are_the_same_every_time(box):
+    scene, geometry, cells = box
+    again = choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+    np.testing.assert_array_equal(again.position, cells.position)
+    np.testing.assert_array_equal(again.tree.value, cells.tree.value)
+
+
+def test_neighbours_in_number_are_neighbours_in_space(box):
+    centre = box[2].position.mean(axis=1)
+    step = np.linalg.norm(np.diff(centre, axis=0), axis=1)
+    anywhere = np.linalg.norm(centre[np.random.default_rng(1).permutation(len(centre))] - centre, axis=1)
+    assert np.median(step) < 0.15 * np.median(anywhere)
+
+
+def test_links_are_those_of_first_hits(box):
+    """Every ray's first hit, traced by itself and located by hand."""
+    _, geometry, cells = box
+    points, pattern = points_of(cells, 40), make_pattern(24, 9, 3)
+    links = trace_links(geometry, cells.tree, points, pattern, first_point=100)
+    normals = face_normals(geometry)
+    origins, directions, expected_of = [], [], []
+    for p in range(40):
+        n, t = points.normal[p].astype(float), points.tangent[p].astype(float)
+        frame = np.stack([t, np.cross(n, t), n])
+        wo = frame @ points.wo[p]
+        shift = shift_of(pattern, 100 + p)
+        for ray in range(33):
+            wi = np.array(local_ray(pattern, ray, *shift, *wo.astype(np.float32)))
+            if wi[2] > 0:
+                origins.append(points.position[p])
+                directions.append(wi @ frame)
+                expected_of.append((p, ray))
+    directions = np.asarray(directions, np.float32)
+    hits = trace_from(geometry.embree, np.array(origins), directions)
+    assert links.num_rays == len(origins)
+    wrong = 0
+    for origin, direction, face, distance, (p, ray) in zip(
+        origins, directions, hits.face, hits.distance, expected_of, strict=True
+    ):
+        expected = NO_CELL
+        if face >= 0:
+            behind = normals[face] @ direction > 0
+            normal = -normals[face] if behind else normals[face]
+            side = 2 * geometry.face_mesh[face] + int(behind)
+            expected = locate(cells.tree, side, *(origin + distance * direction), *normal)
+        wrong += int(expected != links.cell[p, ray])
+    assert wrong <= 0.005 * len(origins)  # rounding at the edge of a cell
+
+
+def test_order_and_division_of_points_do_not_matter(box):
+    _, geometry, cells = box
+    points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
+    whole = trace_links(geometry, cells.tree, points, pattern, 0).cell
+    part = Gatherers(*(a[11:23] for a in (points.position, points.normal, points.tangent, points.wo)))
+    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, pattern, 11).cell, whole[11:23])
+
+
+def test_from_a_closed_room_no_ray_escapes():
+    """A ball seen from inside, its cells' rays and a viewer's: what leaks out would be missing light."""
+    ball = sphere("room", (0, 0, 0), 2.0, 0, rings=24, inside=True)
+    room = scene_of(ball, camera=looking("front", (0, 0, 1), (0, 0, 0), 1.0))
+    geometry = merge(room)
+    cells = choose_cells(room, geometry, ("front",), (64, 64), 500)
+    links = trace_links(geometry, cells.tree, points_of(cells, 400), make_pattern(64, 0, 1), 0)
+    assert np.mean(links.cell == NO_CELL) < 1e-4

@@ -1,0 +1,100 @@
+"""Gather rays as estimators: what they weigh must add up to integrals that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relume.errors import PlanError
+from relume.trace.gather_rays import (
+    MAX_RAYS,
+    density_about_mirror,
+    local_ray,
+    make_pattern,
+    shift_of,
+    weight_of,
+)
+
+WO = np.array([np.sin(0.7), 0.0, np.cos(0.7)], np.float32)
+
+
+def rays_of(pattern, point):
+    """Directions above the horizon and their weights. (n, 3), (n,)"""
+    shift = shift_of(pattern, point)
+    wi = np.array([local_ray(pattern, ray, *shift, *WO) for ray in range(len(pattern.uv))])
+    wi = wi[wi[:, 2] > 0]
+    return wi, np.array([weight_of(pattern, *direction, *WO) for direction in wi])
+
+
+def half_cosines(wi):
+    half = wi + WO
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    return half[:, 2], half @ WO
+
+
+def uniform(num):
+    """Even directions on the hemisphere, for quadrature. (num, 3)"""
+    i = np.arange(num)
+    z, phi = (i + 0.5) / num, i * np.pi * (3 - np.sqrt(5))
+    across = np.sqrt(1 - z * z)
+    return np.stack([across * np.cos(phi), across * np.sin(phi), z], axis=1)
+
+
+@pytest.mark.parametrize("num_glossy", [0, 100])
+def test_directions_are_unit_and_weights_positive(num_glossy):
+    wi, weight = rays_of(make_pattern(100, num_glossy, 1), 7)
+    np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, atol=1e-5)
+    assert weight.min() > 0
+
+
+def test_cosine_rays_alone_weigh_pi_together():
+    wi, weight = rays_of(make_pattern(377, 0, 1), 3)
+    assert len(wi) == 377
+    assert weight.sum() == pytest.approx(np.pi, rel=1e-5)
+
+
+@pytest.mark.parametrize("exponent", [0, 10, 100, 1000])
+@pytest.mark.parametrize("num_glossy", [64, 200])
+def test_highlights_of_every_size_are_estimated_without_bias(exponent, num_glossy):
+    """∫ cos^s θh cos θi dω by rays of many points, against quadrature."""
+    pattern = make_pattern(64, num_glossy, 5)
+    estimates = []
+    for point in range(300):
+        wi, weight = rays_of(pattern, point)
+        estimates.append(weight @ half_cosines(wi)[0] ** exponent)
+    even = uniform(400_000)
+    expected = 2 * np.pi * np.mean(half_cosines(even)[0] ** exponent * even[:, 2])
+    spread = np.std(estimates) / np.sqrt(len(estimates))
+    assert np.mean(estimates) == pytest.approx(expected, abs=4 * spread + 0.003 * expected)
+
+
+def test_glossy_rays_reduce_the_noise_of_a_highlight():
+    def noise(pattern):
+        found = [weight @ half_cosines(wi)[0] ** 3000 for wi, weight in (rays_of(pattern, p) for p in range(60))]
+        return np.std(found) / np.mean(found)
+
+    assert noise(make_pattern(128, 128, 1)) < 0.3 * noise(make_pattern(256, 0, 1))
+
+
+def test_density_about_the_mirror_direction_is_one_over_the_half_vectors():
+    """∫ p(h) dh = 1 over the hemisphere of h, with p(h) = 4 cos θd · p(ωi)."""
+    cosine = np.linspace(0, 1, 2_000_001)
+    density = 4 * np.array(density_about_mirror.py_func(cosine, 1.0), float)
+    assert 2 * np.pi * np.trapezoid(density, cosine) == pytest.approx(1, rel=1e-3)
+
+
+def test_shifts_depend_on_seed_and_point_and_fill_the_square():
+    pattern = make_pattern(8, 0, 3)
+    shifts = np.array([shift_of(pattern, point) for point in range(4096)])
+    counts = np.histogram2d(*shifts.T, bins=8, range=[[0, 1], [0, 1]])[0]
+    assert counts.min() > 40
+    assert counts.max() < 90
+    assert shift_of(make_pattern(8, 0, 4), 5) != shift_of(pattern, 5)
+    far = shift_of(pattern, 16_777_216 + 1), shift_of(pattern, 16_777_216)
+    assert far[0] != far[1]  # points beyond the whole numbers of float32 are still told apart
+
+
+@pytest.mark.parametrize(("num_cosine", "num_glossy"), [(0, 8), (-1, 0), (MAX_RAYS, 1), (8, -1)])
+def test_counts_out_of_bounds_are_refused(num_cosine, num_glossy):
+    with pytest.raises(PlanError):
+        make_pattern(num_cosine, num_glossy, 0)
