@@ -180,7 +180,7 @@ class BakeRequest(Body):
 
 
 class PlanBody(Body):
-    """What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown."""
+    """What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none."""
 
     view_samples: int
     rays: int

@@ -21,6 +21,7 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import NotFoundError
 from relume.transfer.base import Plan, Recipe, Task
+from worker.estimate import Finished
 from worker.lease import is_alive
 from worker.models import BakeRow, TaskRow
 from worker.status import BakeState, BakeStatus, TaskCost, bake_id, recipe_from_json, recipe_json
@@ -148,11 +149,19 @@ class Ledger:
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
 
-    def rays_per_second(self) -> float | None:
-        """Rate of the bakes so far, rays over wall seconds of tasks in one process; None where there are none."""
+    def finished_bakes(self, limit: int) -> list[Finished]:
+        """What the newest ready bakes took."""
+        task_s = func.sum(TaskRow.seconds)
+        query = (
+            select(BakeRow.plan, task_s)
+            .join(TaskRow, TaskRow.bake_id == BakeRow.id)
+            .where(BakeRow.state == "ready")
+            .group_by(BakeRow.id, BakeRow.plan, BakeRow.created)
+            .order_by(BakeRow.created.desc())
+            .limit(limit)
+        )
         with self.sessions() as session:
-            rays, seconds = session.execute(select(func.sum(TaskRow.rays), func.sum(TaskRow.seconds))).one()
-        return float(rays) / float(seconds) if seconds else None
+            return [Finished(Plan(**json.loads(plan)), float(seconds)) for plan, seconds in session.execute(query)]
 
     def _get(self, identity: str) -> BakeRow | None:
         with self.sessions() as session:

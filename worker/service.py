@@ -15,6 +15,7 @@ from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
+from worker.estimate import seconds_for
 from worker.executor import Executors, is_tiny
 from worker.lease import new_owner
 from worker.ledger import Ledger
@@ -26,6 +27,7 @@ log = logging.getLogger(__name__)
 
 POLL_S = 1.0
 CLOSE_S = 10.0
+NUM_JUDGED_BY = 8  # finished bakes that an estimate looks at
 
 
 class BakeService:
@@ -132,9 +134,9 @@ class BakeService:
         """Where the published store of a bake lies. Raises NotFoundError where the id is malformed."""
         return bake_path(self.data_dir, bake_id)
 
-    def rays_per_second(self) -> float | None:
-        """Rate of one process in the bakes so far, for estimates; None where there were none."""
-        return self.ledger.rays_per_second()
+    def seconds_for(self, plan: Plan) -> float | None:
+        """Seconds that a bake will take, by those that took place here; None where there were none."""
+        return seconds_for(plan, self.ledger.finished_bakes(NUM_JUDGED_BY), self._executors.num_workers)
 
     def _known_scene(self, scene_id: str) -> str:
         from worker.scenes import get_scene

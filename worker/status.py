@@ -39,6 +39,12 @@ class BakeStatus:
     created: float
 
     @property
+    def detail(self) -> int:
+        """Pixels times lights: what makes a bake finer."""
+        width, height = self.recipe.size
+        return width * height * self.recipe.num_lights
+
+    @property
     def final(self) -> bool:
         """Whether nothing more happens by itself."""
         return self.state in FINAL_STATES

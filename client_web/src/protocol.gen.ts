@@ -261,7 +261,7 @@ export interface ParameterBody {
   fixed: boolean;
 }
 
-/** What a bake will cost; upper bounds. `seconds` is an estimate from this machine's rate, null where unknown. */
+/** What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none. */
 export interface PlanBody {
   view_samples: number;
   rays: number;

@@ -51,11 +51,5 @@ class BakeNews:
                 seconds_left=None if status.seconds_left is None else round(status.seconds_left, 1),
             )
             for status in statuses
-            if own is not None and status.state in ("running", "ready") and _detail(status) > _detail(own)
+            if own is not None and status.state in ("running", "ready") and status.detail > own.detail
         ]
-
-
-def _detail(status: BakeStatus) -> int:
-    """Pixels times lights: what makes a bake finer."""
-    width, height = status.recipe.size
-    return width * height * status.recipe.num_lights

@@ -146,11 +146,10 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
 
 
 def _plan(plan: Plan, services: Services) -> PlanBody:
-    rate = services.bakes.rays_per_second()
     return PlanBody(
         view_samples=plan.num_view_samples,
         rays=plan.num_rays,
         store_bytes=plan.store_bytes,
         peak_bytes=plan.peak_bytes,
-        seconds=plan.num_rays / rate if rate else None,
+        seconds=services.bakes.seconds_for(plan),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -17,9 +17,10 @@ from relume.errors import NotFoundError, ParameterError
 from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
-from server.thumbnails import thumbnail
+from server.thumbnails import MAX_WIDTH, thumbnail
 from server.uploads import keep_upload, plain_stem
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
+from worker.status import BakeStatus
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
@@ -62,22 +63,16 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
 @router.get("")
 def get_all(services: Shared) -> list[SceneBody]:
     """All scenes, newest first."""
-    bakes: dict[str, list[str]] = defaultdict(list)
-    ready: dict[str, str] = {}
+    bakes: dict[str, list[BakeStatus]] = defaultdict(list)
     for status in services.bakes.bakes():
-        bakes[status.scene].append(status.id)
-        if status.state == "ready":
-            ready.setdefault(status.scene, status.id)
-    return [_body(record, bakes[record.id], ready) for record in list_scenes(services.bakes.ledger)]
+        bakes[status.scene].append(status)
+    return [_body(record, bakes[record.id]) for record in list_scenes(services.bakes.ledger)]
 
 
 @router.get("/{scene}")
 def get_one(scene: Id, services: Shared) -> SceneBody:
     """One scene."""
-    record = get_scene(services.bakes.ledger, scene)
-    statuses = services.bakes.bakes(scene)
-    ready = [status.id for status in statuses if status.state == "ready"]
-    return _body(record, [status.id for status in statuses], {scene: ready[0]} if ready else {})
+    return _body(get_scene(services.bakes.ledger, scene), services.bakes.bakes(scene))
 
 
 @router.delete("/{scene}", status_code=204)
@@ -89,17 +84,25 @@ def delete_one(scene: Id, services: Shared) -> Response:
 
 @router.get("/{scene}/thumbnail.webp", response_class=FileResponse)
 async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> FileResponse:
-    """The scene as its newest bake shows it, unedited; `bake` only makes the address change when it does."""
+    """The scene as a bake of it shows it, unedited; `bake` only makes the address change when it does."""
     statuses = await run_in_threadpool(services.bakes.bakes, scene)
-    ready = [status for status in statuses if status.state == "ready" and bake in (None, status.id)]
-    if not ready:
+    pictured = _pictured([status for status in statuses if bake in (None, status.id)])
+    if pictured is None:
         raise NotFoundError("there is no picture of this scene; bake it first")
-    path = await thumbnail(services, ready[0].id)
+    path = await thumbnail(services, pictured)
     return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
 
 
-def _body(record: SceneRecord, bakes: list[str], ready: Mapping[str, str]) -> SceneBody:
-    bake = ready.get(record.id)
+def _pictured(bakes: Sequence[BakeStatus]) -> str | None:
+    """The bake that a scene's thumbnail shows: the coarsest of those that have its pixels, because it is painted
+    soonest; where none has, the finest."""
+    ready = sorted((status for status in bakes if status.state == "ready"), key=lambda status: status.detail)
+    enough = [status for status in ready if status.recipe.size[0] >= MAX_WIDTH]
+    return (enough or ready[-1:])[0].id if ready else None
+
+
+def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
+    bake = _pictured(bakes)
     return SceneBody(
         id=record.id,
         name=record.name,
@@ -111,5 +114,5 @@ def _body(record: SceneRecord, bakes: list[str], ready: Mapping[str, str]) -> Sc
         warnings=list(record.warnings),
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
-        bakes=bakes,
+        bakes=[status.id for status in bakes],
     )

@@ -82,6 +82,14 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
     assert client.get("/api/bakes").json() == []
 
 
+def test_the_thumbnail_is_of_the_coarsest_bake_that_has_its_pixels(client: TestClient, baked: Baked) -> None:
+    for size, is_shown in (([640, 480], True), ([400, 300], True), ([64, 48], False), ([500, 400], False)):
+        queued = client.post("/api/bakes", json={"scene": baked.scene, "size": size, "lights": 100})
+        assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
+        shown = client.get(f"/api/scenes/{baked.scene}").json()
+        assert shown["thumbnail"].endswith(f"bake={queued.json()['id']}") == is_shown
+
+
 def test_same_recipe_twice_is_the_same_bake(client: TestClient, baked: Baked) -> None:
     request = {"scene": baked.scene, "size": [64, 48], "lights": 20}
     first, second = (client.post("/api/bakes", json=request).json() for _ in range(2))

@@ -58,6 +58,15 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
         assert tree_hash(service.store_path(identity)) == expected
         assert service.submit(SCENE.id, RECIPE) == identity
         assert service.get(identity).state == "ready"
+
+
+def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path) -> None:
+    with open_service(tmp_path) as service:
+        plan = service.plan(SCENE.id, RECIPE)
+        assert service.seconds_for(plan) is None
+        identity = follow(service, service.submit(SCENE.id, RECIPE)).id
+        tasks = service.ledger.finished_tasks(identity).values()
+        assert service.seconds_for(plan) == pytest.approx(sum(cost.seconds for cost in tasks))
         assert not list((tmp_path / "bakes" / "staging").iterdir())
 
 

@@ -1,3 +1,4 @@
+import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { CardProgress } from "./CardProgress";
@@ -12,16 +13,23 @@ interface Props {
   onReady(): void;
 }
 
+/** The scene's thumbnail; the server paints it when it is first asked for, which takes seconds. */
+function Picture({ of }: { of: string }) {
+  const [words, setWords] = useState("painting its picture…");
+  return (
+    <>
+      <span class="no-picture">{words}</span>
+      <img src={of} alt="" loading="lazy" onLoad={() => setWords("")} onError={() => setWords("no picture")} />
+    </>
+  );
+}
+
 /** One scene: a click anywhere on the card opens it, but for the card's own buttons. */
 export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
-        {scene.thumbnail === null ? (
-          <CardProgress scene={scene} onReady={onReady} />
-        ) : (
-          <img src={scene.thumbnail} alt="" loading="lazy" />
-        )}
+        {scene.thumbnail === null ? <CardProgress scene={scene} onReady={onReady} /> : <Picture of={scene.thumbnail} />}
       </button>
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>

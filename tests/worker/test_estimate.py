@@ -1,0 +1,33 @@
+"""How long a bake is said to take before it starts."""
+
+import pytest
+
+from relume.transfer.base import Plan
+from worker.estimate import Finished, seconds_for
+from worker.executor import TINY_BAKE_RAYS
+
+LARGE = Plan(1000, 20 * TINY_BAKE_RAYS, 1, 1)
+SMALL = Plan(1000, TINY_BAKE_RAYS // 2, 1, 1)
+
+
+def test_nothing_is_said_before_anything_was_measured():
+    assert seconds_for(LARGE, [], 4) is None
+    assert seconds_for(LARGE, [Finished(LARGE, 0.0)], 4) is None
+
+
+def test_the_same_bake_again_takes_as_long_whatever_share_of_its_plan_was_traced():
+    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 1) == pytest.approx(120.0)
+    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 4) == pytest.approx(30.0)
+    assert seconds_for(SMALL, [Finished(SMALL, 2.0)], 4) == pytest.approx(2.0)
+
+
+def test_a_bake_is_judged_by_its_like_and_by_others_where_there_is_none():
+    both = [Finished(LARGE, 40.0), Finished(SMALL, 3.0)]
+    assert seconds_for(LARGE, both, 2) == pytest.approx(20.0)
+    assert seconds_for(SMALL, both, 2) == pytest.approx(3.0)
+    assert seconds_for(SMALL, both[:1], 2) == pytest.approx(20.0 / 40)
+
+
+def test_larger_bakes_count_for_more():
+    double = Plan(1000, 2 * LARGE.num_rays, 1, 1)
+    assert seconds_for(LARGE, [Finished(LARGE, 30.0), Finished(double, 30.0)], 1) == pytest.approx(20.0)
