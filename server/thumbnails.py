@@ -31,6 +31,6 @@ def _paint(services: Services, transfer: Transfer, path: Path) -> None:
     width = min(MAX_WIDTH, view.width)
     size = (width, max(1, round(view.height * width / view.width)))
     look = looks.validate(transfer.default_look, transfer.default_look)
-    image = shrink(services.house.library.render(transfer, view.name, look), size)
+    image = shrink(services.house.library.render_small(transfer, view.name, look, width), size)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_image(path, image, look.display.exposure, look.display.tone_map)

@@ -1,4 +1,4 @@
-"""One exact picture without a session: batch renders and `relume render`."""
+"""One picture without a session: batch renders, `relume render`, thumbnails."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from relume.look import Look
 from relume.transfer.cache import FrozenCache
 from relume.transfer.opened import Transfer
 from relume.transfer.picture import Picture
+from relume.transfer.thinned import thinned
 
 _CACHE_BYTES = 4 << 30  # one operator at a time is alive; the largest picture that fits is what a session could show
 
@@ -36,3 +37,15 @@ def render_image(
         if picture.waiting() is None and exact:
             return picture.image()
         picture.freeze(lambda share: None, lambda: False)
+
+
+def render_small(transfer: Transfer, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
+    """Render a look at no more pixels than a small picture needs: whole steps of the baked ones are left out.
+
+    Args:
+        width: of the small picture.
+    Returns:
+        Linear radiance, at least `width` wide where the bake is. (h, w, 3) float32
+    """
+    step = transfer.views[view_name].width // width
+    return render_image(transfer if step < 2 else thinned(transfer, view_name, step), view_name, look)

@@ -16,7 +16,7 @@ def open_library(cache_bytes: int) -> Library:
     from relume.transfer.cache import FrozenCache
     from relume.transfer.opened import open_transfer
     from relume.transfer.picture import Picture
-    from relume.transfer.render import render_image
+    from relume.transfer.render import render_image, render_small
 
     def reference(scene: Path, *args: Any) -> Any:
         return reference_image(load_scene(scene), *args)
@@ -26,6 +26,7 @@ def open_library(cache_bytes: int) -> Library:
         open_transfer=open_transfer,
         make_picture=lambda transfer, view: Picture(transfer, view, cache),
         render=render_image,
+        render_small=render_small,
         reference=reference,
         cache_used_bytes=lambda: cache.used_bytes,
     )

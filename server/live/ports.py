@@ -90,6 +90,8 @@ class Library:
         open_transfer: path of a published store -> transfer; heavy.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3) linear radiance in the baked size; heavy.
+        render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
+            columns where the bake has them.
         reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index) -> the same
             by brute force; heavy.
         cache_used_bytes: what the frozen caches hold now.
@@ -98,5 +100,6 @@ class Library:
     open_transfer: Callable[[Path], Transfer]
     make_picture: Callable[[Any, str], Picture]
     render: Callable[[Any, str, Any], F32]
+    render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., F32]
     cache_used_bytes: Callable[[], int]

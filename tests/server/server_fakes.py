@@ -206,7 +206,7 @@ class Control:
     passes_asked: list[int] = field(default_factory=list)
 
     def open_library(self, cache_bytes: int) -> Library:
-        return Library(self._open, self._picture, self._render, self._reference, lambda: 123)
+        return Library(self._open, self._picture, self._render, self._render_small, self._reference, lambda: 123)
 
     def _open(self, path: Path) -> FakeTransfer:
         attributes = open_store(path).attributes
@@ -220,6 +220,10 @@ class Control:
     def _render(self, transfer: FakeTransfer, view: str, look: Any) -> np.ndarray:
         shape = transfer.views[view].height, transfer.views[view].width, 3
         return np.full(shape, exact_pixel(look), np.float32)
+
+    def _render_small(self, transfer: FakeTransfer, view: str, look: Any, width: int) -> np.ndarray:
+        step = max(1, transfer.views[view].width // width)
+        return self._render(transfer, view, look)[::step, ::step]
 
     def _reference(
         self,
