@@ -66,6 +66,7 @@ GROUPS = (
     Group("bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear")),
     Group("bench.truth", ("truth.mitsuba",)),
     Group("bench.rotation", ("accuracy.rotation_lambert", "accuracy.rotation_cook_torrance_0.2")),
+    Group("bench.swap", ("accuracy.swap_lambert", "accuracy.swap_cook_torrance_0.2")),
     Group("bench.pca", ("pca.blinn_phong_6", "pca.vectors", "pca.slider_nodes")),
     Group("bench.rays", ("bake.rays_vs_embreex",)),
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),

@@ -9,9 +9,6 @@ import typer
 
 from cli.options import Data, LookFile, SceneName, View, read_look
 
-LESS_EXACT = (
-    "the scene was baked for its own light: in another, shadows of small lamps are less exact; bake with --relightable"
-)
 Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")]
 
 
@@ -30,8 +27,8 @@ def render(scene: SceneName, output: Output, look: LookFile = None, view: View =
         bake, view_name = find_bake(service, record, view)
         transfer = open_transfer(service.store_path(bake.id))
         document = complete_look(partial, transfer.default_look)
-        if document.environment.map is not None and not bake.recipe.relightable:
-            typer.echo(f"note: {LESS_EXACT}", err=True)
+        if document.environment.map is not None:
+            typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
         save(output, render_image(transfer, view_name, document), document)
     finally:
         service.close()

@@ -8,6 +8,7 @@ export type {
   ClientMessage,
   CurveMessage,
   DryRunBody,
+  EnvironmentBody,
   FrameHeader,
   HelloMessage,
   LookEntry,
@@ -51,6 +52,7 @@ export interface MaterialLook {
 }
 export interface Look {
   materials: Record<string, MaterialLook>;
+  /** `map` names an environment of the server, null the scene's own. */
   environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
   lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
   display: { exposure: number; tone_map: string };

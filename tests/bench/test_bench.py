@@ -17,8 +17,9 @@ FIXED_NAMES = {
     "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "bake.ray_saving", "store.bytes_per_view_sample",
 }  # fmt: skip
 IN_PROCESS = [
-    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.rays",
-    "bench.bake", "bench.ray_saving", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
+    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
+    "bench.rays", "bench.bake", "bench.ray_saving", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms",
+    "bench.pca",
 ]  # fmt: skip
 WITH_PROCESSES = ["bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth"]
 

@@ -3,6 +3,7 @@ import type {
   BakeBody,
   BakeRequest,
   DryRunBody,
+  EnvironmentBody,
   MaterialBody,
   MaterialMapBody,
   ModelInfo,
@@ -69,6 +70,9 @@ export const materialAt = (f0: number, sigma: number) => get<Term[]>(`/api/mater
 /** Of a library material, whose id is "table/material". */
 export const materialThumbnail = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
+export const listEnvironments = () => get<EnvironmentBody[]>("/api/environments");
+/** The light that a bake's scene came with. */
+export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
 export const getBake = (id: string) => get<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
 
 export const bakesOfScene = (scene: string) => get<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);

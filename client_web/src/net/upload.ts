@@ -1,5 +1,5 @@
-/** Import of a scene: a multipart upload with progress, which fetch cannot report. */
-import type { SceneBody } from "../protocol";
+/** Imports: multipart uploads with progress, which fetch cannot report. */
+import type { EnvironmentBody, SceneBody } from "../protocol";
 import { ApiError } from "./api";
 
 export interface Upload {
@@ -8,9 +8,9 @@ export interface Upload {
   name: string;
 }
 
-function answer(request: XMLHttpRequest): SceneBody {
+function answer(request: XMLHttpRequest): unknown {
   const body = JSON.parse(request.responseText || "null") as unknown;
-  if (request.status === 201) return body as SceneBody;
+  if (request.status === 201) return body;
   const { detail, title } = (body ?? {}) as { detail?: unknown; title?: string };
   throw new ApiError(
     typeof detail === "string" ? detail : (title ?? `The server answered ${request.status}.`),
@@ -19,11 +19,7 @@ function answer(request: XMLHttpRequest): SceneBody {
 }
 
 /** `progress` gets 0…1 of the bytes sent; raises ApiError with the server's words. */
-export function uploadScene(upload: Upload, progress: (fraction: number) => void): Promise<SceneBody> {
-  const form = new FormData();
-  form.append("scene", upload.scene);
-  if (upload.environment !== null) form.append("environment", upload.environment);
-  form.append("name", upload.name);
+function post(path: string, form: FormData, progress: (fraction: number) => void): Promise<unknown> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.upload.onprogress = (event) => progress(event.total > 0 ? event.loaded / event.total : 0);
@@ -35,7 +31,22 @@ export function uploadScene(upload: Upload, progress: (fraction: number) => void
       }
     };
     request.onerror = () => reject(new ApiError("The upload was interrupted; nothing was imported. Try again.", 0));
-    request.open("POST", "/api/scenes");
+    request.open("POST", path);
     request.send(form);
   });
+}
+
+export function uploadScene(upload: Upload, progress: (fraction: number) => void): Promise<SceneBody> {
+  const form = new FormData();
+  form.append("scene", upload.scene);
+  if (upload.environment !== null) form.append("environment", upload.environment);
+  form.append("name", upload.name);
+  return post("/api/scenes", form, progress) as Promise<SceneBody>;
+}
+
+/** An environment that looks may name; it is called as its file is. */
+export function uploadEnvironment(file: File, progress: (fraction: number) => void): Promise<EnvironmentBody> {
+  const form = new FormData();
+  form.append("environment", file);
+  return post("/api/environments", form, progress) as Promise<EnvironmentBody>;
 }

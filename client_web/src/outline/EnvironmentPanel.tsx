@@ -1,8 +1,9 @@
-/** The light around the scene: how bright it is, which way it is turned, and its tint. */
+/** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
 import { ColorField } from "../inspector/ColorField";
 import { edit } from "../state/edit";
 import { defaultLook, look } from "../state/store";
 import { Slider } from "../ui/Slider";
+import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 
 export function EnvironmentPanel() {
   const shown = look.value?.environment;
@@ -12,7 +13,9 @@ export function EnvironmentPanel() {
     <>
       <header class="panel-head">
         <h2>Environment</h2>
+        <ImportEnvironment />
       </header>
+      <EnvironmentGallery />
       <div class="param alone">
         <span class="param-label">Brightness</span>
         <Slider

@@ -1,35 +1,12 @@
 /** Import: drop files anywhere on the page, or choose them; then the upload with its progress. */
-import { useEffect, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
 import { attempt, showError } from "../ui/toasts";
+import { useFileDrop } from "../ui/useFileDrop";
 import { ENVIRONMENT_SUFFIXES, SCENE_SUFFIXES, sortFiles, stem, type Chosen } from "./files";
 
 const NOTHING: Chosen = { scene: null, environment: null, refused: [] };
-
-function useDrop(take: (files: File[]) => void): boolean {
-  const [over, setOver] = useState(false);
-  useEffect(() => {
-    const drag = (event: DragEvent) => {
-      event.preventDefault();
-      setOver(event.type === "dragover");
-    };
-    const drop = (event: DragEvent) => {
-      event.preventDefault();
-      setOver(false);
-      take([...(event.dataTransfer?.files ?? [])]);
-    };
-    window.addEventListener("dragover", drag);
-    window.addEventListener("dragleave", drag);
-    window.addEventListener("drop", drop);
-    return () => {
-      window.removeEventListener("dragover", drag);
-      window.removeEventListener("dragleave", drag);
-      window.removeEventListener("drop", drop);
-    };
-  });
-  return over;
-}
 
 export function DropZone({ onImported }: { onImported(scene: SceneBody): void }) {
   const [chosen, setChosen] = useState<Chosen>(NOTHING);
@@ -42,7 +19,7 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
       );
     setChosen(next);
   };
-  const over = useDrop(take);
+  const over = useFileDrop(take);
   const send = async (scene: File) => {
     setSent(0);
     const order = { scene, environment: chosen.environment, name: stem(scene.name) };

@@ -15,6 +15,10 @@ function endsWith(file: File, suffixes: readonly string[]): boolean {
   return suffixes.some((suffix) => file.name.toLowerCase().endsWith(suffix));
 }
 
+export function isEnvironment(file: File): boolean {
+  return endsWith(file, ENVIRONMENT_SUFFIXES);
+}
+
 /** A file's name without what it ends with. */
 export function stem(name: string): string {
   return name.replace(/\.[^.]+$/, "");
@@ -24,7 +28,7 @@ export function sortFiles(files: readonly File[], before: Chosen): Chosen {
   const next: Chosen = { ...before, refused: [] };
   for (const file of files) {
     if (endsWith(file, SCENE_SUFFIXES)) next.scene = file;
-    else if (endsWith(file, ENVIRONMENT_SUFFIXES)) next.environment = file;
+    else if (isEnvironment(file)) next.environment = file;
     else next.refused.push(file.name);
   }
   return next;

@@ -4,6 +4,7 @@ import { LibraryPanel } from "../library/LibraryPanel";
 import { libraryOpen } from "../library/library";
 import { Inspector } from "../inspector/Inspector";
 import { Outline } from "../outline/Outline";
+import { take } from "../outline/environments";
 import { PictureView } from "../picture/PictureView";
 import { filmstripOpen, helpOpen, inspectorOpen, inspectorWidth, outlineOpen } from "../state/store";
 import { TruthPanel } from "../truth/TruthPanel";
@@ -12,12 +13,14 @@ import { Help } from "./Help";
 import { Splitter } from "./Splitter";
 import { StatusBar } from "./StatusBar";
 import { TopBar } from "./TopBar";
+import { useFileDrop } from "./useFileDrop";
 import { useKeyboard } from "./keyboard";
 
 export function Editor() {
   useKeyboard();
+  const over = useFileDrop((files) => void take(files));
   return (
-    <div class="editor" style={{ "--inspector": `${inspectorWidth.value}px` }}>
+    <div class={`editor ${over ? "over" : ""}`} style={{ "--inspector": `${inspectorWidth.value}px` }}>
       <TopBar />
       <div class="middle">
         {outlineOpen.value && <Outline />}
