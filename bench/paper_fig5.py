@@ -22,6 +22,7 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
 from relume.look.terms import complete_term
+from relume.transfer.along import AlongCurve
 from relume.transfer.frozen import Frozen
 from relume.transfer.term_image import TermImage
 
@@ -64,7 +65,7 @@ def _drawn(start: dict[str, Any], share: float) -> dict[str, Any]:
 def _dragged(lit: Lit, frozen: Frozen, start: dict[str, Any], frames: list[dict[str, Any]]) -> F64:
     """The term's image after the drag and the rest."""
     term = TermImage(start, np.einsum("nc,nc->n", lit.points.normal, lit.points.wo).astype(np.float64))
-    term.adopt(frozen, _CURVE)
+    term.adopt(frozen, AlongCurve.of(term.term.curve(_CURVE)))
     for document in [*frames, *[frames[-1]] * _REST]:
         term.set_document(document)
         term.step(frozen, _BUDGET)

@@ -52,7 +52,7 @@ def _nodes(terms: list[Term]) -> Figure:
         for parameter in term.parameters:
             if moved_curves(term, parameter.name):
                 linearised = linearise({"model": term.model, "params": {}}, parameter.name)
-                found[f"{term.model}.{parameter.name}"] = "bands" if linearised is None else linearised.num_nodes
+                found[f"{term.model}.{parameter.name}"] = "bands" if linearised is None else linearised.num_columns
     return Figure("pca.slider_nodes", max(n for n in found.values() if isinstance(n, int)), "nodes", found)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 SUBPROTOCOL = "relume.v1"
 MAX_MESSAGE_BYTES = 64 * 1024
@@ -104,10 +104,18 @@ class BrushMessage(Message):
 
 
 class TouchMessage(Message):
-    """client → server: the user opened this curve: freeze it ahead and send its `CurveMessage` from now on."""
+    """client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now
+    on; or has a slider in hand, which moves this `parameter`: freeze along it, the open curve stays open."""
 
     type: Literal["touch"]
-    curve: Pointer
+    curve: Pointer | None = None
+    parameter: Pointer | None = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> TouchMessage:
+        if (self.curve is None) == (self.parameter is None):
+            raise ValueError("a touch names a curve or a parameter, one of them")
+        return self
 
 
 ClientMessage = Annotated[

@@ -79,10 +79,11 @@ export interface StreamMessage {
   quality?: number;
 }
 
-/** client → server: the user opened this curve: freeze it ahead and send its `CurveMessage` from now on. */
+/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has a slider in hand, which moves this `parameter`: freeze along it, the open curve stays open. */
 export interface TouchMessage {
   type: "touch";
-  curve: string;
+  curve?: string | null;
+  parameter?: string | null;
 }
 
 /** Compare a look with brute force, in so many passes; figures come from the second on. */

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
 F64 = NDArray[np.float64]
+
+_ROUNDING = 1e-10  # of the largest singular value of curves of length one
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,18 @@ def joint(bands: Sequence[F64]) -> F64:
     return reduce(lambda product, curve: np.multiply.outer(product, curve).ravel(), bands, np.ones(1))
 
 
+def joint_rows(curves: Sequence[F64]) -> F64:
+    """`joint` of rows: of curves at the same values of a parameter. (n, J_1), … -> (n, J_1 · …)"""
+    return np.array([joint(rows) for rows in zip(*curves, strict=True)])
+
+
+def span(curves: F64) -> F64:
+    """Orthonormal rows that hold curves (n, J) to rounding. (r, J)"""
+    lengths = np.linalg.norm(curves, axis=1)
+    _, sizes, rows = np.linalg.svd(curves[lengths > 0] / lengths[lengths > 0, None], full_matrices=False)
+    return np.asarray(rows[sizes > _ROUNDING * sizes[:1]])
+
+
 def relative_rms(found: F64, exact: F64) -> float:
     """√mean (found − exact)² ÷ √mean exact², over bands and values of the parameter."""
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
@@ -92,9 +106,13 @@ class Nodes:
 
     def coefficients(self, curve: F64) -> F64:
         """Of a curve (J,) in the curves at the nodes, by least squares. (k,)"""
+        return np.asarray(self._inverse @ curve)
+
+    @cached_property
+    def _inverse(self) -> F64:
+        """From a curve to its coefficients. (k, J)"""
         lengths = np.linalg.norm(self.curves, axis=1)  # sharp curves are long: without this they alone would count
-        found, *_ = np.linalg.lstsq(self.curves.T / lengths, curve, rcond=None)
-        return np.asarray(found / lengths)
+        return np.asarray(np.linalg.pinv(self.curves.T / lengths, rcond=_ROUNDING) / lengths[:, None])
 
 
 def choose_nodes(values: F64, curves: F64, between: F64, most: int) -> Nodes:

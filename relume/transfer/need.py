@@ -4,26 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
-from relume.transfer.frozen import Frozen, freeze, frozen_bytes
+from relume.transfer.along import Along, AlongCurve
+from relume.transfer.frozen import Frozen, frozen_bytes
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.projector import contract
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
 
-Candidate = tuple[MaterialImage, TermImage, str | None]
+
+class Candidate(NamedTuple):
+    """Something to be made for a term: an operator along something, or an image where that is None."""
+
+    material: MaterialImage
+    image: TermImage
+    along: Along | None
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory to keep it."""
+        if self.along is None:
+            return shaded_bytes(self.material.num_samples)
+        return frozen_bytes(self.material.num_samples, self.along.num_columns)
 
 
 @dataclass(frozen=True, eq=False)
 class Need:
-    """An operator along the curve `active`, or an image where that is None.
+    """An operator along `active`, or an image where that is None.
 
     All that `make` reads was fixed when the need was found: the picture may be changed while it runs.
 
@@ -32,6 +46,7 @@ class Need:
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
         environment: what lights it.
         is_default: the term is one of the scene's own look, whose images are kept beside the store.
+        refines: the picture is near its look without it; it can wait until the hand rests.
     """
 
     what: str
@@ -42,10 +57,11 @@ class Need:
     term: Term
     kind: Hashable
     bands: Mapping[str, NDArray[np.float64]]
-    active: str | None
+    active: Along | None
     num_bytes: int
     environment: EnvironmentKey
     is_default: bool
+    refines: bool
 
     @property
     def state(self) -> Literal["freezing", "shading"]:
@@ -63,9 +79,9 @@ class Need:
         images, active = self.images, self.active
         lights = images.transfer.lights_in(self.environment)
 
-        def frozen(curve: str) -> Frozen:
+        def frozen(along: Along) -> Frozen:
             receivers = images.view.receivers(self.material.index)
-            return freeze(self.term, self.bands, curve, lights, receivers, progress, cancelled)
+            return along.freeze(self.term, self.bands, lights, receivers, progress, cancelled)
 
         def shaded() -> Shaded:
             receivers = images.view.receivers(self.material.index)
@@ -81,81 +97,116 @@ class Need:
         return images.cache.get(self.key, Frozen, self.num_bytes, lambda: frozen(active))
 
 
-def next_need(images: ViewImages, touched: Candidate | None) -> Need | None:
-    """The most urgent need: first what the look lacks, then the curve that the user has opened.
+class Hand(NamedTuple):
+    """What a hand is known to be on.
+
+    Attributes:
+        touched: what the user has opened or taken hold of. moved: the parameter of the last edit, if it was one alone.
+    """
+
+    touched: Candidate | None
+    moved: Candidate | None
+
+    def along(self, image: TermImage, curves: set[str]) -> Along | None:
+        """What the hand moves where such curves of a term change: all of them together, else what is touched."""
+        found = [hand.along for hand in (self.moved, self.touched) if hand is not None and hand.image is image]
+        able = [along for along in found if along is not None and not curves.isdisjoint(along.moves)]
+        return next((along for along in able if curves <= set(along.moves)), able[-1] if able else None)
+
+
+def next_need(images: ViewImages, hand: Hand) -> Need | None:
+    """The most urgent need: first what the look lacks, then what is touched, then what is only near the look.
 
     The touched material goes first, and what is cheap: a picture that opens soon shows something, and then sharpens.
 
     Raises:
         MemoryBudgetError: something that the look lacks is larger than the cache may be.
     """
-    lacking = sorted(_lacking(images, touched), key=lambda candidate: _cost(candidate, touched))
+    lacking = sorted(_lacking(images, hand), key=lambda candidate: _cost(candidate, hand.touched))
     for candidate in lacking:
-        images.cache.check(_num_bytes(candidate))
+        images.cache.check(candidate.num_bytes)
     if lacking:
-        return _need(images, lacking[0])
-    if touched is None or not is_freezable(touched):
-        return None
-    material, image, curve = touched
-    is_followed = image.active == curve and images.operator(material, image) is not None
-    return None if is_followed or not image.is_exact() else _need(images, touched)
+        return _need(images, lacking[0], refines=False)
+    if hand.touched is not None and is_freezable(hand.touched) and _is_awaited(images, hand.touched):
+        return _need(images, hand.touched, refines=False)
+    for material in images.by_name.values():
+        for image in material.terms:
+            if image.is_near and not image.differing():
+                return _need(images, Candidate(material, image, None), refines=True)
+    return None
 
 
 def is_freezable(candidate: Candidate) -> bool:
-    """Whether there is anything to freeze: samples, and a curve that light has a part in."""
-    material, image, curve = candidate
-    return material.num_samples > 0 and curve in image.target
+    """Whether there is anything to freeze: samples, and something that light has a part in."""
+    return candidate.material.num_samples > 0 and candidate.along is not None
 
 
 def check_room(images: ViewImages, candidate: Candidate) -> None:
     """Raises MemoryBudgetError where a need is larger than the cache may be."""
     if is_freezable(candidate):
-        images.cache.check(_num_bytes(candidate))
+        images.cache.check(candidate.num_bytes)
 
 
-def _lacking(images: ViewImages, touched: Candidate | None) -> Iterator[Candidate]:
+def _is_awaited(images: ViewImages, touched: Candidate) -> bool:
+    """Whether the hand must wait for an operator before it can move what it has touched.
+
+    A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, and exact.
+    """
+    material, image, along = touched
+    active = image.active
+    if along is None or image.differing():
+        return False
+    if active is None or images.operator(material, image) is None:
+        return True
+    return active != along and not (active.is_complete and active.moves == along.moves)
+
+
+def _lacking(images: ViewImages, hand: Hand) -> Iterator[Candidate]:
     """One candidate for each term whose image does not show its target and follows no operator towards it."""
     for material in images.by_name.values():
         if not material.num_samples:
             continue
         for image in material.changed_terms():
-            differing = image.differing()
-            if image.active in differing and images.operator(material, image) is not None:
-                continue  # the hand moves this curve: follow it, the others when it rests
-            opened = touched[2] if touched is not None and touched[1] is image else None
-            otherwise = None if image.effective is None else differing[0]
-            yield material, image, opened if opened in differing else otherwise
+            differing = set(image.differing())
+            along = hand.along(image, differing)
+            if image.effective is None:
+                # its operator along a curve gives the image as well, and exactly
+                yield Candidate(material, image, along if along is not None and along.is_complete else None)
+            elif differing and not _follows(images, material, image, along):
+                first = next(name for name in image.target if name in differing)
+                yield Candidate(material, image, along or AlongCurve.of(image.term.curve(first)))
+
+
+def _follows(images: ViewImages, material: MaterialImage, image: TermImage, along: Along | None) -> bool:
+    """Whether the operator in use is the one to go on with: it leaves free what differs, or some and none is better."""
+    active, differing = image.active, set(image.differing())
+    if active is None or differing.isdisjoint(active.moves) or images.operator(material, image) is None:
+        return False
+    return differing <= set(active.moves) or along is None or not differing <= set(along.moves)
 
 
 def _cost(candidate: Candidate, touched: Candidate | None) -> tuple[bool, bool, int]:
     """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
-    material, image, curve = candidate
-    is_flat = curve is None and contract(image.term, image.target, None).kinds.size == 0
-    return touched is None or material is not touched[0], not is_flat, material.num_samples
+    material, image, along = candidate
+    is_flat = along is None and contract(image.term, image.target, None).kinds.size == 0
+    return touched is None or material is not touched.material, not is_flat, material.num_samples
 
 
-def _num_bytes(candidate: Candidate) -> int:
-    material, image, curve = candidate
-    if curve is None:
-        return shaded_bytes(material.num_samples)
-    return frozen_bytes(material.num_samples, image.term.curve(curve).num_bands)
-
-
-def _need(images: ViewImages, candidate: Candidate) -> Need:
-    material, image, curve = candidate
+def _need(images: ViewImages, candidate: Candidate, *, refines: bool) -> Need:
+    material, image, along = candidate
     name = images.transfer.material_names[material.index]
-    label = image.term.label if curve is None else image.term.curve(curve).label
     return Need(
-        what=f"{name}, {label}",
-        key=images.key(material, image, curve, of_target=True),
+        what=f"{name}, {image.term.label if along is None else along.label}",
+        key=images.key(material, image, along, of_target=True),
         images=images,
         material=material,
         image=image,
         term=image.term,
         kind=image.kind,
         bands=image.target,
-        active=curve,
-        num_bytes=_num_bytes(candidate),
+        active=along,
+        num_bytes=candidate.num_bytes,
         environment=images.environment,
         is_default=images.environment == BAKED_ENVIRONMENT and image.document in images.default.materials[name].terms,
+        refines=refines,
     )

@@ -14,9 +14,9 @@ from relume.errors import ParameterError
 from relume.look import Look
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
-from relume.transfer.need import Candidate, Need, check_room, next_need
+from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
-from relume.transfer.pointer import CurvePointer, parse_pointer
+from relume.transfer.pointer import CurvePointer, ParameterPointer, moved_parameter, parse_curve, parse_pointer
 from relume.transfer.probe import brush, probe
 from relume.transfer.resolve import encode, resolve
 from relume.transfer.shade import Shaded
@@ -54,7 +54,8 @@ class Picture:
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
         self._shown_environment = self._images.environment
-        self._touched: CurvePointer | None = None
+        self._touched: CurvePointer | ParameterPointer | None = None
+        self._moved: ParameterPointer | None = None
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
@@ -62,44 +63,44 @@ class Picture:
         self._images.set_look(look)
         if self._images.environment != before:
             self._touched = None  # the hand has moved on to the environment
+        self._moved = moved_parameter(self._look, look)
         self._look = look
 
     def touch(self, pointer: str) -> None:
-        """Prepare a curve ahead of the first edit, e.g. "/materials/Teapot/terms/1/curves/theta_h".
+        """Prepare a curve or a parameter ahead of its first edit, e.g. "/materials/Teapot/terms/1/curves/theta_h".
 
         Raises:
-            ParameterError: there is no such curve in this look.
+            ParameterError: there is no such curve or parameter in this look.
             MemoryBudgetError: its operator is larger than the cache may be.
         """
         touched = parse_pointer(pointer)
-        check_room(self._images, self._images.find(touched))
+        check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
         self._touched = touched
 
     def waiting(self) -> Need | None:
-        """What must be made next, for the look or for the curve that was touched; None where nothing is lacking.
+        """What must be made next, for the look or for what was touched; None where nothing is lacking.
 
         The picture may be advanced meanwhile: all that does not depend on it follows the look.
 
         Raises:
             MemoryBudgetError: something that the look lacks is larger than the cache may be.
         """
-        return next_need(self._images, self._find_touched())
+        return next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
 
     def adopt(self, need: Need, made: Frozen | Shaded) -> None:
         """Go on with what a need has made, unless the look has moved on to where it is of no use."""
         image = need.image
         if not any(image is known for known in need.material.terms) or image.kind != need.kind:
             return
+        is_current = need.key == self._images.key(need.material, image, need.active, of_target=True)
         if isinstance(made, Shaded):
-            if image.effective is None:
+            if image.effective is None or (image.is_near and is_current):
                 image.show(made, need.bands)
-        elif need.active is not None and need.key == self._images.key(
-            need.material, image, need.active, of_target=True
-        ):
+        elif need.active is not None and is_current:
             image.adopt(made, need.active)
-            touched = self._find_touched()
-            if touched is not None and touched[1] is image and touched[2] != need.active:
-                self._touched = None  # the hand has moved on to another curve of this term
+            touched = self._find(self._touched)
+            if touched is not None and touched.image is image and touched.along != need.active:
+                self._touched = None  # the hand has moved on to something else of this term
 
     def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
         """Make what `waiting` names and adopt it.
@@ -152,8 +153,9 @@ class Picture:
 
     def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bands of a curve as displayed and as its parameters alone would give it. (3, J) each"""
-        _, term, curve = self._images.find(parse_pointer(pointer))
-        declared = term.term.curve(curve)
+        wanted = parse_curve(pointer)
+        _, term = self._images.find(wanted)
+        declared = term.term.curve(wanted.name)
         return curve_bands(term.document, declared), generated_bands(term.document, declared)
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
@@ -162,13 +164,13 @@ class Picture:
 
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
         """Which pixels a stretch of a curve lights; see `relume.transfer.probe.brush`."""
-        return brush(self._images, self._radiance, parse_pointer(pointer), from_deg, to_deg)
+        return brush(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
 
-    def _find_touched(self) -> Candidate | None:
-        if self._touched is None:
+    def _find(self, pointer: CurvePointer | ParameterPointer | None) -> Candidate | None:
+        """What a pointer means in the look as it is now; None where an edit has removed it."""
+        if pointer is None:
             return None
         try:
-            return self._images.find(self._touched)
-        except ParameterError:  # an edit has removed it
-            self._touched = None
+            return Candidate(*self._images.find(pointer), self._images.along(pointer))
+        except ParameterError:
             return None

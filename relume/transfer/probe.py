@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from relume.basis.daubechies import analysis, synthesis
 from relume.color import luminance
 from relume.errors import EditNotSupportedError, ParameterError
-from relume.transfer.pointer import CurvePointer
+from relume.transfer.along import AlongCurve
+from relume.transfer.pointer import CurvePointer, ParameterPointer
 from relume.transfer.resolve import resolve
 from relume.transfer.stream import columns_of, stream
 from relume.transfer.term_image import TermImage
@@ -20,13 +21,18 @@ F32 = NDArray[np.float32]
 
 
 def probe(
-    images: ViewImages, radiance: F32, gain: NDArray[np.float64], touched: CurvePointer | None, x: int, y: int
+    images: ViewImages,
+    radiance: F32,
+    gain: NDArray[np.float64],
+    touched: CurvePointer | ParameterPointer | None,
+    x: int,
+    y: int,
 ) -> dict[str, Any]:
     """A pixel's material, radiance, and what each band of its active curve gives to it.
 
     Args:
         radiance: of every view sample. (3, samples) float32. gain: multiplies each channel. (3,)
-        touched: the curve to answer for, where it is the pixel's material's.
+        touched: of the term to answer for, where it is the pixel's material's.
     Raises:
         ParameterError: the pixel lies outside the picture.
     """
@@ -43,13 +49,15 @@ def probe(
     name = images.transfer.material_names[index]
     for k, term in _touched_first(images, name, touched):
         bands = _contributions(images, name, term, samples, weights)
-        if bands is not None and term.active is not None:
-            pointer = str(CurvePointer(name, k, term.active))
+        if bands is not None and isinstance(term.active, AlongCurve):
+            pointer = str(CurvePointer(name, k, term.active.name))
             return {"material": name, "radiance": seen, "bands": gain[:, None] * bands, "curve": pointer}
     return {"material": name, "radiance": seen, "bands": None, "curve": None}
 
 
-def _touched_first(images: ViewImages, name: str, touched: CurvePointer | None) -> list[tuple[int, TermImage]]:
+def _touched_first(
+    images: ViewImages, name: str, touched: CurvePointer | ParameterPointer | None
+) -> list[tuple[int, TermImage]]:
     terms = list(enumerate(images.by_name[name].terms))
     if touched is not None and touched.material == name:
         terms.sort(key=lambda item: item[0] != touched.term)
@@ -62,10 +70,10 @@ def _contributions(
     """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None where none is frozen."""
     material = images.by_name[name]
     frozen = images.operator(material, term)
-    if frozen is None or term.active is None:
+    if frozen is None or not isinstance(term.active, AlongCurve):
         return None
     rows = images.view.rows(material.index)
-    curve = synthesis(term.shown) if term.shown is not None else term.target[term.active]
+    curve = synthesis(term.shown) if term.shown is not None else term.target[term.active.name]
     bands = np.zeros_like(curve)
     for sample, weight in zip(samples, weights, strict=True):
         if rows.start <= sample < rows.stop:
@@ -82,9 +90,9 @@ def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: fl
     Raises:
         EditNotSupportedError: the curve is not frozen yet; touch it and freeze first.
     """
-    material, term, curve = images.find(pointer)
+    material, term = images.find(pointer)
     frozen = images.operator(material, term)
-    if frozen is None or term.active != curve or term.shown is None:
+    if frozen is None or term.active != images.along(pointer) or term.shown is None:
         raise EditNotSupportedError(images.transfer.method, "a brush over a curve that is not open; open it first")
     bands = synthesis(term.shown)
     edges = np.linspace(0, 90, bands.shape[1] + 1)

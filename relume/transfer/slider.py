@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.pca import Nodes, choose_nodes, joint
+from relume.basis.pca import Nodes, choose_nodes, joint, joint_rows, span
 from relume.brdf.curves import curve_bands, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
@@ -29,149 +30,175 @@ from relume.brdf.term import Curve, Term
 from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges
-from relume.transfer.frozen import tiles_of
+from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.projector import Projector, Receivers, contract
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+Settings = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 MAX_ERROR = 1e-3
 MAX_NODES = 24
 _NUM_VALUES = 97
-_MAX_PRODUCT = 1 << 15  # bands of all moved curves multiplied; 0.1 GB while nodes are chosen
+_MAX_PRODUCT = 1 << 15  # dimensions of all moved curves multiplied; 50 MB while nodes are chosen
 _SAMPLES_A_STEP = 512
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """What a parameter does to a term's curves, as a combination of what it does at a few values.
+    """What a parameter does to a term's curves, as a combination of what it does at a few values; an `Along`.
 
     Attributes:
-        curves: those it moves. nodes: of R, G and B, equally many.
+        others: parameters that move the same curves, with their values.
+        curves: those it moves.
+        spans: of each channel's curves, each weighed by solid angle, an orthonormal basis. (r, J) each
+        nodes: of R, G and B, equally many; their curves are `joint` coordinates in the spans.
     """
 
+    model: str
     parameter: str
-    curves: tuple[Curve, ...]
-    nodes: tuple[Nodes, Nodes, Nodes]
+    others: Settings
+    curves: tuple[Curve, ...] = field(compare=False)
+    spans: tuple[tuple[F64, ...], ...] = field(compare=False)
+    nodes: tuple[Nodes, Nodes, Nodes] = field(compare=False)
+
+    is_complete = False
 
     @property
-    def num_nodes(self) -> int:
-        """S."""
+    def label(self) -> str:
+        """What people read."""
+        return TERMS[self.model].parameter(self.parameter).label
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Names of the curves it moves."""
+        return tuple(curve.name for curve in self.curves)
+
+    @property
+    def num_columns(self) -> int:
+        """S, the number of nodes."""
         return len(self.nodes[0].values)
 
-    def coefficients(self, document: Mapping[str, Any]) -> F64:
-        """c of the curves of a term document that differs from the one linearised in the parameter alone. (3, S)"""
-        products = _product(document, self.curves)
-        return np.array([nodes.coefficients(row) for nodes, row in zip(self.nodes, products, strict=True)])
+    def holds_for(self, document: Mapping[str, Any]) -> bool:
+        """Whether a term document differs from the one linearised in the parameter alone, as far as its curves go."""
+        return document["model"] == self.model and _others(document, self.parameter) == self.others
 
-    def bands(self, document: Mapping[str, Any]) -> dict[str, F64]:
+    def coefficients(self, bands: Mapping[str, F64]) -> F64:
+        """c of a term's curves, (3, J) each. (3, S)"""
+        weighed = [bands[curve.name] * solid_angles(curve) for curve in self.curves]
+        return np.array(
+            [
+                nodes.coefficients(joint([basis @ rows[channel] for basis, rows in zip(bases, weighed, strict=True)]))
+                for channel, (nodes, bases) in enumerate(zip(self.nodes, self.spans, strict=True))
+            ]
+        )
+
+    def bands_at_nodes(self) -> dict[str, F64]:
         """Bands of the moved curves at all nodes. (3, S, J) each"""
-        at_nodes = [
-            _at(document, self.parameter, *values) for values in zip(*(n.values for n in self.nodes), strict=True)
+        documents = [
+            _at(self.model, self.others, self.parameter, values)
+            for values in zip(*(n.values for n in self.nodes), strict=True)
         ]
-        return {curve.name: np.stack([curve_bands(at, curve) for at in at_nodes], axis=1) for curve in self.curves}
+        return {
+            curve.name: np.stack([curve_bands(document, curve) for document in documents], axis=1)
+            for curve in self.curves
+        }
 
+    def freeze(
+        self,
+        term: Term,
+        bands: Mapping[str, F64],
+        lights: TriangleLights,
+        receivers: Receivers,
+        progress: Callable[[float], None],
+        cancelled: Callable[[], bool],
+    ) -> Frozen:
+        """Contract all curves at all nodes in one pass: the columns are the images there.
 
-def _at(document: Mapping[str, Any], parameter: str, *values: float) -> dict[str, Any]:
-    """The document with one parameter at a value for R, G and B."""
-    return {**document, "params": {**(document.get("params") or {}), parameter: [float(value) for value in values]}}
+        Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
+        share light out to.
+
+        Args:
+            bands: of all the term's curves, (3, J) each; the moved ones' values do not matter.
+            progress: called with the share done. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        at_nodes = self.bands_at_nodes()
+        alone = self.moves[0] if len(self.moves) == 1 else None
+        contraction = contract(term, bands if alone else {**bands, **at_nodes}, alone)
+        num_samples = len(receivers.normal)
+        tiles, samples = tiles_of(num_samples)
+        rows = np.zeros((tiles * samples, self.num_columns, 3), np.float32)
+        lock, done = threading.Lock(), [0]
+
+        def step(start: int, stop: int) -> None:
+            if cancelled():
+                raise CancelledError("freezing was cancelled")
+            projected = Projector(term, contraction, lights, receivers).project(start, stop)
+            if alone is not None:
+                matrices = at_nodes[alone].astype(np.float32)
+                projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
+            rows[start:stop] = projected
+            with lock:
+                done[0] += stop - start
+                progress(done[0] / num_samples)
+
+        for_ranges(step, num_samples, _SAMPLES_A_STEP)
+        importance = np.sqrt(np.einsum("nsc,nsc->cs", rows, rows, dtype=np.float64))
+        transport = rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1)
+        return Frozen(np.ascontiguousarray(transport), importance)
 
 
 def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:
-    """Choose the nodes of a term's parameter; None where none do: no curve moves, one is drawn, or 24 are too few."""
-    term: Term = TERMS[document["model"]]
+    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or 24 are too few."""
+    others = _others(document, parameter)
+    return None if others is None else _linearised(document["model"], parameter, others)
+
+
+def _others(document: Mapping[str, Any], parameter: str) -> Settings | None:
+    """What else the curves that a parameter moves are made from; None where it moves none, or one is drawn."""
+    term = TERMS[document["model"]]
     curves = moved_curves(term, parameter)
     if not curves or any(drawn_curves(document, curve) for curve in curves):
         return None
-    if math.prod(curve.num_bands for curve in curves) > _MAX_PRODUCT:
-        return None
-    declared = term.parameter(parameter)
+    read = sorted({name for curve in curves for name in curve.parameters} - {parameter})
+    given = document.get("params") or {}
+    values = ((name, given.get(name, term.parameter(name).default)) for name in read)
+    return tuple((name, tuple(value) if isinstance(value, list | tuple) else float(value)) for name, value in values)
+
+
+@lru_cache(maxsize=64)
+def _linearised(model: str, parameter: str, others: Settings) -> Linearised | None:
+    term = TERMS[model]
+    declared, curves = term.parameter(parameter), moved_curves(term, parameter)
     values = slider_values(declared, _NUM_VALUES)
-    inside, between = (
-        _products(document, parameter, curves, at)
-        for at in (values, slider_values(declared, _NUM_VALUES - 1, between=True))
-    )
-    alike = bool(np.all(inside == inside[0]))
-    chosen = [choose_nodes(values, inside[c], between[c], MAX_NODES) for c in ((0,) if alike else (0, 1, 2))]
+    between = slider_values(declared, _NUM_VALUES - 1, between=True)
+    weighed = [_weighed(model, others, parameter, curve, np.concatenate([values, between])) for curve in curves]
+    alike = all(bool(np.all(rows == rows[0])) for rows in weighed)
+    spans, chosen = [], []
+    for channel in (0,) if alike else (0, 1, 2):
+        spans.append(tuple(span(rows[channel]) for rows in weighed))
+        if math.prod(len(basis) for basis in spans[-1]) > _MAX_PRODUCT:
+            return None
+        products = joint_rows([rows[channel] @ basis.T for rows, basis in zip(weighed, spans[-1], strict=True)])
+        chosen.append(choose_nodes(values, products[: len(values)], products[len(values) :], MAX_NODES))
     if any(nodes.errors[-1] > MAX_ERROR for nodes in chosen):
         return None
     num = max(1 + int(np.argmax(nodes.errors <= MAX_ERROR)) for nodes in chosen)
     if any(len(nodes.values) < num for nodes in chosen):
         return None
     red, green, blue = (nodes.first(num) for nodes in (chosen * 3 if alike else chosen))
-    return Linearised(parameter, curves, (red, green, blue))
+    return Linearised(model, parameter, others, curves, tuple(spans * 3 if alike else spans), (red, green, blue))
 
 
-def _product(document: Mapping[str, Any], curves: tuple[Curve, ...]) -> F64:
-    """All curves multiplied, each band weighed by the directions it has: errors then are those of light. (3, J)"""
-    weighed = [curve_bands(document, curve) * solid_angles(curve) for curve in curves]
-    return np.array([joint([rows[channel] for rows in weighed]) for channel in range(3)])
+def _at(model: str, others: Settings, parameter: str, values: Sequence[float]) -> dict[str, Any]:
+    """A document with one parameter at a value for R, G and B."""
+    return {"model": model, "params": {**dict(others), parameter: [float(value) for value in values]}}
 
 
-def _products(document: Mapping[str, Any], parameter: str, curves: tuple[Curve, ...], values: F64) -> F64:
-    """`_product` at values of a parameter. (3, n, J)"""
-    products = [_product(_at(document, parameter, value, value, value), curves) for value in values]
-    return np.array(products).transpose(1, 0, 2)
-
-
-@dataclass(frozen=True)
-class FrozenSlider:
-    """The linear operator from one parameter to the image of one term; its columns are images at the nodes.
-
-    Attributes:
-        transport: laid out as `Frozen.transport`, for `stream`. (tiles, 3, S, samples) float32
-    """
-
-    linearised: Linearised
-    transport: F32
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory it holds."""
-        return self.transport.nbytes
-
-
-def freeze_slider(
-    document: Mapping[str, Any],
-    linearised: Linearised,
-    lights: TriangleLights,
-    receivers: Receivers,
-    progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
-) -> FrozenSlider:
-    """Contract all curves at all nodes of a parameter in one pass.
-
-    Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
-    share light out to.
-
-    Args:
-        document: the term; its value of the parameter does not matter.
-        progress: called with the share done. cancelled: asked now and then.
-    Raises:
-        CancelledError: `cancelled` said so.
-    """
-    term = TERMS[document["model"]].settled(document)
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-    at_nodes = linearised.bands(document)
-    alone = linearised.curves[0].name if len(linearised.curves) == 1 else None
-    contraction = contract(term, bands if alone else {**bands, **at_nodes}, alone)
-    num_samples = len(receivers.normal)
-    tiles, samples = tiles_of(num_samples)
-    rows = np.zeros((tiles * samples, linearised.num_nodes, 3), np.float32)
-    lock, done = threading.Lock(), [0]
-
-    def step(start: int, stop: int) -> None:
-        if cancelled():
-            raise CancelledError("freezing was cancelled")
-        projected = Projector(term, contraction, lights, receivers).project(start, stop)
-        if alone is not None:
-            matrices = at_nodes[alone].astype(np.float32)
-            projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
-        rows[start:stop] = projected
-        with lock:
-            done[0] += stop - start
-            progress(done[0] / num_samples)
-
-    for_ranges(step, num_samples, _SAMPLES_A_STEP)
-    transport = rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1)
-    return FrozenSlider(linearised, np.ascontiguousarray(transport))
+def _weighed(model: str, others: Settings, parameter: str, curve: Curve, values: F64) -> F64:
+    """A curve at values of a parameter, each band weighed by the directions it has: errors are those of light. (3, n,
+    J)"""
+    at_values = [curve_bands(_at(model, others, parameter, (value, value, value)), curve) for value in values]
+    return np.stack(at_values, axis=1) * solid_angles(curve)

@@ -1,7 +1,8 @@
-"""The live image of one term of one material: which curve is free, what it shows, what it should show.
+"""The live image of one term of one material: what is free, what it shows, what it should show.
 
 Exactness is tracked as in eqs. 29 to 31, Ben-Artzi 2006: the image belongs to the effective coefficients, and a step
-adds T · (c_perfect − c_effective), the most important coefficients first where there is no time for all.
+adds T · (c_perfect − c_effective), the most important coefficients first where there is no time for all. Along a
+parameter, whose few coefficients say curves only nearly, a step sums all of them, and the image is near its look.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.errors import EditError
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
+from relume.transfer.along import Along
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
@@ -31,7 +32,8 @@ class TermImage:
     Attributes:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
-        active: the curve of the operator in use. shown: coefficients of it in `image`, (3, J).
+        is_near: it shows them only as closely as the nodes of a parameter can say them.
+        active: what the operator in use leaves free. shown: its coefficients in `image`, (3, columns).
         term: the declaration of the term's model, fixed parameters put in. kind: what tells it from
             others, the light included.
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
@@ -45,7 +47,8 @@ class TermImage:
         self._theta_o = np.arccos(cos_theta_o)
         self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
         self.effective: dict[str, F64] | None = None
-        self.active: str | None = None
+        self.active: Along | None = None
+        self.is_near = False
         self.shown: F64 | None = None
         self.is_composed = False
         self.kind: Hashable = None
@@ -57,6 +60,9 @@ class TermImage:
         kind = (model, TERMS[model].fixed_values(document), self._environment)
         if kind != self.kind:
             self.effective = self.active = self.shown = None
+            self.is_near = False
+        elif self.active is not None and not self.active.holds_for(document):
+            self.active = self.shown = None
         self.kind = kind
         self.document = document
         self.term = TERMS[model].settled(document)
@@ -72,8 +78,7 @@ class TermImage:
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
         """Go on from an image of these curves, which may have been the target some time ago."""
         self.image[:] = shaded.image
-        self.effective = dict(bands)
-        self.active = self.shown = None
+        self.effective, self.is_near = dict(bands), False
         self.is_composed = False
 
     def _outgoing(self) -> F32 | None:
@@ -91,41 +96,44 @@ class TermImage:
 
     def is_exact(self) -> bool:
         """Whether the image shows the target."""
-        return self.effective is not None and not self.differing()
+        return self.effective is not None and not self.is_near and not self.differing()
 
-    def dormant_key(self, active: str | None, *, of_target: bool) -> Hashable:
-        """What a frozen operator, or an image where no curve is active, depends on besides view and material."""
+    def dormant_key(self, active: Along | None, *, of_target: bool) -> Hashable:
+        """What a frozen operator, or an image where nothing is active, depends on besides view and material."""
         bands = self.target if of_target or self.effective is None else self.effective
+        moved = () if active is None else active.moves
         return (
             self.kind,
             active,
-            *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name != active),
+            *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in moved),
         )
 
-    def adopt(self, frozen: Frozen, active: str) -> None:
+    def adopt(self, frozen: Frozen, active: Along) -> None:
         """Go on with an operator whose dormant curves are those of the target.
 
-        Where the image showed other dormant curves it is made anew from all coefficients.
+        Where the image shows other curves, or the operator can say them better, it is made anew from all coefficients.
         """
-        others = [name for name in self.differing() if name != active]
+        differing = set(self.differing())
         known = self.active == active  # `shown` holds, also where only some coefficients have been moved
         self.active = active
-        if self.effective is None or others:
-            self.image[:] = 0
-            self.shown = analysis(self.target[active])
-            stream(frozen.transport, columns_of(self.shown), self.image)
+        if not differing <= set(active.moves) or (differing and not known) or (self.is_near and active.is_complete):
+            self._sum(frozen, active)
             self.effective = dict(self.target)
-            self.is_composed = False
         elif not known:
-            self.shown = analysis(self.effective[active])
+            self.shown = active.coefficients(self.target)
 
     def step(self, frozen: Frozen, max_coefficients: int | None) -> int:
-        """Bring the active curve towards its target (eqs. 29 to 31); returns the number of coefficients moved."""
-        if self.active is None or self.effective is None or self.shown is None:
+        """Bring what is free towards its target (eqs. 29 to 31); returns the number of coefficients moved."""
+        active = self.active
+        if active is None or self.effective is None or self.shown is None:
             raise EditError("the term has no frozen operator; freeze it first")
-        if np.array_equal(self.target[self.active], self.effective[self.active]):
+        free = {name: self.target[name] for name in active.moves}
+        if set(self.differing()).isdisjoint(free):
             return 0
-        perfect = analysis(self.target[self.active])
+        if not active.is_complete:
+            self.effective = {**self.effective, **free}
+            return self._sum(frozen, active)
+        perfect = active.coefficients(self.target)
         change = perfect - self.shown
         budget = change.size if max_coefficients is None else 3 * max_coefficients
         moved = int(np.count_nonzero(change))
@@ -133,10 +141,19 @@ class TermImage:
             weight = np.abs(change) * frozen.importance
             change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
             self.shown = np.where(change == 0, self.shown, perfect)  # a sum would leave a rest to move again
-            self.effective = {**self.effective, self.active: np.full_like(perfect, np.nan)}  # shows no curve exactly
+            free = {name: np.full_like(bands, np.nan) for name, bands in free.items()}  # shows no curve exactly
         else:
             self.shown = perfect
-            self.effective = {**self.effective, self.active: self.target[self.active]}
+        self.effective = {**self.effective, **free}
         stream(frozen.transport, columns_of(change), self.image)
         self.is_composed = False
         return min(moved, budget)
+
+    def _sum(self, frozen: Frozen, active: Along) -> int:
+        """Make the image anew from all coefficients of the target; returns their number."""
+        self.shown = active.coefficients(self.target)
+        self.image[:] = 0
+        stream(frozen.transport, columns_of(self.shown), self.image)
+        self.is_near = not active.is_complete
+        self.is_composed = False
+        return self.shown.size

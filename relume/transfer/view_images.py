@@ -6,11 +6,13 @@ from collections.abc import Hashable
 
 from relume.errors import ParameterError
 from relume.look import BAKED_ENVIRONMENT, Look, validate
+from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
-from relume.transfer.pointer import CurvePointer
+from relume.transfer.pointer import CurvePointer, ParameterPointer
+from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
 
 
@@ -43,24 +45,38 @@ class ViewImages:
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
 
-    def find(self, pointer: CurvePointer) -> tuple[MaterialImage, TermImage, str]:
-        """What a pointer means in the look as it is now.
+    def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, TermImage]:
+        """The material and the term of a pointer in the look as it is now.
 
         Raises:
-            ParameterError: there is no such curve.
+            ParameterError: there is no such curve or parameter.
         """
         material = self.by_name.get(pointer.material)
         if material is None or not pointer.term < len(material.terms):
             raise ParameterError(str(pointer), pointer.material, "a material and term of this look")
         term = material.terms[pointer.term]
-        if pointer.curve not in {curve.name for curve in term.term.curves}:
-            raise ParameterError(str(pointer), pointer.curve, ", ".join(curve.name for curve in term.term.curves))
-        return material, term, pointer.curve
+        declared = term.term.curves if isinstance(pointer, CurvePointer) else term.term.parameters
+        names = [item.name for item in declared]
+        if pointer.name not in names:
+            raise ParameterError(str(pointer), pointer.name, ", ".join(names))
+        return material, term
+
+    def along(self, pointer: CurvePointer | ParameterPointer) -> Along | None:
+        """What must be free for what a pointer means to be moved; None where light has no part in it.
+
+        Raises:
+            ParameterError: there is no such curve or parameter.
+        """
+        _, term = self.find(pointer)
+        if isinstance(pointer, ParameterPointer):
+            return linearise(term.document, pointer.name)
+        curve = term.term.curve(pointer.name)
+        return None if curve.outgoing else AlongCurve.of(curve)
 
     def key(
-        self, material: MaterialImage, term: TermImage, active: str | None, *, of_target: bool
+        self, material: MaterialImage, term: TermImage, active: Along | None, *, of_target: bool
     ) -> tuple[Hashable, ...]:
-        """Name of an operator, or of an image where no curve is active, in the cache; the store comes first."""
+        """Name of an operator, or of an image where nothing is active, in the cache; the store comes first."""
         return self.transfer.key, self.view.name, material.index, term.dormant_key(active, of_target=of_target)
 
     def operator(self, material: MaterialImage, term: TermImage) -> Frozen | None:

@@ -21,6 +21,7 @@ from server.live.threads import OneAtATime, Threads
 from server.live.viewport import Viewport
 
 REST_S = 0.040  # a hand that moves edits at least this often; refining in between would only delay the next frame
+SETTLE_S = 0.250  # what only refines a picture takes both cores from the next edit
 CHECK_S = 1.0
 
 
@@ -35,7 +36,7 @@ class FrameLoop:
         self._answers = Answers(parts.wire, self._work)
         self._accepted: Target | None = None
         self._viewports: dict[str, Viewport] = {}
-        self._rest_until_s = 0.0
+        self._rest_until_s = self._settle_at_s = 0.0
 
     async def run(self) -> None:
         """Serve until cancelled or until the client is lost."""
@@ -55,6 +56,8 @@ class FrameLoop:
             await self._open_view(self._shown.focus)
         elif (pointer := self._wishes.take_touch()) is not None:
             await self._touch(pointer)
+        elif (parameter := self._wishes.take_hold()) is not None:
+            await self._prepare(parameter)
         elif self._freezer.is_done:
             await self._adopt()
         else:
@@ -104,6 +107,8 @@ class FrameLoop:
         now_s = time.perf_counter()
         self._window.check(now_s)
         due_s = min((self._due_s(v) for v in self._viewports.values() if self._has_room(v)), default=float("inf"))
+        if self._freezer.running is None and any(v.need is not None for v in self._viewports.values()):
+            due_s = min(due_s, self._settle_at_s)
         try:
             async with asyncio.timeout(min(CHECK_S, max(0.0, due_s - now_s))):
                 await self._wishes.news.wait()
@@ -134,8 +139,12 @@ class FrameLoop:
         target = self._wishes.target
         self._answers.touched = pointer
         await self._answers.send_curve(target)
-        if self._answers.touched is None:
-            return
+        if self._answers.touched is not None and not await self._prepare(pointer):
+            self._answers.touched = None
+
+    async def _prepare(self, pointer: str) -> bool:
+        """Freeze along what the user has in hand, in the newest look there is; False where that was refused."""
+        target = self._wishes.target
         if target is not self._accepted:
             try:
                 await self._work.quick(painter.accept, self._pictures(), target)
@@ -145,11 +154,11 @@ class FrameLoop:
         try:
             needs = await self._work.quick(painter.touch, self._pictures(), pointer)
         except RelumeError as error:  # the look is another one now, or freezing it takes more memory than there is
-            self._answers.touched = None
             await self._wire.refuse(error)
-            return
+            return False
         for viewport, need in zip(self._viewports.values(), needs, strict=True):
             viewport.need = need
+        return True
 
     async def _adopt(self) -> None:
         """Hand over what was made, where its view is still shown."""
@@ -166,8 +175,9 @@ class FrameLoop:
             if self._is_stale(*running):
                 self._freezer.cancel()
             return
+        is_resting = time.perf_counter() >= self._settle_at_s
         for viewport in self._by_urgency():
-            if viewport.need is not None:
+            if viewport.need is not None and (is_resting or not viewport.need.refines):
                 self._freezer.start(viewport, viewport.need)
                 return
 
@@ -175,7 +185,8 @@ class FrameLoop:
         """Whether the user has moved on; an image of an older look is still worth showing where there is none."""
         if viewport not in self._viewports.values():
             return True
-        return need.state == "freezing" and (viewport.need is None or viewport.need.key != need.key)
+        is_dispensable = need.state == "freezing" or need.refines
+        return is_dispensable and (viewport.need is None or viewport.need.key != need.key)
 
     async def _answer(self) -> bool:
         """The newest probe, and a brush's frame of one view; whether anything was asked."""
@@ -209,6 +220,7 @@ class FrameLoop:
         self._accepted, viewport.served_s = target, time.perf_counter()
         if viewport.is_behind(target) and target.received_s is not None:
             self._rest_until_s = time.perf_counter() + REST_S
+            self._settle_at_s = time.perf_counter() + SETTLE_S
         viewport.painted(order, painted, self._wishes)
         if painted.message is not None:
             await self._deliver(viewport, order, painted, painted.message)

@@ -89,7 +89,7 @@ def accept(pictures: Iterable[Picture], target: Target) -> None:
 
 
 def touch(pictures: Iterable[Picture], pointer: str) -> list[Need | None]:
-    """Tell pictures which curve the user has opened; what each of them needs now."""
+    """Tell pictures which curve or slider the user has in hand; what each of them needs now."""
     found = list(pictures)
     for picture in found:
         picture.touch(pointer)

@@ -16,10 +16,12 @@ class Wishes:
 
     Attributes:
         target: the newest look; it stays, each view is painted with it once.
+        touch, hold: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 
     target: Target
     touch: str | None = None
+    hold: str | None = None
     probe: ProbeMessage | None = None
     brush: BrushMessage | None = None
     form: Literal["hdr", "jpeg", "auto"] = "auto"
@@ -29,6 +31,11 @@ class Wishes:
     def take_touch(self) -> str | None:
         """Empty the touched curve's slot."""
         taken, self.touch = self.touch, None
+        return taken
+
+    def take_hold(self) -> str | None:
+        """Empty the held parameter's slot."""
+        taken, self.hold = self.hold, None
         return taken
 
     def take_probe(self) -> ProbeMessage | None:

@@ -98,6 +98,7 @@ class FakeNeed:
     control: "Control"
     key: str
     state: str = "freezing"
+    refines: bool = False
 
     @property
     def what(self) -> str:
@@ -143,7 +144,7 @@ class FakePicture:
     def waiting(self) -> FakeNeed | None:
         lacking = [THETA_D] if self._lacks_theta_d() else []
         needed = [curve for curve in (*lacking, self.wanted) if curve not in self.frozen]
-        return FakeNeed(self.control, needed[0]) if needed else None
+        return FakeNeed(self.control, needed[0], refines=self.control.refines) if needed else None
 
     def adopt(self, need: FakeNeed, made: str) -> None:
         self.frozen.add(made)
@@ -197,6 +198,7 @@ class Control:
     """What tests set and see."""
 
     max_step: int = NUM_COEFFICIENTS
+    refines: bool = False
     num_looks: int = 0
     num_cancelled: int = 0
     num_opened: int = 0

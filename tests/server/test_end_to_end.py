@@ -147,3 +147,29 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
     for view, picture in pictures.items():
         request = {"bake": bake, "view": view, "looks": [{"materials": {"Ball": {"terms": terms}}}]}
         assert_same(picture, rendered_by(real, request, tmp_path))
+
+
+def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: TestClient, tmp_path: Path) -> None:
+    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+    scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
+    bake = bakes.submit(scene, Recipe("direct", ("front",), (64, 48), 100))
+    with bakes.subscribe(bake) as changes:
+        assert list(changes)[-1].state == "ready"
+    term, picture, frames = "/materials/Ball/terms/1", np.zeros((48, 64, 3)), []
+    ggx = {"model": "ggx", "color": [0.8, 0.7, 0.6], "params": {"roughness": 0.5}}
+    with open_session(real, bake) as session:
+        session.edit(1, term, ggx)
+        put(picture, session.exact(1))
+        session.send(type="touch", parameter=f"{term}/params/roughness")
+        while session.text("status")["state"] != "ready":
+            pass
+        session.edit(2, f"{term}/params/roughness", 0.3)
+        while not frames or not frames[-1].header["exact"]:
+            frames.append(session.frame())
+            put(picture, frames[-1])
+    assert [frame.header["exact"] for frame in frames] == [False, True]
+    ggx["params"] = {"roughness": 0.3}
+    document = real.get(f"/api/scenes/{scene}").json()["materials"]
+    first = next(material["terms"][0] for material in document if material["name"] == "Ball")
+    looks = [{"materials": {"Ball": {"terms": [first, ggx]}}}]
+    assert_same(picture, rendered_by(real, {"bake": bake, "view": "front", "looks": looks}, tmp_path))

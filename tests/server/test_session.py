@@ -109,6 +109,65 @@ def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, bak
         assert session.text("curve")["revision"] == 1
 
 
+def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_H)
+        assert session.text("curve")["curve"] == THETA_H
+        session.send(type="touch", parameter=IOR)
+        assert session.text("status")["what"] == "Paper, ior"
+        control.may_freeze.set()
+        while session.text("status")["state"] != "ready":
+            pass
+        session.edit(1, SIGMA, 0.4)
+        assert session.text("curve")["curve"] == THETA_H
+
+
+@pytest.mark.parametrize(
+    "touch",
+    [
+        {},
+        {"curve": THETA_H, "parameter": IOR},
+        {"parameter": THETA_H},
+        {"parameter": IOR.replace("ior", "colour")},
+        {"parameter": IOR.replace("Paper", "Nobody")},
+        {"parameter": IOR.replace("/1/", "/999/")},
+    ],
+)
+def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", **touch)
+        assert session.text("problem")["problem"]["detail"]
+        session.edit(1, SIGMA, 0.4)
+        session.exact(1)
+
+
+def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
+    client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.frame_loop.SETTLE_S", 3600.0)
+    control.refines = True
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        for revision in (1, 3, 5):
+            session.edit(revision, IOR, 2.0 + revision)
+            session.edit(revision + 1, SIGMA, revision / 10)
+            session.frame()
+        assert not control.freezing.is_set()
+
+
+def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked, control: Control) -> None:
+    control.refines = True
+    control.may_freeze.set()
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.edit(1, IOR, 2.0)
+        session.exact(1)
+
+
 def test_moving_on_to_another_curve_cancels_the_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)

@@ -14,6 +14,7 @@ from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.look import validate
+from relume.transfer.along import AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen, freeze
 from relume.transfer.picture import Picture
@@ -107,9 +108,9 @@ def lambert_of(*bands):
 
 def test_what_moves_the_picture_most_goes_first(monkeypatch):
     """A small change of a coefficient that much light falls on before a large one that lights nothing."""
-    monkeypatch.setattr("relume.transfer.term_image.analysis", identity.analysis)
+    monkeypatch.setattr("relume.transfer.along.analysis", identity.analysis)
     frozen, term = one_pixel([0.01, 100, 2]), TermImage(lambert_of(0), np.ones(1))
-    term.adopt(frozen, "theta_i")
+    term.adopt(frozen, AlongCurve("theta_i", "θi", 64))
     term.set_document(lambert_of(50, 1, 10))
     seen = []
     while not term.is_exact():
@@ -120,11 +121,11 @@ def test_what_moves_the_picture_most_goes_first(monkeypatch):
 
 def test_didactic_example_of_table_2(monkeypatch):
     """One pixel, T = (3, 5, 2), one multiplication a frame; bands themselves as the basis, as in the paper."""
-    monkeypatch.setattr("relume.transfer.term_image.analysis", identity.analysis)
+    monkeypatch.setattr("relume.transfer.along.analysis", identity.analysis)
     frozen = one_pixel([3, 5, 2])
 
     term = TermImage(lambert_of(0), np.ones(1))
-    term.adopt(frozen, "theta_i")
+    term.adopt(frozen, AlongCurve("theta_i", "θi", 64))
     assert not term.image.any()
     session = [  # c_perfect, R_perfect, c_diff, R_effective, c_effective
         ((4, 2, 1), 24, (4, 2, 1), 12, (4, 0, 0)),  # a curve with geometric decay is loaded

@@ -213,7 +213,11 @@ def test_operator_larger_than_the_cache_is_refused_and_the_picture_stands(transf
     with pytest.raises(MemoryBudgetError):
         picture.touch(BALL + "theta_h")
     assert picture.waiting() is None
-    picture.set_look(look_of(transfer, sigma(0.07)))
+
+    def draw(document):
+        document["materials"]["Ball"]["terms"][1]["curves"] = {"theta_h": {"points": [[0, 1], [90, 0]]}}
+
+    picture.set_look(look_of(transfer, draw))
     with pytest.raises(MemoryBudgetError):
         picture.waiting()
     picture.set_look(look_of(transfer))
@@ -267,7 +271,7 @@ def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
     advance = picture.advance(None)
     assert advance.changed
     assert not advance.exact
-    assert picture.waiting().active == "theta_h"
+    assert picture.waiting().active.moves == ("theta_h",)
     assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
@@ -294,7 +298,7 @@ def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
     assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
     shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
     assert shaded == [("Wall", "lambert")]
-    assert need.active == "theta_d"  # its operator gives the image as well
+    assert need.active.moves == ("theta_d",)  # its operator gives the image as well
 
 
 def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):

@@ -14,7 +14,7 @@ from relume.brdf.sweep import bands_at, moved_curves, slider_values
 from relume.errors import CancelledError
 from relume.light.triangles import subdivide
 from relume.transfer.projector import Projector, contract
-from relume.transfer.slider import MAX_ERROR, MAX_NODES, freeze_slider, linearise
+from relume.transfer.slider import MAX_ERROR, MAX_NODES, linearise
 from relume.transfer.stream import columns_of, stream
 
 SLIDERS = [("blinn_phong", "exponent"), ("cook_torrance", "ior"), ("cook_torrance", "sigma"), ("ggx", "roughness")]
@@ -30,26 +30,33 @@ def receivers(lights):
     return twins.only_above(twins.make_receivers(70, lights.num_lights, seed=11), lights)
 
 
+def bands_of(document):
+    term = TERMS[document["model"]].settled(document)
+    return {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+
+
 def shaded(document, lights, receivers):
     """All curves contracted, straight from the projector. (n, 3)"""
-    term = TERMS[document["model"]].settled(document)
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+    term, bands = TERMS[document["model"]].settled(document), bands_of(document)
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
-def image_of(frozen, document, count):
+def image_of(along, document, count):
     """R(p) as a frame would make it. (n, 3)"""
+    linearised, frozen = along
     tiles, _, _, samples = frozen.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)
-    stream(frozen.transport, columns_of(frozen.linearised.coefficients(document)), image)
+    stream(frozen.transport, columns_of(linearised.coefficients(bands_of(document))), image)
     return image.transpose(0, 2, 1).reshape(-1, 3)[:count]
 
 
 def frozen_along(document, parameter, lights, receivers):
+    term = TERMS[document["model"]].settled(document)
     linearised = linearise(document, parameter)
     assert linearised is not None
-    assert linearised.num_nodes <= MAX_NODES
-    return freeze_slider(document, linearised, lights, receivers, lambda share: None, lambda: False)
+    assert linearised.num_columns <= MAX_NODES
+    frozen = linearised.freeze(term, bands_of(document), lights, receivers, lambda share: None, lambda: False)
+    return linearised, frozen
 
 
 def relative(found, expected):
@@ -58,21 +65,21 @@ def relative(found, expected):
 
 @pytest.mark.parametrize(("model", "parameter"), SLIDERS)
 def test_image_at_any_value_is_the_shaded_one(model, parameter, lights, receivers):
-    frozen = frozen_along({"model": model, "params": {}}, parameter, lights, receivers)
+    along = frozen_along({"model": model, "params": {}}, parameter, lights, receivers)
     declared = TERMS[model].parameter(parameter)
     for value in slider_values(declared, 9, between=True):
         document = {"model": model, "params": {parameter: float(value)}}
         expected = shaded(document, lights, receivers)
         # curves are held to MAX_ERROR over all directions; these points see some of them more brightly than others
-        assert relative(image_of(frozen, document, 70), expected) < 3 * MAX_ERROR
+        assert relative(image_of(along, document, 70), expected) < 3 * MAX_ERROR
 
 
 def test_columns_are_the_images_at_the_nodes(lights, receivers):
     document = {"model": "cook_torrance", "params": {"sigma": [0.1, 0.3, 0.6], "extinction": [0.0, 2.0, 6.0]}}
-    frozen = frozen_along(document, "ior", lights, receivers)
-    columns = frozen.transport.transpose(2, 0, 3, 1).reshape(frozen.linearised.num_nodes, -1, 3)[:, :70]
+    linearised, frozen = frozen_along(document, "ior", lights, receivers)
+    columns = frozen.transport.transpose(2, 0, 3, 1).reshape(linearised.num_columns, -1, 3)[:, :70]
     for k, column in enumerate(columns):
-        values = [float(nodes.values[k]) for nodes in frozen.linearised.nodes]
+        values = [float(nodes.values[k]) for nodes in linearised.nodes]
         expected = shaded(
             {"model": "cook_torrance", "params": {**document["params"], "ior": values}}, lights, receivers
         )
@@ -81,10 +88,10 @@ def test_columns_are_the_images_at_the_nodes(lights, receivers):
 
 def test_each_channel_has_its_own_value_and_its_own_nodes(lights, receivers):
     document = {"model": "cook_torrance", "params": {"extinction": [0.0, 2.0, 6.0]}}
-    frozen = frozen_along(document, "ior", lights, receivers)
-    assert not np.array_equal(frozen.linearised.nodes[0].curves, frozen.linearised.nodes[2].curves)
+    along = frozen_along(document, "ior", lights, receivers)
+    assert not np.array_equal(along[0].nodes[0].values, along[0].nodes[2].values)
     at = {"model": "cook_torrance", "params": {"extinction": [0.0, 2.0, 6.0], "ior": [1.3, 2.2, 4.0]}}
-    assert relative(image_of(frozen, at, 70), shaded(at, lights, receivers)) < 3 * MAX_ERROR
+    assert relative(image_of(along, at, 70), shaded(at, lights, receivers)) < 3 * MAX_ERROR
 
 
 def test_several_settings_at_once_are_each_alone(lights, receivers):
@@ -113,7 +120,7 @@ def test_cancelling_stops(lights, receivers):
     document = {"model": "ggx", "params": {}}
     linearised = linearise(document, "f0")
     with pytest.raises(CancelledError):
-        freeze_slider(document, linearised, lights, receivers, lambda share: None, lambda: True)
+        linearised.freeze(TERMS["ggx"], bands_of(document), lights, receivers, lambda share: None, lambda: True)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 /** The curve editor: a term's one-dimensional factor, under the hand. */
 import { useEffect, useMemo, useState } from "preact/hooks";
 import type { CurveEdits, CurveInfo } from "../protocol";
+import { holdCurve } from "../state/live";
 import { curvePath, curveShape, probe } from "../state/store";
 import { clearBrush } from "./brush";
 import { CurveBar, CurveTools } from "./CurveBar";
@@ -62,7 +63,11 @@ export function CurveEditor({ info, edits }: { info: CurveInfo; edits: CurveEdit
   return (
     <div class="curve" ref={measure} onKeyDown={(event) => stretchKey(event, hand)}>
       <CurveTools hand={hand} />
-      <div class={`plot ${tool.value}`} style={{ width: `${frame.width}px`, height: `${frame.height}px` }}>
+      <div
+        class={`plot ${tool.value}`}
+        style={{ width: `${frame.width}px`, height: `${frame.height}px` }}
+        onPointerEnter={holdCurve}
+      >
         <Plot
           frame={frame}
           lines={model.lines}

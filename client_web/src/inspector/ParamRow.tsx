@@ -14,13 +14,14 @@ interface Props {
   value: ParamValue;
   initial: ParamValue;
   onChange(value: ParamValue): void;
+  onHold(): void;
 }
 
 function mean(value: ParamValue): number {
   return typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
 }
 
-export function ParamRow({ info, value, initial, onChange }: Props) {
+export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
   const parted = typeof value !== "number";
   const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit };
   const toggle = () => onChange(parted ? mean(value) : [value, value, value]);
@@ -50,11 +51,12 @@ export function ParamRow({ info, value, initial, onChange }: Props) {
               value={value[channel] as number}
               initial={typeof initial === "number" ? initial : (initial[channel] as number)}
               onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
+              onHold={onHold}
             />
           ))}
         </div>
       ) : (
-        <Slider {...range} label={info.label} value={value} initial={mean(initial)} onChange={onChange} />
+        <Slider {...range} label={info.label} value={value} initial={mean(initial)} onChange={onChange} onHold={onHold} />
       )}
       {info.fixed ? null : link}
     </div>

@@ -3,6 +3,7 @@ import { useMemo } from "preact/hooks";
 import { CurveEditor } from "../curve/CurveEditor";
 import type { ModelInfo, Rgb, Term } from "../protocol";
 import { edit } from "../state/edit";
+import { hold } from "../state/live";
 import { pointer } from "../state/pointer";
 import { defaultLook, models, modelOf, selectedCurve, selectedTerm } from "../state/store";
 import { IconButton } from "../ui/Button";
@@ -108,6 +109,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
               value={term.params?.[info.name] ?? info.default}
               initial={same?.params?.[info.name] ?? info.default}
               onChange={(value) => edit(info.label, `${path}/params/${info.name}`, value)}
+              onHold={() => hold(`${path}/params/${info.name}`)}
             />
           ))}
           {model !== undefined && <Curves model={model} term={term} index={index} />}

@@ -33,6 +33,23 @@ export function send(message: ClientMessage): boolean {
   return session?.ask(message) ?? false;
 }
 
+/** The hand was last on a slider, for which the server may have put the open curve away. */
+let holding = false;
+
+/** A hand has come to the slider of a parameter: the server prepares for it. */
+export function hold(parameter: string): void {
+  holding = true;
+  send({ type: "touch", parameter });
+}
+
+/** The hand has come back to the open curve. */
+export function holdCurve(): void {
+  const curve = store.curvePath.peek();
+  if (!holding || curve === null) return;
+  holding = false;
+  send({ type: "touch", curve });
+}
+
 export function reconnectNow(): void {
   session?.reconnectNow();
 }
@@ -235,5 +252,6 @@ effect(() => {
   const curve = store.curvePath.value;
   forgetShape();
   stage.clearBrush();
+  holding = false;
   if (curve !== null) send({ type: "touch", curve });
 });

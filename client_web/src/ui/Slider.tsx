@@ -11,6 +11,8 @@ interface Props extends Range {
   initial?: number;
   tint?: string;
   onChange(value: number): void;
+  /** The hand has come to the slider, and has not moved it yet. */
+  onHold?(): void;
 }
 
 const FINE = 0.1;
@@ -37,6 +39,7 @@ export function Slider(props: Props) {
   const down = (event: PointerEvent) => {
     const element = track.current as HTMLDivElement;
     if (event.button !== 0) return;
+    props.onHold?.();
     if ((event.ctrlKey || event.altKey || event.metaKey) && initial !== undefined) return onChange(initial);
     element.setPointerCapture(event.pointerId);
     const box = element.getBoundingClientRect();
@@ -77,6 +80,7 @@ export function Slider(props: Props) {
         aria-valuenow={value}
         aria-valuetext={shown}
         style={tint === undefined ? undefined : { "--tint": tint }}
+        onFocus={props.onHold}
         onPointerDown={down}
         onPointerMove={move}
         onKeyDown={key}
