@@ -26,7 +26,7 @@ class ThinnedStore:
         self._store, self._prefix = store, f"views/{view}/"
         self._kept = np.flatnonzero((x % step == 0) & (y % step == 0))
         columns, rows = -(-width // step), -(-height // step)
-        self._pixel = (y // step * columns + x // step)[self._kept].astype(np.uint32)
+        self._pixel: NDArray[np.uint32] = (y // step * columns + x // step)[self._kept].astype(np.uint32)
         self._attributes = {**store.attributes, "size": [columns, rows]}
 
     @property
@@ -47,8 +47,7 @@ class ThinnedStore:
             return self._pixel[start:stop]
         kept = self._kept[start : self.shape(path)[0] if stop is None else stop]
         first, end = (int(kept[0]), int(kept[-1]) + 1) if len(kept) else (0, 0)
-        rows: NDArray[Any] = self._store.read(path, first, end)[kept - first]
-        return rows
+        return self._store.read(path, first, end)[kept - first]
 
     def _is_thinned(self, path: str) -> bool:
         """Whether an array has a row for each sample of the view."""
