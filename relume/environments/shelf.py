@@ -1,6 +1,6 @@
 """Environments that were imported; `relume.shelf` keeps them.
 
-    <folder>/<id>/radiance.npy        as `relume.light.environment` reads the file, at most 4096 texels wide
+    <folder>/<id>/radiance.npy        as `relume.light.environment` reads the file, at most 2048 texels wide
                   thumbnail.png
                   environment.json    name, and what had to be changed
 
@@ -24,7 +24,7 @@ from relume.shelf import Shelf
 from relume.shrink import shrink
 
 SHELF = Shelf("imported environment", "env:", "environment.json", SceneError, max_entries=500)
-MAX_WIDTH = 4096  # a texel of 0.09°: finer than what the light in a bake is divided into
+MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
 _RADIANCE, _THUMBNAIL = "radiance.npy", "thumbnail.png"
 
 
