@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 
 import numpy as np
 import pytest
@@ -28,6 +29,11 @@ def cells(editor: Editor) -> list[NDArray[np.int16]]:
     editor.wait_until_exact()
     editor.page.mouse.move(2, 2)
     editor.page.evaluate(SETTLE)
+    return screenshots(editor)
+
+
+def screenshots(editor: Editor) -> list[NDArray[np.int16]]:
+    """The canvases as they are now."""
     images = [Image.open(io.BytesIO(canvas.screenshot())) for canvas in editor.canvas.all()]
     return [np.asarray(image.convert("RGB")).astype(np.int16) for image in images]
 
@@ -48,6 +54,17 @@ def test_one_drag_changes_every_view(both: Editor) -> None:
     after = cells(both)
     assert min(changed(a, b) for a, b in zip(before, after, strict=True)) > 0.005
     assert both.page.evaluate("window.relumeStats.latencies.length") > drawn
+
+
+def test_a_stretch_of_the_curve_tints_every_view(both: Editor) -> None:
+    both.choose("Ball", 1)
+    plain = cells(both)
+    plot = both.page.locator(".plot").bounding_box()
+    assert plot is not None
+    both.page.mouse.move(plot["x"] + 0.3 * plot["width"], plot["y"] + 0.5 * plot["height"])
+    deadline = time.monotonic() + WAIT_MS / 1e3
+    while not all(changed(a, b) > 0.1 for a, b in zip(plain, screenshots(both), strict=True)):
+        assert time.monotonic() < deadline, "a view was not tinted"
 
 
 def test_the_pointer_is_told_to_the_server_and_probes_its_own_view(both: Editor) -> None:
