@@ -76,7 +76,7 @@ def _edit(picture: Picture, transfer: Transfer, num_edits: int) -> tuple[Look, i
         _change(rng, term, curve, parameter)
         look = validate(copy.deepcopy(document), transfer.default_look)
         picture.set_look(look)
-        while picture.waiting() is not None:
+        while (need := picture.waiting()) is not None and not need.refines:
             picture.freeze(lambda share: None, lambda: False)
         inexact += not picture.advance(_BUDGET).exact
     return look, inexact

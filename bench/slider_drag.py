@@ -1,0 +1,154 @@
+"""slider.*: a hand drags one slider, along the parameter and along a curve alone.
+
+320×320, the teapot on a table; its highlight, `ggx`, is dragged from roughness 0.15 to 0.75. Error: the worst relative
+RMSE of a shown frame over the pixels of the teapot, its highlight alone lit, against the same look made exact, frame by
+frame. Time: look → picture brought on, median. `one_curve` is the same drag with the operator of θh alone and 64
+coefficients a frame, which was how a slider of several curves was followed before. In the context of the error: both
+drags, the second a slider that moves one curve (σ of `cook_torrance`), by nodes and by wavelets.
+`slider.freeze_ratio`: making the operator along the parameter ÷ along its θh, medians in turn.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.figure import Figure
+from bench.points import freeze_along, lit_points, relative_rmse
+from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from bench.timing import in_turn
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.environments.studio import studio
+from relume.look import Look, validate
+from relume.look.terms import complete_term
+from relume.store import bake_here
+from relume.transfer.base import Recipe
+from relume.transfer.cache import FrozenCache
+from relume.transfer.direct import DirectMethod
+from relume.transfer.opened import Transfer, open_transfer
+from relume.transfer.picture import Picture
+from relume.transfer.slider import linearise
+
+_NAMES = ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")
+_TERM = "/materials/Teapot/terms/1"
+_BUDGETS = (16, 64, None)
+
+
+@dataclass(frozen=True)
+class _Drag:
+    """A slider, and the looks that a drag of it goes through."""
+
+    model: str
+    parameter: str
+    values: NDArray[np.float64]
+
+    @property
+    def document(self) -> dict[str, Any]:
+        return {"model": self.model, "color": [0.9, 0.9, 0.9], "params": {self.parameter: float(self.values[0])}}
+
+    def looks(self, transfer: Transfer) -> list[Look]:
+        """The highlight alone, so that errors are of what moves."""
+        looks = []
+        for value in self.values:
+            document = copy.deepcopy(transfer.default_look)
+            terms = document["materials"]["Teapot"]["terms"]
+            terms[0]["color"] = [0.0, 0.0, 0.0]
+            terms[1] = {**self.document, "params": {self.parameter: float(value)}}
+            looks.append(validate(document, transfer.default_look))
+        return looks
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Both drags, and both freezes."""
+    size, num_lights, num_frames = ((32, 32), 60, 4) if tiny else ((320, 320), 500, 12)
+    several = _Drag("ggx", "roughness", np.linspace(0.15, 0.75, num_frames))
+    alone = _Drag("cook_torrance", "sigma", np.geomspace(0.05, 0.5, num_frames))
+    terms = (LAMBERT, cook_torrance(0.2))
+    scene = teapot_on_table(studio(), terms, terms)
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = Recipe("direct", ("front",), size, num_lights)
+        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"))
+        found = {f"{drag.model}.{drag.parameter}": _ways(transfer, drag) for drag in (several, alone)}
+    ours, before = found["ggx.roughness"]["nodes"], found["ggx.roughness"]["θh alone, 64"]
+    ratio, freezes = _freezes(tiny, several, alone)
+    return [
+        Figure(_NAMES[0], ours["error"], "relative RMSE", {"one_curve": before["error"], "size": list(size), **found}),
+        Figure(_NAMES[1], ours["ms"], "ms", {"one_curve": before["ms"], "size": list(size)}),
+        Figure(_NAMES[2], ratio, "ratio", freezes),
+    ]
+
+
+def _ways(transfer: Transfer, drag: _Drag) -> dict[str, dict[str, float]]:
+    """The drag with nodes, and with the wavelets of θh, so many of them a frame."""
+    exact = _exact(transfer, drag)
+    found = {"nodes": _follow(transfer, drag, "params/" + drag.parameter, None, exact)}
+    for budget in _BUDGETS:
+        name = f"θh alone, {'all' if budget is None else budget}"
+        found[name] = _follow(transfer, drag, "curves/theta_h", budget, exact)
+    return found
+
+
+def _exact(transfer: Transfer, drag: _Drag) -> list[NDArray[np.float32]]:
+    """The pictures of the drag, each of them shaded."""
+    pictures = []
+    for look in drag.looks(transfer):
+        picture = Picture(transfer, "front", FrozenCache(4 << 30))
+        picture.set_look(look)
+        _settle(picture)
+        pictures.append(picture.image())
+    return pictures
+
+
+def _follow(
+    transfer: Transfer, drag: _Drag, touched: str, budget: int | None, exact: list[NDArray[np.float32]]
+) -> dict[str, float]:
+    """Drag with what is touched frozen beforehand, and nothing else made."""
+    looks, seen = drag.looks(transfer), transfer.views["front"].material_ids() == 0
+    picture = Picture(transfer, "front", FrozenCache(4 << 30))
+    picture.set_look(looks[0])
+    _settle(picture)
+    picture.touch(f"{_TERM}/{touched}")
+    picture.freeze(lambda share: None, lambda: False)
+    errors, taken = [], []
+    for look, right in zip(looks[1:], exact[1:], strict=True):
+        began = time.perf_counter()
+        picture.set_look(look)
+        picture.advance(budget)
+        taken.append(time.perf_counter() - began)
+        errors.append(relative_rmse(picture.image()[seen], right[seen]))
+    return {"error": max(errors), "error_median": float(np.median(errors)), "ms": 1e3 * float(np.median(taken))}
+
+
+def _settle(picture: Picture) -> None:
+    while not picture.advance(None).exact or picture.waiting() is not None:
+        if picture.waiting() is not None:
+            picture.freeze(lambda share: None, lambda: False)
+
+
+def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, Mapping[str, Any]]:
+    """Seconds along each parameter and along θh; the ratio is of the first."""
+    num_points, num_lights, size = (60, 80, (32, 32)) if tiny else (6000, 2000, (320, 320))
+    documents = [complete_term(("slider",), drag.document, None) for drag in drags]
+    scene = teapot_on_table(studio(), (documents[0],), (documents[0],))
+    lit = lit_points(scene, size, num_points, num_lights, material=0)
+    calls: dict[str, Callable[[], object]] = {}
+    for drag, document in zip(drags, documents, strict=True):
+        term, along = TERMS[drag.model], linearise(document, drag.parameter)
+        if along is None:
+            raise ValueError(f"{drag.parameter} of {drag.model} has no nodes")
+        bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+        rest = (lit.lights, lit.receivers, lambda share: None, lambda: False)
+        calls[f"{drag.model}.{drag.parameter}, {along.num_columns} nodes"] = partial(along.freeze, term, bands, *rest)
+        calls[f"{drag.model}, θh"] = partial(freeze_along, lit, document, "theta_h")
+    taken = [float(np.median(times)) for times in in_turn(list(calls.values()), 2 if tiny else 5)]
+    return taken[0] / taken[1], {**dict(zip(calls, taken, strict=True)), "view_samples": num_points}
