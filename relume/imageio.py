@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import uuid
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from PIL import Image
 from relume.errors import ParameterError, RelumeError, ShapeMismatchError
 from relume.tonemap import tone_map
 
-__all__ = ["to_bytes", "tone_map", "write_image"]
+__all__ = ["png_bytes", "to_bytes", "tone_map", "write_image"]
 
 F32 = NDArray[np.float32]
 
@@ -23,6 +24,13 @@ F32 = NDArray[np.float32]
 def to_bytes(display: F32) -> NDArray[np.uint8]:
     """Display values in [0, 1], rounded to 0…255. (...)"""
     return (np.clip(display, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def png_bytes(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """A PNG file of RGB or grey pixels. (height, width[, 3])"""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG")
+    return buffer.getvalue()
 
 
 def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str = "agx") -> None:

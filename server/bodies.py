@@ -145,6 +145,7 @@ class MeasuredBody(Body):
     name: str
     created: str
     terms: list[dict[str, Any]]
+    thumbnail: str
     lobes_error: tuple[float, float, float]
     homomorphic_error: tuple[float, float, float]
 

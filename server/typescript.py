@@ -51,6 +51,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,
+    bodies.MeasuredBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

@@ -237,6 +237,18 @@ export interface MaterialMapBody {
   triangles: [number, number, number][];
 }
 
+/** A measured material; looks name it by `data`, `terms` is how it begins. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
+export interface MeasuredBody {
+  id: string;
+  data: string;
+  name: string;
+  created: string;
+  terms: Record<string, unknown>[];
+  thumbnail: string;
+  lobes_error: [number, number, number];
+  homomorphic_error: [number, number, number];
+}
+
 /** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`). */
 export interface ModelBody {
   model: string;

@@ -59,6 +59,7 @@ export interface Look {
 }
 
 /** A library material, its terms in look-document form. */
+export type MeasuredBody = Omit<gen.MeasuredBody, "terms"> & { terms: Term[] };
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 
 /** A scene, its default terms in look-document form. */

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.color import luminance
-from relume.imageio import to_bytes, tone_map
+from relume.imageio import png_bytes, to_bytes, tone_map
 from relume.replacing import Replacing
 from relume.shrink import shrink
 
@@ -28,10 +27,8 @@ def thumbnail(radiance: NDArray[np.float32]) -> bytes:
     small = shrink(radiance, (min(WIDTH, width), min(HEIGHT, height)))
     light = luminance(small)
     mean = float(np.exp(np.mean(np.log(light[light > 0], dtype=np.float64))))
-    buffer = io.BytesIO()
     shown = Image.fromarray(to_bytes(tone_map(small, float(np.log2(_GREY / mean)), "agx")))
-    shown.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR).save(buffer, "PNG")
-    return buffer.getvalue()
+    return png_bytes(np.asarray(shown.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR)))
 
 
 def write_thumbnail(path: Path, radiance: NDArray[np.float32]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.studio import studio
+from relume.imageio import png_bytes, to_bytes, tone_map
 from relume.light.triangles import TriangleLights, subdivide
 from relume.transfer.projector import Receivers
 from relume.transfer.shade import shade
@@ -17,6 +18,8 @@ from relume.transfer.term_image import TermImage
 
 F32 = NDArray[np.float32]
 
+THUMBNAIL_SIZE = 64
+_EXPOSURE = 1.0
 _NUM_LIGHTS = 200
 _FINER = 2  # samples a pixel, along each side
 _BEHIND = 0.05  # radiance around the ball
@@ -44,6 +47,11 @@ def ball_image(documents: Sequence[Mapping[str, Any]], size: int) -> F32:
     picture = np.full((finer, finer, 3), _BEHIND)
     picture[inside] = _shaded(documents, _receivers(x[inside], y[inside]))
     return np.asarray(picture.reshape(size, _FINER, size, _FINER, 3).mean(axis=(1, 3)), np.float32)
+
+
+def ball_png(documents: Sequence[Mapping[str, Any]]) -> bytes:
+    """A tone-mapped PNG of a ball, 64 × 64."""
+    return png_bytes(to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE), _EXPOSURE, "agx")))
 
 
 def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import io
 from collections.abc import AsyncIterator
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
-from PIL import Image
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, ParameterError
+from relume.imageio import png_bytes
 from relume.transfer.base import Plan, Recipe
 from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
 from server.errors import NotReadyError
@@ -91,14 +90,8 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
         if view not in transfer.views:
             raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
-        png = await run_in_threadpool(_png, transfer.views[view])
+        png = await run_in_threadpool(lambda: png_bytes(transfer.views[view].material_ids()))
     return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=31536000, immutable"})
-
-
-def _png(view: Any) -> bytes:
-    buffer = io.BytesIO()
-    Image.fromarray(view.material_ids()).save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 @router.get("/{bake}/environment.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import asdict
 from functools import lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
-from PIL import Image
 
 from relume.errors import NotFoundError
-from relume.imageio import to_bytes
 from relume.look.library import navigation_map, presets
 from relume.look.terms import complete_term
-from relume.tonemap import tone_map
 from server.bodies import MapPoint, MaterialBody, MaterialMapBody
 
 router = APIRouter(prefix="/api/materials", tags=["materials"])
-THUMBNAIL_SIZE = 64
-_EXPOSURE = 1.0
 Part = Annotated[str, Path(max_length=100)]
 
 
@@ -62,13 +56,9 @@ async def thumbnail(table: Part, material: Part) -> Response:
 
 @lru_cache(maxsize=1024)
 def _thumbnail(identity: str) -> bytes:
-    from relume.transfer.ball import ball_image  # loads compiled kernels
+    from relume.transfer.ball import ball_png  # loads compiled kernels
 
     preset = next((preset for preset in presets() if preset.id == identity), None)
     if preset is None:
         raise NotFoundError(f"the library has no material {identity[:80]!r}; GET /api/materials lists them")
-    terms = [complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)]
-    shown = tone_map(ball_image(terms, THUMBNAIL_SIZE), _EXPOSURE, "agx")
-    buffer = io.BytesIO()
-    Image.fromarray(to_bytes(shown)).save(buffer, "PNG")
-    return buffer.getvalue()
+    return ball_png([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
+from relume.look.terms import complete_term
 from relume.measured.shelf import SHELF, MaterialRecord, get_record, keep, records
 from relume.shelf import check_name
 from server.bodies import Id, MeasuredBody
@@ -53,11 +55,30 @@ def get_measured(material: Id, services: Shared) -> MeasuredBody:
     return _body(get_record(materials_path(services.settings.data), material))
 
 
+@router.get("/{material}/thumbnail.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+async def get_thumbnail(material: Id, services: Shared) -> Response:
+    """A ball of the material."""
+    record = get_record(materials_path(services.settings.data), material)
+    png = await run_in_threadpool(_thumbnail, record)
+    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+
+
+@lru_cache(maxsize=256)
+def _thumbnail(record: MaterialRecord) -> bytes:
+    from relume.transfer.ball import ball_png  # loads compiled kernels
+
+    return ball_png(_terms(record))
+
+
 @router.delete("/{material}", status_code=204)
 def delete_measured(material: Id, services: Shared) -> Response:
     """Delete a measured material; looks that name it are refused from then on."""
     SHELF.remove(materials_path(services.settings.data), material)
     return Response(status_code=204)
+
+
+def _terms(record: MaterialRecord) -> list[dict[str, Any]]:
+    return [complete_term(("measured", k), term, None) for k, term in enumerate(record.terms())]
 
 
 def _body(record: MaterialRecord) -> MeasuredBody:
@@ -66,7 +87,8 @@ def _body(record: MaterialRecord) -> MeasuredBody:
         data=record.data,
         name=record.name,
         created=datetime.fromtimestamp(record.created, UTC).isoformat(),
-        terms=record.terms(),
+        terms=_terms(record),
+        thumbnail=f"/api/materials/measured/{record.id}/thumbnail.png",
         lobes_error=record.lobes_error,
         homomorphic_error=record.homomorphic_error,
     )

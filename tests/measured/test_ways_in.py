@@ -1,10 +1,13 @@
 """Measured materials by the command line and over HTTP."""
 
+import io
 import json
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from merl_files import planes_of
+from PIL import Image
 
 from cli.main import main
 from relume.measured.merl import is_measured, read_merl, write_merl
@@ -72,6 +75,9 @@ def test_rest_imports_lists_shows_and_deletes(home, red, tmp_path):
         assert [term["model"] for term in made["terms"]] == ["measured_lv", "measured_hd"]
         assert max(made["lobes_error"]) < 0.01
         assert client.get(url).json() == [made] == [client.get(f"{url}/{made['id']}").json()]
+        ball = np.asarray(Image.open(io.BytesIO(client.get(made["thumbnail"]).content)), int)
+        assert ball.shape == (64, 64, 3)
+        assert ball[16:48, 16:48, 0].mean() > 1.5 * ball[16:48, 16:48, 2].mean()
         needing = [m["model"] for m in client.get("/api/models").json() if m["needs_data"]]
         assert needing == ["measured_lv", "measured_hd", "measured_hf"]
         assert client.delete(f"{url}/{made['id']}").status_code == 204

@@ -1,15 +1,32 @@
-/** Measured materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
+/** Materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
+import { useRef } from "preact/hooks";
 import { IconButton } from "../ui/Button";
-import { materialThumbnail } from "../net/api";
 import { models, selectedMaterial } from "../state/store";
 import { NavigationMap } from "./NavigationMap";
-import { DRAG_TYPE, fittedModels, group, groups, libraryOpen, model, putOnSelected, shown } from "./library";
+import {
+  DRAG_TYPE,
+  fittedModels,
+  group,
+  groups,
+  importMeasured,
+  libraryOpen,
+  MEASURED,
+  model,
+  putOnSelected,
+  sending,
+  shown,
+} from "./library";
 
 function Filters() {
   const label = (name: string) => models.value.find((info) => info.model === name)?.label ?? name;
   return (
     <div class="library-filters">
-      <select aria-label="Kind" value={group.value} onChange={(event) => (group.value = event.currentTarget.value)}>
+      <select
+        aria-label="Kind"
+        value={group.value}
+        disabled={model.value === MEASURED}
+        onChange={(event) => (group.value = event.currentTarget.value)}
+      >
         <option value="all">all kinds</option>
         {groups.value.map((name) => (
           <option key={name}>{name}</option>
@@ -21,7 +38,29 @@ function Filters() {
             {label(name)}
           </option>
         ))}
+        <option value={MEASURED}>imported measurements</option>
       </select>
+    </div>
+  );
+}
+
+function ImportMeasured() {
+  const picker = useRef<HTMLInputElement>(null);
+  const take = (event: Event) => {
+    const input = event.currentTarget as HTMLInputElement;
+    const file = input.files?.[0];
+    input.value = "";
+    if (file !== undefined) void importMeasured(file);
+  };
+  return (
+    <div class="library-import">
+      <input ref={picker} type="file" accept=".binary" aria-label="Measured material" hidden onChange={take} />
+      <button disabled={sending.value !== null} onClick={() => picker.current?.click()}>
+        Import a measured material…
+      </button>
+      {sending.value !== null && (
+        <span role="status">{sending.value < 1 ? `Sending, ${Math.round(100 * sending.value)} %` : "Factorising…"}</span>
+      )}
     </div>
   );
 }
@@ -40,16 +79,20 @@ export function LibraryPanel() {
       </p>
       <NavigationMap />
       <Filters />
+      <ImportMeasured />
+      {shown.value.length === 0 && model.value === MEASURED && (
+        <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>
+      )}
       <ul class="library-balls">
         {shown.value.map((material) => (
           <li key={material.id}>
             <button
               draggable
-              title={`${material.name}. ${material.source}`}
+              title={material.about}
               onClick={() => putOnSelected(material.id)}
               onDragStart={(event) => event.dataTransfer?.setData(DRAG_TYPE, material.id)}
             >
-              <img src={materialThumbnail(material.id)} alt="" width={64} height={64} loading="lazy" />
+              <img src={material.thumbnail} alt="" width={64} height={64} loading="lazy" />
               <span>{material.name}</span>
             </button>
           </li>

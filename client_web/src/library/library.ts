@@ -1,7 +1,8 @@
-/** The library of measured materials: what it holds, and putting one onto an object. */
+/** The library: fitted materials, measurements that were imported here, and putting one onto an object. */
 import { computed, signal } from "@preact/signals";
-import { listMaterials } from "../net/api";
-import type { MaterialBody } from "../protocol";
+import { listMaterials, listMeasured, materialThumbnail } from "../net/api";
+import { uploadMeasured } from "../net/upload";
+import type { MaterialBody, MeasuredBody, Term } from "../protocol";
 import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
 import { select } from "../state/select";
@@ -9,33 +10,77 @@ import { selectedMaterial } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 
 export const DRAG_TYPE = "application/x-relume-material";
+/** Among the models: what was measured and is not fitted. */
+export const MEASURED = "measured";
+
+/** What a ball of the library stands for. */
+interface Entry {
+  id: string;
+  name: string;
+  about: string;
+  thumbnail: string;
+  terms: Term[];
+}
+
 export const libraryOpen = signal(false);
 export const library = signal<MaterialBody[]>([]);
+const measured = signal<MeasuredBody[]>([]);
 export const group = signal("all");
 export const model = signal("cook_torrance");
+/** Share of a measurement that has been sent; null while none is on its way. */
+export const sending = signal<number | null>(null);
 
 const uniqueOf = (values: string[]) => [...new Set(values)].sort();
 export const groups = computed(() => uniqueOf(library.value.map((material) => material.group)));
 export const fittedModels = computed(() => uniqueOf(library.value.map((material) => material.model)));
 
+function fittedEntry({ id, name, source, terms }: MaterialBody): Entry {
+  return { id, name, about: `${name}. ${source}`, thumbnail: materialThumbnail(id), terms };
+}
+
+function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): Entry {
+  return { id, name, about: `${name}, measured. Exact until its curves are edited.`, thumbnail, terms };
+}
+
 /** One entry a material and source, of the model and group that are chosen. */
-export const shown = computed(() =>
-  library.value.filter((m) => m.model === model.value && (group.value === "all" || m.group === group.value)),
+export const shown = computed<Entry[]>(() =>
+  model.value === MEASURED
+    ? measured.value.map(measuredEntry)
+    : library.value
+        .filter((m) => m.model === model.value && (group.value === "all" || m.group === group.value))
+        .map(fittedEntry),
 );
 
 export async function openLibrary(): Promise<void> {
   libraryOpen.value = !libraryOpen.value;
   if (library.value.length > 0) return;
   await attempt(async () => {
-    library.value = await listMaterials();
+    [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
+  });
+}
+
+/** Import a MERL file and show it among the measurements. */
+export async function importMeasured(file: File): Promise<void> {
+  await attempt(async () => {
+    sending.value = 0;
+    try {
+      const made = await uploadMeasured(file, (share) => (sending.value = share));
+      measured.value = await listMeasured();
+      model.value = MEASURED;
+      note(`${made.name} is in the library.`);
+    } finally {
+      sending.value = null;
+    }
   });
 }
 
 /** Give an object the terms of a library material. */
 export function putOn(target: string, id: string): void {
-  const material = library.value.find((entry) => entry.id === id);
-  if (material === undefined) return;
-  edit(material.name, pointer("materials", target, "terms"), material.terms);
+  const entry =
+    library.value.filter((material) => material.id === id).map(fittedEntry)[0] ??
+    measured.value.filter((material) => material.id === id).map(measuredEntry)[0];
+  if (entry === undefined) return;
+  edit(entry.name, pointer("materials", target, "terms"), entry.terms);
   select(target);
 }
 

@@ -6,6 +6,7 @@ import type {
   EnvironmentBody,
   MaterialBody,
   MaterialMapBody,
+  MeasuredBody,
   ModelInfo,
   Problem,
   RenderBody,
@@ -65,6 +66,7 @@ export const listScenes = () => get<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
 export const listModels = () => get<ModelInfo[]>("/api/models");
 export const listMaterials = () => get<MaterialBody[]>("/api/materials");
+export const listMeasured = () => get<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => get<MaterialMapBody>("/api/materials/map");
 export const materialAt = (f0: number, sigma: number) => get<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
 /** Of a library material, whose id is "table/material". */

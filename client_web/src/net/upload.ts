@@ -1,5 +1,5 @@
 /** Imports: multipart uploads with progress, which fetch cannot report. */
-import type { EnvironmentBody, SceneBody } from "../protocol";
+import type { EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
 import { ApiError } from "./api";
 
 export interface Upload {
@@ -49,4 +49,11 @@ export function uploadEnvironment(file: File, progress: (fraction: number) => vo
   const form = new FormData();
   form.append("environment", file);
   return post("/api/environments", form, progress) as Promise<EnvironmentBody>;
+}
+
+/** A MERL file; what it is called in the library is its file's name. */
+export function uploadMeasured(file: File, progress: (fraction: number) => void): Promise<MeasuredBody> {
+  const form = new FormData();
+  form.append("material", file);
+  return post("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
 }
