@@ -1,7 +1,8 @@
 """bake.ray_saving: shadow rays of a full trace ÷ those that the bake traced, and what that changed.
 
 The built-in scene, one view, baked twice: as always, and with every ray traced. The row has the bits that differ, the
-bake's own estimate of them, and the relative RMSE between both pictures: of the scene's own look and all Lambert.
+bake's own estimate of them, the relative RMSE between both pictures (of the scene's own look and all Lambert), and the
+wall time of each bake, which is also given as a multiple of its seconds in the kernels that trace and predict.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from bench.figure import Figure
 from bench.points import relative_rmse
 from bench.scenes import LAMBERT
+from bench.timing import seconds
 from relume.look import complete, validate
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
@@ -38,15 +40,23 @@ class _EveryRay(DirectMethod):
         return Written({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 
 
+_BAKES = (DirectMethod(), _EveryRay())
+
+
+def _times(method: DirectMethod, scene: Scene, recipe: Recipe, path: Path) -> tuple[float, float]:
+    """Seconds of a whole bake, and those in which it traced and predicted."""
+    written: list[Written] = []
+    wall_s = seconds(lambda: bake_here(method, scene, recipe, path, lambda _, one: written.append(one)))
+    return wall_s, sum(one.trace_s for one in written)
+
+
 def measure(tiny: bool) -> list[Figure]:
     """Two bakes, two pictures of each."""
     scene = demo_scene()
     recipe = Recipe("direct", ("front",), (64, 48) if tiny else (640, 480), 60 if tiny else 2000)
     with tempfile.TemporaryDirectory() as folder:
-        paths = [
-            bake_here(method, scene, recipe, Path(folder) / f"{k}.zarr")
-            for k, method in enumerate((DirectMethod(), _EveryRay()))
-        ]
+        paths = [Path(folder) / f"{k}.zarr" for k in range(2)]
+        saving, full = (_times(bake, scene, recipe, path) for bake, path in zip(_BAKES, paths, strict=True))
         rays = read_rays(open_store(paths[0]))
         bits = [np.unpackbits(open_store(path).read("views/0/visibility")) for path in paths]
         context = {
@@ -55,6 +65,10 @@ def measure(tiny: bool) -> list[Figure]:
             "wrong_bits": float(np.count_nonzero(bits[0] != bits[1]) / rays.full),
             "estimated_by_the_bake": rays.wrong_share,
             **_changes(scene, paths),
+            "wall_s": saving[0],
+            "wall_s_of_every_ray": full[0],
+            "wall_vs_rays": saving[0] / saving[1],
+            "wall_vs_rays_of_every_ray": full[0] / full[1],
             "size": list(recipe.size),
             "lights": recipe.num_lights,
         }
