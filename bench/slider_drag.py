@@ -13,7 +13,7 @@ from __future__ import annotations
 import copy
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -135,7 +135,7 @@ def _settle(picture: Picture) -> None:
             picture.freeze(lambda share: None, lambda: False)
 
 
-def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, Mapping[str, Any]]:
+def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, dict[str, Any]]:
     """Seconds along each parameter and along θh; the ratio is of the first."""
     num_points, num_lights, size = (60, 80, (32, 32)) if tiny else (6000, 2000, (320, 320))
     documents = [complete_term(("slider",), drag.document, None) for drag in drags]
