@@ -35,7 +35,7 @@ class _EveryRay(DirectMethod):
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         position = store.read(f"views/{k}/position", task.start, task.stop)
         normal = store.read(f"views/{k}/normal", task.start, task.stop)
-        embree = self._geometry_of(scene).embree
+        embree = self.geometry_of(scene).embree
         traced = trace_visibility(embree, position, normal, read_lights(store).direction)
         return Written({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 

@@ -34,7 +34,7 @@ class Cells:
     Attributes:
         position: of the points that stand for a cell, off the surface. (C, `POINTS_A_CELL`, 3) float32
         normal: shading normals there. (C, `POINTS_A_CELL`, 3) float32
-        diffuse: texture channel, its mean over the cell's points. (C, 3) float32
+        diffuse, specular: texture channels, their means over the cell's points. (C, 3) float32
         material: index into the scene's materials. (C,) uint16
     """
 
@@ -42,6 +42,7 @@ class Cells:
     position: F32
     normal: F32
     diffuse: F32
+    specular: F32
     material: NDArray[np.uint16]
 
     @property
@@ -87,5 +88,6 @@ def choose_cells(
         surface.position.reshape(shape),
         surface.normal.reshape(shape),
         surface.diffuse.reshape(shape).mean(axis=1),
+        surface.specular.reshape(shape).mean(axis=1),
         geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),
     )

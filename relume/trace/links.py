@@ -79,7 +79,7 @@ def _cell_of(packet, words, lane, surfaces, tree):  # type: ignore[no-untyped-de
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
-    intersect, scene, arguments, points, surfaces, tree, pattern, first_point, start, stop, links
+    intersect, scene, arguments, points, surfaces, tree, pattern, numbers, start, stop, links
 ):
     """Trace all rays of points [start, stop); returns how many.
 
@@ -99,7 +99,7 @@ def _trace(  # type: ignore[no-untyped-def]
         ox = t[0] * wo[0] + t[1] * wo[1] + t[2] * wo[2]
         oy = b[0] * wo[0] + b[1] * wo[1] + b[2] * wo[2]
         oz = n[0] * wo[0] + n[1] * wo[1] + n[2] * wo[2]
-        shift_u, shift_v = shift_of(pattern, first_point + p)
+        shift_u, shift_v = shift_of(pattern, numbers[p])
         for axis in range(3):
             packet[axis * 16 : (axis + 1) * 16] = position[p, axis]
         links[p] = NO_CELL
@@ -126,11 +126,13 @@ def _trace(  # type: ignore[no-untyped-def]
     return num_rays
 
 
-def trace_links(geometry: Geometry, tree: CellTree, points: Gatherers, pattern: Pattern, first_point: int) -> Links:
+def trace_links(
+    geometry: Geometry, tree: CellTree, points: Gatherers, pattern: Pattern, numbers: NDArray[np.uint32]
+) -> Links:
     """Trace all rays of points.
 
     Args:
-        first_point: number of the first of them among all that share the pattern; it decides their shifts.
+        numbers: of the points among all that share the pattern; they decide their shifts. (n,) uint32
     Cost: O(n · rays · (log triangles + log cells)) time.
     """
     links = np.empty((len(points.position), len(pattern.uv)), np.uint16)
@@ -143,7 +145,7 @@ def trace_links(geometry: Geometry, tree: CellTree, points: Gatherers, pattern: 
         counts.append(
             _trace(
                 intersect16, geometry.embree.handle, arguments.ctypes.data, arrays, surfaces, tree, pattern,
-                first_point, start, stop, links,
+                numbers, start, stop, links,
             )
         )  # fmt: skip
 

@@ -38,7 +38,7 @@ _SAMPLES_A_PIXEL = 1.5  # upper bound over the scenes measured; edges have two o
 _SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
 
 
-class _Sampled(NamedTuple):
+class Sampled(NamedTuple):
     """What every task of the second stage needs of the first.
 
     Attributes:
@@ -54,15 +54,15 @@ class DirectMethod:
     """Implements `relume.transfer.base.TransferMethod`."""
 
     name = "direct"
-    stages = ("samples", "visibility")
+    stages: tuple[str, ...] = ("samples", "visibility")
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._geometry: tuple[str, Geometry] | None = None
-        self._sampled: _Sampled | None = None
+        self._sampled: Sampled | None = None
 
     def __reduce__(self) -> tuple[type[DirectMethod], tuple[()]]:
-        return DirectMethod, ()  # travels to workers without what it keeps
+        return type(self), ()  # travels to workers without what it keeps
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
@@ -108,7 +108,7 @@ class DirectMethod:
         ranges = [
             (view, start, min(start + SHARD_ROWS, rows))
             for k, view in enumerate(recipe.views)
-            for rows in [self._sampled_of(store).num_surface_samples[k]]
+            for rows in [self.sampled_of(store).num_surface_samples[k]]
             for start in range(0, rows, SHARD_ROWS)
         ]
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
@@ -118,7 +118,7 @@ class DirectMethod:
         if stage == 0:
             return []
         bits = (store.shape("lights/power")[0] + 7) // 8
-        num_surface_samples = self._sampled_of(store).num_surface_samples
+        num_surface_samples = self.sampled_of(store).num_surface_samples
         return [
             ArraySpec(
                 f"views/{k}/visibility",
@@ -136,7 +136,7 @@ class DirectMethod:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
             return Written(self._lights(scene, recipe), 0, 0.0)
-        samples = sample_view(scene, self._geometry_of(scene), task.view, recipe.size)
+        samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
         surface = samples.surface
         arrays: dict[str, NDArray[Any]] = {
             "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
@@ -158,23 +158,25 @@ class DirectMethod:
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        found = trace_coherent(self._geometry_of(scene).embree, position, normal, self._sampled_of(store).targets)
+        found = trace_coherent(self.geometry_of(scene).embree, position, normal, self.sampled_of(store).targets)
         rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
         arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
         return Written(arrays, found.rays.traced, found.trace_s)
 
-    def _geometry_of(self, scene: Scene) -> Geometry:
+    def geometry_of(self, scene: Scene) -> Geometry:
+        """The scene's triangles, built once for all tasks of a process."""
         with self._lock:
             if self._geometry is None or self._geometry[0] != scene.id:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
 
-    def _sampled_of(self, store: StoreReader) -> _Sampled:
+    def sampled_of(self, store: StoreReader) -> Sampled:
+        """What the first stage has written, read once for all tasks of a store."""
         with self._lock:
             if self._sampled is None or self._sampled.store is not store:
                 views = range(len(store.attributes["views"]))
                 rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
-                self._sampled = _Sampled(store, _targets(store), rows)
+                self._sampled = Sampled(store, _targets(store), rows)
             return self._sampled
 
 

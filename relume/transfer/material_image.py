@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.compose import add_term
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import View
@@ -19,7 +18,7 @@ F32 = NDArray[np.float32]
 class MaterialImage:
     """State of one material in one view."""
 
-    def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]], light: Hashable) -> None:
         self._view, self.index = view, index
         rows = view.rows(index)
         self.num_samples = rows.stop - rows.start
@@ -27,8 +26,8 @@ class MaterialImage:
         self._cos_theta_o = view.cos_theta_o[rows]
         self._textures = {name: texture[rows] for name, texture in view.textures.items()}
         self.documents = list(documents)
-        self._environment = BAKED_ENVIRONMENT
-        self.terms = [TermImage(document, self._cos_theta_o) for document in documents]
+        self._light = light
+        self.terms = [TermImage(document, self._cos_theta_o, light) for document in documents]
         self._is_current = False
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
@@ -38,18 +37,18 @@ class MaterialImage:
         kept = len(self.terms)
         for k, document in enumerate(documents):
             if k >= kept:
-                self.terms.append(TermImage(document, self._cos_theta_o, self._environment))
+                self.terms.append(TermImage(document, self._cos_theta_o, self._light))
             elif document != self.documents[k]:
                 self.terms[k].set_document(document)
         del self.terms[len(documents) :]
         self.documents = list(documents)
         self._is_current = False
 
-    def set_environment(self, environment: EnvironmentKey) -> None:
+    def set_light(self, light: Hashable) -> None:
         """It is lit by this from now on."""
-        self._environment = environment
+        self._light = light
         for term in self.terms:
-            term.set_environment(environment)
+            term.set_light(light)
 
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.frozen import Frozen, frozen_bytes
 from relume.transfer.material_image import MaterialImage
-from relume.transfer.projector import contract
+from relume.transfer.projector import Receivers, contract
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
-from relume.transfer.view_images import ViewImages
+from relume.transfer.view_images import Light, ViewImages
 
 
 class Candidate(NamedTuple):
@@ -44,7 +43,7 @@ class Need:
     Attributes:
         what: in words. key: its name in the cache; equal keys are the same need.
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
-        environment: what lights it.
+        light: what arrives at it.
         is_default: the term is one of the scene's own look, whose images are kept beside the store.
         refines: the picture is near its look without it; it can wait until the hand rests.
     """
@@ -59,7 +58,7 @@ class Need:
     bands: Mapping[str, NDArray[np.float64]]
     active: Along | None
     num_bytes: int
-    environment: EnvironmentKey
+    light: Light
     is_default: bool
     refines: bool
 
@@ -77,15 +76,16 @@ class Need:
             CancelledError: `cancelled` said so.
         """
         images, active = self.images, self.active
-        lights = images.transfer.lights_in(self.environment)
+        lights = images.transfer.lights_in(self.light.environment)
+
+        def receivers() -> Receivers:
+            return images.view.receivers(self.material.index, images.transfer.reflected_in(*self.light))
 
         def frozen(along: Along) -> Frozen:
-            receivers = images.view.receivers(self.material.index)
-            return along.freeze(self.term, self.bands, lights, receivers, progress, cancelled)
+            return along.freeze(self.term, self.bands, lights, receivers(), progress, cancelled)
 
         def shaded() -> Shaded:
-            receivers = images.view.receivers(self.material.index)
-            return shade(self.term, self.bands, lights, receivers, progress, cancelled)
+            return shade(self.term, self.bands, lights, receivers(), progress, cancelled)
 
         def shaded_once() -> Shaded:
             if not self.is_default:
@@ -206,7 +206,7 @@ def _need(images: ViewImages, candidate: Candidate, *, refines: bool) -> Need:
         bands=image.target,
         active=along,
         num_bytes=candidate.num_bytes,
-        environment=images.environment,
-        is_default=images.environment == BAKED_ENVIRONMENT and image.document in images.default.materials[name].terms,
+        light=images.light,
+        is_default=images.light == images.default_light and image.document in images.default.materials[name].terms,
         refines=refines,
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
 from relume.store import open_store
 from relume.transfer.base import StoreReader
 from relume.transfer.derived import DerivedImages
-from relume.transfer.stored import read_lights, read_tiles
+from relume.transfer.gathered import CellLight, Reflectances
+from relume.transfer.stored import read_cells, read_lights, read_tiles
 from relume.transfer.view import View, open_view
 
 _LIGHTS_KEPT = 4
@@ -32,6 +34,7 @@ class Transfer:
     Attributes:
         key: path of the store; tells this bake's frozen operators from other bakes' in a shared cache.
         default_look: the complete look of the scene as it was imported.
+        cells: gather cells, where light that surfaces reflect was baked.
     """
 
     key: str
@@ -41,7 +44,9 @@ class Transfer:
     num_lights: int
     default_look: dict[str, Any]
     material_names: Sequence[str]
+    cells: CellLight | None
     views: dict[str, View]
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @cached_property
     def derived(self) -> DerivedImages:
@@ -74,6 +79,19 @@ class Transfer:
         tiles = read_tiles(self.store)
         return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(tiles, self.radiance_of(key.map), key.rotation))
 
+    def reflected_in(self, environment: EnvironmentKey, reflectances: Reflectances) -> NDArray[np.float32] | None:
+        """Radiance of the gather cells; None where there are none."""
+        if self.cells is None:
+            return None
+        with self._lock:
+            return self._reflected(environment, reflectances)
+
+    @cached_property
+    def _reflected(self) -> Callable[[EnvironmentKey, Reflectances], NDArray[np.float32]]:
+        assert self.cells is not None
+        radiance = self.cells.radiance
+        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key, reflectances: radiance(self.lights_in(key), reflectances))
+
     def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
         """Radiance of a view's samples of an environment. (n, 3) float32"""
         if environment == BAKED_ENVIRONMENT:
@@ -99,6 +117,7 @@ def open_transfer(path: Path) -> Transfer:
             num_lights=found["num_lights"],
             default_look=complete({}, found["look"]),
             material_names=tuple(found["materials"]),
+            cells=read_cells(store) if "gather_rays" in found else None,
             views={view["name"]: open_view(store, k) for k, view in enumerate(found["views"])},
         )
     except (KeyError, TypeError, IndexError, ParameterError) as error:

@@ -53,15 +53,15 @@ class Picture:
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._shown_environment = self._images.environment
+        self._shown_environment = self._images.light.environment
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
-        before = self._images.environment
+        before = self._images.light.environment
         self._images.set_look(look)
-        if self._images.environment != before:
+        if self._images.light.environment != before:
             self._touched = None  # the hand has moved on to the environment
         self._moved = moved_parameter(self._look, look)
         self._look = look
@@ -129,7 +129,7 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        environment = images.environment
+        environment = images.light.environment
         if environment != self._shown_environment or not np.array_equal(self._gain, self._look.environment.gain):
             self._gain, self._shown_environment = np.array(self._look.environment.gain), environment
             first = self._view.num_surface_samples

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.transfer.eight_bands import NUM as EIGHT
+from relume.transfer.gathered import GatherRays, RayProjector
 from relume.transfer.listing import list_lights
 from relume.transfer.project_kernel import project_points
 
@@ -34,12 +35,14 @@ class Receivers:
     Attributes:
         normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32, unit
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon. (n, bytes) uint8
+        rays: light that arrives by reflection; None where only the lights themselves are meant.
     """
 
     normal: F32
     tangent: F32
     wo: F32
     visible: NDArray[np.uint8]
+    rays: GatherRays | None = None
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,9 @@ class Projector:
         self._first = np.empty(_POINTS_A_BLOCK + 1, np.int64)
         self._light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
+        self._rays = None
+        if receivers.rays is not None:
+            self._rays = RayProjector(term, contraction, receivers, receivers.rays, _POINTS_A_BLOCK)
 
     def project(self, start: int, stop: int) -> F32:
         """Transport of points [start, stop) along the free curve, in its bands.
@@ -164,6 +170,8 @@ class Projector:
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
+            if self._rays is not None:
+                self._rays.add(block, end, out[block - start : end - start])
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:

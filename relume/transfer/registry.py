@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from relume.transfer.base import TransferMethod
 from relume.transfer.direct import DirectMethod
+from relume.transfer.gather import GatherMethod
 
-METHODS: dict[str, TransferMethod] = {method.name: method for method in (DirectMethod(),)}
+METHODS: dict[str, TransferMethod] = {method.name: method for method in (DirectMethod(), GatherMethod())}

@@ -1,16 +1,22 @@
-"""Lights and receivers as a store of the direct method keeps them."""
+"""Lights, receivers, gather cells and rays as a store keeps them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import TEXTURES
 from relume.errors import StoreError
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
+from relume.trace.cell_tree import CellTree
 from relume.trace.coherent import RayCounts
+from relume.trace.gather_rays import Pattern, make_pattern
 from relume.transfer.base import StoreReader
+from relume.transfer.gathered import CellLight, GatherRays
 from relume.transfer.projector import Receivers
+
+F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
 
@@ -26,6 +32,36 @@ def read_tiles(store: StoreReader) -> Tiles:
     if not tiles.is_whole():
         raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
     return tiles
+
+
+def read_tree(store: StoreReader) -> CellTree:
+    """The tree over a store's gather cells."""
+    return CellTree(*(store.read(f"cells/{name}") for name in CellTree._fields))
+
+
+def read_cells(store: StoreReader) -> CellLight:
+    """The gather cells of a store."""
+    normal = store.read("cells/normal")
+    return CellLight(
+        normal,
+        store.read("cells/visibility").reshape(*normal.shape[:2], -1),
+        store.read("cells/links"),
+        store.read("cells/material"),
+        np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
+    )
+
+
+def pattern_of_material(store: StoreReader, k: int, material: int) -> Pattern:
+    """The gather rays of a material's samples in the k-th view."""
+    num_cosine, num_glossy = store.attributes["gather_rays"][material]
+    return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
+
+
+def read_gather_rays(store: StoreReader, k: int, material: int, start: int, stop: int, radiance: F32) -> GatherRays:
+    """Rays of samples [start, stop) of the k-th view, all of one material. radiance: of cells"""
+    links = store.read(f"views/{k}/links", start, stop)
+    numbers = store.read(f"views/{k}/number", start, stop)
+    return GatherRays(links, pattern_of_material(store, k, material), numbers, radiance)
 
 
 def read_rays(store: StoreReader) -> RayCounts:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.errors import EditError
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.transfer.along import Along
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.shade import Shaded
@@ -40,10 +39,8 @@ class TermImage:
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
 
-    def __init__(
-        self, document: Mapping[str, Any], cos_theta_o: F64, environment: EnvironmentKey = BAKED_ENVIRONMENT
-    ) -> None:
-        self._environment = environment
+    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, light: Hashable = None) -> None:
+        self._light = light
         self._theta_o = np.arccos(cos_theta_o)
         self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
         self.effective: dict[str, F64] | None = None
@@ -57,7 +54,7 @@ class TermImage:
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
         model: str = document["model"]
-        kind = (model, TERMS[model].fixed_values(document), self._environment)
+        kind = (model, TERMS[model].fixed_values(document), self._light)
         if kind != self.kind:
             self.effective = self.active = self.shown = None
             self.is_near = False
@@ -70,9 +67,9 @@ class TermImage:
         self.outgoing = self._outgoing()
         self.is_composed = False
 
-    def set_environment(self, environment: EnvironmentKey) -> None:
+    def set_light(self, light: Hashable) -> None:
         """Other light: what the image shows counts for nothing, but stands until there is a new one."""
-        self._environment = environment
+        self._light = light
         self.set_document(self.document)
 
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:

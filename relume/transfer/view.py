@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from relume.errors import ChunkDamagedError
 from relume.trace.view_samples import BACKGROUND
 from relume.transfer.base import StoreReader
 from relume.transfer.projector import Receivers
-from relume.transfer.stored import read_receivers
+from relume.transfer.stored import read_gather_rays, read_receivers
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
@@ -58,11 +58,19 @@ class View:
         """The samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
-    def receivers(self, material: int) -> Receivers:
-        """A material's samples as points that light arrives at; reads the store."""
+    def receivers(self, material: int, reflected: F32 | None = None) -> Receivers:
+        """A material's samples as points that light arrives at; reads the store.
+
+        Args:
+            reflected: radiance of gather cells, whose light arrives too; from `Transfer.reflected_in`.
+        """
         rows = self.rows(material)
         visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
-        return read_receivers(self.store, self.index, rows.start, rows.stop, visible)
+        receivers = read_receivers(self.store, self.index, rows.start, rows.stop, visible)
+        if reflected is None:
+            return receivers
+        rays = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
+        return replace(receivers, rays=rays)
 
     def background(self) -> F32:
         """Radiance of the samples after the surfaces. (n, 3) float32"""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from typing import NamedTuple
 
+from relume.brdf.albedo import reflectances_of
 from relume.errors import ParameterError
-from relume.look import BAKED_ENVIRONMENT, Look, validate
+from relume.look import EnvironmentKey, Look, validate
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
+from relume.transfer.gathered import Reflectances
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import CurvePointer, ParameterPointer
@@ -16,34 +19,51 @@ from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
 
 
+class Light(NamedTuple):
+    """What arrives at surfaces: pictures of equal light need the same operators.
+
+    Attributes:
+        reflectances: of all materials, for light that they reflect onto each other; none where that was not baked.
+    """
+
+    environment: EnvironmentKey
+    reflectances: Reflectances
+
+
 class ViewImages:
     """Found by name, by pointer, and by what the cache knows them as.
 
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
-        environment: what lights them.
+        light: what arrives at them. default_light: what does under the scene's own look.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
         self.default = validate(transfer.default_look, transfer.default_look)
-        self.environment = BAKED_ENVIRONMENT
+        self.light = self.default_light = self._light_of(self.default)
         self.by_name = {
-            name: MaterialImage(self.view, index, self.default.materials[name].terms)
+            name: MaterialImage(self.view, index, self.default.materials[name].terms, self.light)
             for index, name in enumerate(transfer.material_names)
         }
 
     def set_look(self, look: Look) -> None:
         """A new target for every term. Raises what `Transfer.radiance_of` raises; then nothing has changed."""
-        environment = look.environment.key
-        if environment != self.environment:
-            self.transfer.radiance_of(environment.map)
-            self.environment = environment
+        light = self._light_of(look)
+        if light != self.light:
+            self.transfer.radiance_of(light.environment.map)
+            self.light = light
             for material in self.by_name.values():
-                material.set_environment(environment)
+                material.set_light(light)
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
+
+    def _light_of(self, look: Look) -> Light:
+        if self.transfer.cells is None:
+            return Light(look.environment.key, ())
+        terms = (look.materials[name].terms for name in self.transfer.material_names)
+        return Light(look.environment.key, tuple(map(reflectances_of, terms)))
 
     def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, TermImage]:
         """The material and the term of a pointer in the look as it is now.

@@ -102,7 +102,7 @@ def test_links_are_those_of_first_hits(box):
     """Every ray's first hit, traced by itself and located by hand."""
     _, geometry, cells = box
     points, pattern = points_of(cells, 40), make_pattern(24, 9, 3)
-    links = trace_links(geometry, cells.tree, points, pattern, first_point=100)
+    links = trace_links(geometry, cells.tree, points, pattern, np.arange(100, 140, dtype=np.uint32))
     normals = face_normals(geometry)
     origins, directions, expected_of = [], [], []
     for p in range(40):
@@ -135,10 +135,10 @@ def test_links_are_those_of_first_hits(box):
 
 def test_order_and_division_of_points_do_not_matter(box):
     _, geometry, cells = box
-    points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
-    whole = trace_links(geometry, cells.tree, points, pattern, 0).cell
+    points, pattern, numbers = points_of(cells, 30), make_pattern(16, 0, 3), np.arange(30, dtype=np.uint32)
+    whole = trace_links(geometry, cells.tree, points, pattern, numbers).cell
     part = Gatherers(*(a[11:23] for a in (points.position, points.normal, points.tangent, points.wo)))
-    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, pattern, 11).cell, whole[11:23])
+    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, pattern, numbers[11:23]).cell, whole[11:23])
 
 
 def test_from_a_closed_room_no_ray_escapes():
@@ -147,5 +147,7 @@ def test_from_a_closed_room_no_ray_escapes():
     room = scene_of(ball, camera=looking("front", (0, 0, 1), (0, 0, 0), 1.0))
     geometry = merge(room)
     cells = choose_cells(room, geometry, ("front",), (64, 64), 500)
-    links = trace_links(geometry, cells.tree, points_of(cells, 400), make_pattern(64, 0, 1), 0)
+    links = trace_links(
+        geometry, cells.tree, points_of(cells, 400), make_pattern(64, 0, 1), np.arange(400, dtype=np.uint32)
+    )
     assert np.mean(links.cell == NO_CELL) < 1e-4

@@ -1,0 +1,107 @@
+"""Light that reaches points by reflection, by path tracing: the truth that gathered light is compared with.
+
+    R(x) = E[ π f(ωi, ωo) L(y, −ωi) ],   L(y, ω) = L_direct(y, ω) + E[ π f_d(ωi', ω) L(y', −ωi') ] …
+
+with ωi drawn by the cosine, y what it hits, and f_d the diffuse terms: any number of diffuse bounces, one of any kind
+to the eye. It shares neither cells nor links with what it checks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import is_diffuse
+from relume.brdf.evaluate import eval_brdf
+from relume.look import Look
+from relume.reference.radiance import Points, reference_radiance
+from relume.reference.texels import Texels
+from relume.scene.model import Scene
+from relume.trace.geometry import Geometry
+from relume.trace.photons import cosine_directions
+from relume.trace.primary import Hits, trace_from
+from relume.trace.surface import surface_at
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Terms = Sequence[Mapping[str, Any]]
+
+_TEXTURE_ANGLE = 1e-3
+
+
+def reference_indirect(
+    scene: Scene,
+    geometry: Geometry,
+    texels: Texels,
+    look: Look,
+    points: Points,
+    material: NDArray[np.integer],
+    num_bounces: int,
+    num_paths: int,
+    spp: int,
+    seed: int = 0,
+) -> F64:
+    """Radiance of points by light that surfaces have reflected onto them, 1 to `num_bounces` times.
+
+    Args:
+        points: seen from one direction each. material: index into the scene's materials. (n,)
+        num_paths: for each point. spp: texels drawn for each place that a path visits.
+    Returns:
+        The mean over paths and its variance. (2, n, 3) float64
+    Cost: O(n · num_paths · num_bounces · spp) shadow rays.
+    """
+    rng = np.random.default_rng((seed, points.num_points))
+    terms: list[Terms] = [look.materials[m.name].terms for m in scene.materials]
+    diffuse: list[Terms] = [list(filter(is_diffuse, of_material)) for of_material in terms]
+    total, squares = np.zeros((2, points.num_points, 3))
+    for path in range(num_paths):
+        here, of, f_terms = points, np.asarray(material), terms
+        rows, weight = np.arange(points.num_points), np.ones((points.num_points, 3))
+        found = np.zeros((points.num_points, 3))
+        for bounce in range(num_bounces):
+            directions = cosine_directions(here.normal, rng)
+            weight = weight * np.pi * _brdf(f_terms, here, of, directions)
+            hits = trace_from(geometry.embree, here.position, directions)
+            hit = np.nonzero(hits.face >= 0)[0]
+            here, of = _places(scene, geometry, hits, directions, hit)
+            rows, weight, f_terms = rows[hit], weight[hit], diffuse
+            arriving = np.zeros((len(hit), 3))
+            for index, of_material in enumerate(diffuse):
+                at = np.nonzero(of == index)[0]
+                drawn = (seed * num_paths + path) * num_bounces + bounce
+                arriving[at] = reference_radiance(
+                    geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn
+                )[0]  # fmt: skip
+            np.add.at(found, rows, weight * arriving)
+        total += found
+        squares += found**2
+    mean = total / num_paths
+    return np.stack([mean, np.maximum(squares / num_paths - mean**2, 0) / max(1, num_paths - 1)])
+
+
+def _places(
+    scene: Scene, geometry: Geometry, hits: Hits, directions: F32, hit: NDArray[np.intp]
+) -> tuple[Points, NDArray[np.int32]]:
+    """What some of the rays have hit, seen from where they come, and its materials."""
+    some = Hits(hits.face[hit], hits.uv[hit], hits.distance[hit])
+    surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
+    textures = {"diffuse": surface.diffuse, "specular": surface.specular}
+    points = Points(surface.position, surface.normal, surface.tangent, -directions[hit], textures)
+    return points, geometry.face_material[some.face]
+
+
+def _brdf(terms: Sequence[Terms], points: Points, material: NDArray[np.integer], directions: F32) -> F64:
+    """f(ωi, ωo) of each point. directions: world space. (n, 3)"""
+    normal, tangent = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    frames = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    wi, wo = (np.einsum("nij,nj->ni", frames, v.astype(np.float64)) for v in (directions, points.wo))
+    value = np.zeros((points.num_points, 3))
+    for index, of_material in enumerate(terms):
+        at = np.nonzero(material == index)[0]
+        for term in of_material:
+            texture = points.textures[term["texture"]][at] if term["texture"] is not None else 1.0
+            value[at] += texture * eval_brdf(term, wi[at], wo[at])
+    return value

@@ -1,0 +1,117 @@
+"""The kernels of `relume.transfer.gathered`: gather rays listed with their light, weighed by curves, put into bands.
+
+A ray is a direction, where a light triangle has an extent: it falls into one band of every curve.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from relume.brdf.angles import angles_into
+from relume.trace.cell_tree import NO_CELL
+from relume.trace.gather_rays import local_ray, shift_of, weight_of
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_rays(  # type: ignore[no-untyped-def]
+    normal, tangent, wo, links, pattern, numbers, radiance, start, stop, first, wi, out, power
+):
+    """List the rays of points [start, stop) that hit a cell, in the points' local frames.
+
+    Args:
+        normal, tangent, wo: (n, 3) float32. links: (n, rays) uint16. numbers: (n,) uint32
+        radiance: of cells. (NO_CELL + 1, 3) float32
+    Writes first (points + 1,), wi (3, K), wo as `out` (3, K), and power: w · L, sr times radiance (3, K); returns K.
+    """
+    end = 0
+    for p in range(start, stop):
+        first[p - start] = end
+        n, t, o = normal[p], tangent[p], wo[p]
+        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+        ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
+        oy = bx * o[0] + by * o[1] + bz * o[2]
+        oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+        shift_u, shift_v = shift_of(pattern, numbers[p])
+        for ray in range(links.shape[1]):
+            cell = links[p, ray]
+            if cell == NO_CELL:
+                continue
+            x, y, z = local_ray(pattern, ray, shift_u, shift_v, ox, oy, oz)
+            weight = weight_of(pattern, x, y, z, ox, oy, oz)
+            wi[0, end], wi[1, end], wi[2, end] = x, y, z
+            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            for channel in range(3):
+                power[channel, end] = weight * radiance[cell, channel]
+            end += 1
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
+    """Multiply the weights of rays by a dormant curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
+    for channel in range(3):
+        row = channel if num_rows == 3 else 0
+        for n in range(num):
+            weight[channel, n] *= bands[row, band[n]]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _spread(settings, setting_of, band, weight, num, out):  # type: ignore[no-untyped-def]
+    """Add rays to all settings of the curves that have several. band: of each curve and ray. out: (3, ≥ N)"""
+    num_padded = out.shape[1]
+    blue = settings.shape[2] // num_padded - 1
+    product = np.empty(settings.shape[2], np.float32)
+    for n in range(num):
+        product[:] = 1
+        for k in range(setting_of.shape[0]):
+            if setting_of[k] >= 0:
+                product *= settings[setting_of[k], band[k, n]]
+        for channel in range(3):
+            begin = (blue * channel // 2) * num_padded
+            out[channel] += weight[channel, n] * product[begin : begin + num_padded]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def project_rays(  # type: ignore[no-untyped-def]
+    first, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
+):
+    """Add listed rays to their points; curves as in `relume.transfer.projector.Contraction`.
+
+    Args:
+        first, wi, wo, power: from `list_rays`. shading: quotients, one row for all channels, or three. (1 or 3, K)
+        out: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
+    """
+    num_curves, blue_row = kinds.shape[0], shading.shape[0] - 1
+    most = np.diff(first[: out.shape[0] + 1]).max()
+    gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
+    band = np.zeros((num_curves, most), np.int64)
+    for p in range(out.shape[0]):
+        begin, end = first[p], first[p + 1]
+        num = end - begin
+        if num == 0:
+            continue
+        for channel in range(3):
+            weight[channel, :num] = power[channel, begin:end] * shading[blue_row * channel // 2, begin:end]
+        for k in range(num_curves):
+            scale = np.float32(num_bands[k] / (math.pi / 2))
+            angles_into(
+                kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
+                axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
+            )  # fmt: skip
+            for n in range(num):
+                band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
+            if k != active and setting_of[k] < 0:
+                _multiply(bands[k], num_rows[k], band[k], weight, num)
+        if active >= 0:
+            for n in range(num):
+                for channel in range(3):
+                    out[p, channel, band[active, n]] += weight[channel, n]
+        elif settings.shape[0] > 0:
+            _spread(settings, setting_of, band, weight, num, out[p])
+        else:
+            for channel in range(3):
+                out[p, channel, 0] += weight[channel, :num].sum()

@@ -1,0 +1,275 @@
+"""Reflected light in pictures: its kernel against plain NumPy, its pictures against path tracing and against bakes."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+import twins
+from analytic_terms import ANALYTIC
+from sessions import BUDGET, look_of, settle
+from tiny_scenes import looking, quad, scene_of
+
+from relume.brdf.albedo import diffuse_reflectance, reflectances_of
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.light.triangles import subdivide
+from relume.look import validate
+from relume.reference import Points, texels_of
+from relume.reference.indirect import reference_indirect
+from relume.scene.model import Material
+from relume.store import bake_here
+from relume.trace.cell_tree import NO_CELL
+from relume.trace.gather_rays import local_ray, make_pattern, shift_of, weight_of
+from relume.trace.geometry import merge
+from relume.transfer.base import Recipe
+from relume.transfer.cache import FrozenCache
+from relume.transfer.gathered import CellLight, GatherRays
+from relume.transfer.opened import open_transfer
+from relume.transfer.picture import Picture
+from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.registry import METHODS
+from relume.transfer.render import render_image
+from relume.transfer.thinned import thinned
+
+NUM_CELLS = 90
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
+REFLECTANCES = ((0.5, 0.4, 0.3, 0, 0, 0, 0, 0, 0), (0.1, 0.1, 0.1, 0.6, 0.2, 0.4, 0, 0, 0))
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return subdivide(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
+
+
+@pytest.fixture(scope="module")
+def cells(lights):
+    rng = np.random.default_rng(4)
+    normal = twins.unit(rng.normal(size=(NUM_CELLS, 4, 3))).astype(np.float32)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
+    links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
+    material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
+    return CellLight(normal, visible, links, material, rng.random((2, NUM_CELLS, 3), np.float32))
+
+
+@pytest.fixture(scope="module")
+def receivers(cells, lights):
+    """Points in the dark but for reflected light; a tenth of the rays finds nothing."""
+    rng = np.random.default_rng(5)
+    dark = twins.make_receivers(30, lights.num_lights, seed=6)
+    pattern = make_pattern(20, 13, 7)
+    links = rng.integers(0, NUM_CELLS, (30, 33)).astype(np.uint16)
+    for p in range(30):
+        wo = twins.frames(dark)[p] @ dark.wo[p]
+        for ray in range(33):
+            below = local_ray(pattern, ray, *shift_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
+            if below or rng.random() < 0.1:
+                links[p, ray] = NO_CELL
+    rays = GatherRays(links, pattern, np.arange(50, 80, dtype=np.uint32), cells.radiance(lights, REFLECTANCES))
+    return Receivers(dark.normal, dark.tangent, dark.wo, np.zeros_like(dark.visible), rays)
+
+
+def bands_of(model):
+    rng = np.random.default_rng(1)
+    bands = {}
+    for curve in TERMS[model].curves:
+        x = np.linspace(0, 1, curve.num_bands)
+        bands[curve.name] = rng.uniform(0.2, 1, (3, 1)) + 0.15 * np.sin(rng.uniform(3, 12, (3, 1)) * x)
+    return bands
+
+
+def image(model, bands, active, lights, receivers):
+    term = TERMS[model]
+    found = Projector(term, contract(term, bands, active), lights, receivers).project(0, len(receivers.normal))
+    return found[:, 0] if active is None else np.einsum("njc,cj->nc", found.astype(float), bands[active])
+
+
+def image_numpy(model, bands, receivers):
+    """Ray by ray, float64."""
+    term, rays = TERMS[model], receivers.rays
+    radiance = rays.radiance.astype(float)
+    out = np.zeros((len(receivers.normal), 3))
+    for p, frame in enumerate(twins.frames(receivers)):
+        wo = frame @ receivers.wo[p].astype(float)
+        shift = shift_of(rays.pattern, rays.numbers[p])
+        for ray, cell in enumerate(rays.links[p]):
+            if cell == NO_CELL:
+                continue
+            wi = np.array(local_ray(rays.pattern, ray, *shift, *wo.astype(np.float32)))
+            value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * radiance[cell]
+            value = value * term.quotients(*wi.astype(float), *wo)
+            for curve in term.curves:
+                if not curve.outgoing:
+                    value = value * bands[curve.name][:, twins.band_of(curve, wi.astype(float)[None], wo)[0]]
+            out[p] += value
+    return out
+
+
+@pytest.mark.parametrize("model", list(ANALYTIC))
+def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
+    bands = bands_of(model)
+    expected = image_numpy(model, bands, receivers)
+    found = image(model, bands, None, lights, receivers)
+    # an angle within rounding of a band's edge may fall to either side
+    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max())
+    assert np.median(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("model", "curve"), CURVES)
+def test_any_curve_may_be_the_free_one(model, curve, lights, receivers):
+    bands = bands_of(model)
+    none = image(model, bands, None, lights, receivers)
+    np.testing.assert_allclose(image(model, bands, curve, lights, receivers), none, rtol=1e-4, atol=2e-6 * none.max())
+
+
+def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
+    bands = bands_of("cook_torrance")
+    name = TERMS["cook_torrance"].curves[0].name
+    several = np.stack([bands[name] * k for k in (1.0, 2.0, 0.5)], axis=1)
+    term = TERMS["cook_torrance"]
+    together = Projector(term, contract(term, {**bands, name: several}, None), lights, receivers).project(0, 30)
+    for k in range(3):
+        alone = image("cook_torrance", {**bands, name: several[:, k]}, None, lights, receivers)
+        np.testing.assert_allclose(together[:, k], alone, rtol=1e-4, atol=1e-6 * alone.max())
+
+
+def test_reflected_light_adds_to_the_lights_own(lights, receivers):
+    lit = twins.only_above(twins.make_receivers(30, lights.num_lights, seed=6), lights)
+    both = Receivers(lit.normal, lit.tangent, lit.wo, lit.visible, receivers.rays)
+    bands = bands_of("blinn_phong")
+    parts = [image("blinn_phong", bands, None, lights, r) for r in (lit, receivers)]
+    np.testing.assert_allclose(image("blinn_phong", bands, None, lights, both), sum(parts), rtol=1e-5)
+
+
+def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
+    black = cells.radiance(lights, ((0.0,) * 9,) * 2, 5)
+    assert not black.any()
+    by_bounces = [cells.radiance(lights, REFLECTANCES, n).sum() for n in (0, 1, 2, 24, 25)]
+    assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
+    assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
+
+
+def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
+    found = cells.reflectance(REFLECTANCES)
+    expected = np.array([[0.5, 0.4, 0.3], [0.1, 0.1, 0.1]])[cells.material]
+    expected[cells.material == 1] += np.array([0.6, 0.2, 0.4]) * cells.textures[0][cells.material == 1]
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_reflectance_of_diffuse_terms():
+    lambert = {"model": "lambert", "color": [0.2, 0.5, 0.9], "texture": None, "params": {}, "curves": {}}
+    np.testing.assert_allclose(diffuse_reflectance(lambert), [0.2, 0.5, 0.9], rtol=1e-6)
+    rough = {**lambert, "model": "oren_nayar", "params": {"sigma": 0.5}}
+    assert 0.5 < diffuse_reflectance(rough)[1] / 0.5 < 1.0
+    glossy = {**lambert, "model": "blinn_phong", "params": {"exponent": 20.0}}
+    assert reflectances_of([lambert, glossy]) == reflectances_of([lambert])
+
+
+@pytest.fixture(scope="module")
+def corner():
+    """A white floor between a red wall and a glossy one, which throw light onto it."""
+    glossy = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 30.0}}
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]}, glossy)),
+        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
+        Material("Blue", ({"model": "oren_nayar", "color": [0.1, 0.2, 0.8], "params": {}},)),
+    ]
+    floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    red = quad("red", [[-1, 0, 1], [-1, 0, -1], [-1, 1.5, -1], [-1, 1.5, 1]], 1, tangent=(0, 1, 0))
+    blue = quad("blue", [[-1, 0, -1], [1, 0, -1], [1, 1.5, -1], [-1, 1.5, -1]], 2)
+    sky = np.full((16, 32, 3), 0.3, np.float32)
+    sky[2:5, 16:20] = 30
+    camera = looking("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
+    return scene_of(floor, red, blue, camera=camera, environment=sky, materials=materials)
+
+
+def baked(scene, method, folder, size=(40, 30)):
+    path = bake_here(METHODS[method], scene, Recipe(method, ("front",), size, 400), folder / f"{method}.zarr")
+    return open_transfer(path)
+
+
+@pytest.fixture(scope="module")
+def gathered(corner, tmp_path_factory):
+    return baked(corner, "gather", tmp_path_factory.mktemp("corner"))
+
+
+def default_look(transfer):
+    return validate(transfer.default_look, transfer.default_look)
+
+
+def test_gathered_light_is_that_of_path_tracing(corner, gathered):
+    """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
+    view, look = gathered.views["front"], default_look(gathered)
+    geometry, texels = merge(corner), texels_of(corner.environment)
+    reflectances = tuple(reflectances_of(look.materials[name].terms) for name in gathered.material_names)
+    reflected = gathered.reflected_in(look.environment.key, reflectances)
+    found, expected, variance = [], [], []
+    for index, name in enumerate(gathered.material_names):
+        rows = view.rows(index)
+        chosen = np.arange(0, rows.stop - rows.start, 12)
+        lit = view.receivers(index, reflected)
+        dark = Receivers(lit.normal, lit.tangent, lit.wo, 0 * lit.visible, lit.rays)
+        radiance = np.zeros((len(lit.normal), 3))
+        for document in look.materials[name].terms:
+            bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
+            radiance += image(document["model"], bands, None, gathered.lights, dark) * document["color"]
+        found.append(radiance[chosen])
+        position = view.store.read("views/0/position", rows.start, rows.stop)
+        ones = np.ones_like(position)
+        points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}).rows(chosen)
+        material = np.full(len(chosen), index)
+        truth = reference_indirect(corner, geometry, texels, look, points, material, 4, 48, 24, seed=index)
+        expected.append(truth[0])
+        variance.append(truth[1])
+    found, expected, variance = map(np.concatenate, (found, expected, variance))
+    deviation = np.sqrt(variance.sum(axis=0)) / len(found)  # of the mean
+    assert np.all(np.abs(found.mean(axis=0) - expected.mean(axis=0)) < 4 * deviation + 0.01 * expected.mean(axis=0))
+    square, noise = ((found - expected) ** 2).mean(), variance.mean()
+    assert np.sqrt(max(0.0, square - noise) / (expected**2).mean()) < 0.12
+
+
+def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp_path):
+    """The wall made green in the editor: what it throws onto the floor is what a bake of a green wall gives."""
+
+    def green(document):
+        document["materials"]["Red"]["terms"][0]["color"] = [0.1, 0.7, 0.2]
+
+    edited = render_image(gathered, "front", look_of(gathered, green))
+    terms = copy.deepcopy(corner.materials[1].terms)
+    terms[0]["color"] = [0.1, 0.7, 0.2]
+    materials = [corner.materials[0], Material("Red", terms), corner.materials[2]]
+    other = scene_of(
+        *corner.meshes, camera=corner.cameras[0], environment=corner.environment.radiance, materials=materials
+    )
+    green_bake = baked(other, "gather", tmp_path)
+    expected = render_image(green_bake, "front", default_look(green_bake))
+    before = render_image(gathered, "front", default_look(gathered))
+    assert np.abs(edited - before).mean() > 0.05 * before.mean()
+    # other seeds, other cells: what is compared is the light, not its noise
+    assert np.abs(edited - expected).mean() < 0.02 * expected.mean()
+
+
+def test_without_reflection_a_picture_is_the_direct_one(corner, gathered, tmp_path):
+    """All diffuse terms black: what is left has the lights' own light only."""
+
+    def black(document):
+        for material in document["materials"].values():
+            material["terms"][0]["color"] = [0.0, 0.0, 0.0]
+
+    direct = baked(corner, "direct", tmp_path)
+    expected = render_image(direct, "front", look_of(direct, black))
+    np.testing.assert_allclose(render_image(gathered, "front", look_of(gathered, black)), expected, rtol=1e-5)
+    brighter = render_image(gathered, "front", default_look(gathered)) - render_image(
+        direct, "front", default_look(direct)
+    )
+    assert brighter.min() > -1e-5
+    assert brighter.mean() > 0.02
+
+
+def test_a_thinned_bake_has_the_same_light(gathered):
+    """Its samples keep the rays that were traced for them."""
+    step = 3
+    whole = Picture(gathered, "front", FrozenCache(BUDGET))
+    few = Picture(thinned(gathered, "front", step), "front", FrozenCache(BUDGET))
+    np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
