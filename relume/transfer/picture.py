@@ -13,10 +13,17 @@ from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
 from relume.look import Look
 from relume.transfer.cache import FrozenCache
-from relume.transfer.frozen import Frozen
+from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
-from relume.transfer.pointer import CurvePointer, ParameterPointer, moved_parameter, parse_curve, parse_pointer
+from relume.transfer.pointer import (
+    ROTATION,
+    CurvePointer,
+    ParameterPointer,
+    moved_parameter,
+    parse_curve,
+    parse_pointer,
+)
 from relume.transfer.probe import brush, probe
 from relume.transfer.resolve import encode, resolve
 from relume.transfer.shade import Shaded
@@ -56,28 +63,37 @@ class Picture:
         self._shown_environment = self._images.light.environment
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
+        self._is_turning = self._lacks_glimpse = False
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
-        before = self._images.light.environment
-        self._images.set_look(look)
-        if self._images.light.environment != before:
+        before, images = self._images.light, self._images
+        is_shown = any(t.effective is not None or t.is_glimpse for m in images.by_name.values() for t in m.terms)
+        images.set_look(look)
+        if images.light != before:
+            self._lacks_glimpse = (is_shown or self._lacks_glimpse) and can_glimpse(images)
+        if images.light.environment != before.environment:
             self._touched = None  # the hand has moved on to the environment
         self._moved = moved_parameter(self._look, look)
         self._look = look
 
     def touch(self, pointer: str) -> None:
-        """Prepare a curve or a parameter ahead of its first edit, e.g. "/materials/Teapot/terms/1/curves/theta_h".
+        """Prepare a curve, a parameter or the environment's rotation ahead of its first edit.
 
+        Args:
+            pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h", or `ROTATION`.
         Raises:
             ParameterError: there is no such curve or parameter in this look.
             MemoryBudgetError: its operator is larger than the cache may be.
         """
+        self._is_turning = pointer == ROTATION
+        if self._is_turning:
+            return
         touched = parse_pointer(pointer)
         check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
         self._touched = touched
 
-    def waiting(self) -> Need | None:
+    def waiting(self) -> Need | Glimpse | None:
         """What must be made next, for the look or for what was touched; None where nothing is lacking.
 
         The picture may be advanced meanwhile: all that does not depend on it follows the look.
@@ -85,10 +101,17 @@ class Picture:
         Raises:
             MemoryBudgetError: something that the look lacks is larger than the cache may be.
         """
-        return next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
+        images = self._images
+        if self._lacks_glimpse or (self._is_turning and can_glimpse(images) and not is_prepared(images)):
+            return Glimpse.of(images)
+        return next_need(images, Hand(self._find(self._touched), self._find(self._moved)))
 
-    def adopt(self, need: Need, made: Frozen | Shaded) -> None:
+    def adopt(self, need: Need | Glimpse, made: Any) -> None:
         """Go on with what a need has made, unless the look has moved on to where it is of no use."""
+        if isinstance(need, Glimpse):
+            need.adopt(made)
+            self._lacks_glimpse = self._lacks_glimpse and need.light != self._images.light
+            return
         image = need.image
         if not any(image is known for known in need.material.terms) or image.kind != need.kind:
             return

@@ -35,6 +35,7 @@ class ParameterPointer(_TermPointer):
         return self._written("params")
 
 
+ROTATION = "/environment/rotation"
 _KINDS: dict[str, type[CurvePointer] | type[ParameterPointer]] = {"curves": CurvePointer, "params": ParameterPointer}
 
 

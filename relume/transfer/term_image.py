@@ -32,6 +32,7 @@ class TermImage:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
         is_near: it shows them only as closely as the nodes of a parameter can say them.
+        is_glimpse: `image` is a rough one, of this light or of the one before.
         active: what the operator in use leaves free. shown: its coefficients in `image`, (3, columns).
         term: the declaration of the term's model, fixed parameters put in. kind: what tells it from
             others, the light included.
@@ -45,7 +46,7 @@ class TermImage:
         self.image: F32 = np.zeros((tiles_of(len(cos_theta_o))[0], 3, tiles_of(len(cos_theta_o))[1]), np.float32)
         self.effective: dict[str, F64] | None = None
         self.active: Along | None = None
-        self.is_near = False
+        self.is_near = self.is_glimpse = False
         self.shown: F64 | None = None
         self.is_composed = False
         self.kind: Hashable = None
@@ -75,8 +76,13 @@ class TermImage:
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
         """Go on from an image of these curves, which may have been the target some time ago."""
         self.image[:] = shaded.image
-        self.effective, self.is_near = dict(bands), False
-        self.is_composed = False
+        self.effective = dict(bands)
+        self.is_near = self.is_glimpse = self.is_composed = False
+
+    def glimpse(self, image: F32) -> None:
+        """Show a rough image, of no curves in particular, until there is a better one."""
+        self.image[:] = image
+        self.is_glimpse, self.is_composed = True, False
 
     def _outgoing(self) -> F32 | None:
         curves = [curve for curve in self.term.curves if curve.outgoing]
@@ -152,5 +158,5 @@ class TermImage:
         self.image[:] = 0
         stream(frozen.transport, columns_of(self.shown), self.image)
         self.is_near = not active.is_complete
-        self.is_composed = False
+        self.is_glimpse = self.is_composed = False
         return self.shown.size

@@ -9,6 +9,7 @@ from typing import Any
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve
 from relume.errors import ParameterError
+from relume.transfer.pointer import ROTATION
 
 _POINTER = r"^/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9]\d{0,2})/%s/(?P<name>[a-z_0-9]+)$"
 CURVE, PARAMETER = re.compile(_POINTER % "curves"), re.compile(_POINTER % "params")
@@ -28,7 +29,9 @@ def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any
 
 
 def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
-    """Raises ParameterError where there is no such parameter in this look."""
+    """Raises ParameterError where there is no such parameter in this look; the environment's rotation counts as one."""
+    if pointer == ROTATION:
+        return
     term, name = _term(PARAMETER.match(pointer), document)
     if term is None or name not in {parameter.name for parameter in TERMS[term["model"]].parameters}:
         raise ParameterError("parameter", pointer, "a pointer like /materials/Teapot/terms/1/params/ior of this look")

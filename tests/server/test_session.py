@@ -125,6 +125,15 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
         assert session.text("curve")["curve"] == THETA_H
 
 
+def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        control.may_freeze.set()
+        session.send(type="touch", parameter="/environment/rotation")
+        session.edit(1, SIGMA, 0.4)
+        session.exact(1)
+
+
 @pytest.mark.parametrize(
     "touch",
     [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import twins
 from analytic_terms import ANALYTIC
-from sessions import BUDGET, look_of, settle
+from sessions import BUDGET, look_of, relative_rmse, settle
 from tiny_scenes import looking, quad, scene_of
 
 from relume.brdf.albedo import diffuse_reflectance, reflectances_of
@@ -26,6 +26,7 @@ from relume.trace.geometry import merge
 from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
 from relume.transfer.gathered import CellLight, GatherRays
+from relume.transfer.glimpse import Glimpse
 from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
 from relume.transfer.projector import Projector, Receivers, contract
@@ -273,3 +274,19 @@ def test_a_thinned_bake_has_the_same_light(gathered):
     whole = Picture(gathered, "front", FrozenCache(BUDGET))
     few = Picture(thinned(gathered, "front", step), "front", FrozenCache(BUDGET))
     np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
+
+
+def test_other_reflected_light_is_glimpsed_before_it_is_shaded(gathered, monkeypatch):
+    monkeypatch.setattr("relume.transfer.glimpse._MOST_SHADED", 300)
+    picture, document = settle(Picture(gathered, "front", FrozenCache(BUDGET))), copy.deepcopy(gathered.default_look)
+    for material in document["materials"].values():
+        for term in material["terms"]:
+            term["color"] = [0.1, 0.7, 0.2]
+    picture.set_look(validate(document, gathered.default_look))
+    picture.advance(None)
+    still, need = picture.image(), picture.waiting()
+    assert isinstance(need, Glimpse)
+    picture.adopt(need, need.make(lambda share: None, lambda: False))
+    assert not picture.advance(None).exact
+    glimpse, exact = picture.image(), settle(picture).image()
+    assert relative_rmse(glimpse, exact) < 0.7 * relative_rmse(still, exact)

@@ -1,6 +1,7 @@
 /** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
 import { ColorField } from "../inspector/ColorField";
 import { edit } from "../state/edit";
+import { hold } from "../state/live";
 import { defaultLook, look } from "../state/store";
 import { Slider } from "../ui/Slider";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
@@ -40,6 +41,7 @@ export function EnvironmentPanel() {
           scale="linear"
           unit="°"
           onChange={(value) => edit("Environment rotation", "/environment/rotation", value)}
+          onHold={() => hold("/environment/rotation")}
         />
       </div>
       <div class="param alone">

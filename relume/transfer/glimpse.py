@@ -1,0 +1,186 @@
+"""A glimpse of other light: one sample of each small square of pixels is shaded, those between are interpolated.
+
+When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
+counts for nothing at once, and shading all samples takes seconds. A glimpse costs a few thousand samples whatever the
+picture's size, holds no operator, and lets the hand see where the light goes; colours and textures multiply it at full
+size. It is never called exact: at rest all is shaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from relume.brdf.term import Term
+from relume.transfer.frozen import tiles_of
+from relume.transfer.material_image import MaterialImage
+from relume.transfer.projector import Receivers
+from relume.transfer.shade import Shaded, shade
+from relume.transfer.term_image import TermImage
+from relume.transfer.view import View
+from relume.transfer.view_images import Light, ViewImages
+
+F32 = NDArray[np.float32]
+
+_MOST_SHADED = 6000  # samples of a view, about
+_NUM_NEIGHBOURS = 3
+_PIXELS_A_TURN = 10.0  # a unit of normals counts as so many squares of pixels
+_SOFT = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
+
+
+@dataclass(frozen=True)
+class Sparse:
+    """The samples of a material that are shaded, and how all others are made from them.
+
+    Attributes:
+        weights: rows sum to one. (samples, shaded samples)
+    """
+
+    receivers: Receivers
+    weights: Any
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        few, weights = self.receivers, self.weights
+        links = 0 if few.rays is None else few.rays.links.nbytes
+        of_few = few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links
+        return int(of_few + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
+
+    def lit_by(self, reflected: F32 | None) -> Receivers:
+        """The few samples with the radiance of the gather cells as it is now."""
+        rays = self.receivers.rays
+        if rays is None or reflected is None:
+            return self.receivers
+        return replace(self.receivers, rays=replace(rays, radiance=reflected))
+
+
+def choose_sparse(view: View, material: int, reflected: F32 | None) -> Sparse:
+    """One sample of each square of pixels that a material is seen in; reads the store, see `View.receivers`.
+
+    Those between take the mean of the nearest, by place in the picture and by normal.
+    """
+    rows = view.rows(material)
+    step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
+    y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
+    _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
+    whole = view.receivers(material, reflected)
+    place = np.concatenate([np.stack([x, y], axis=1), _PIXELS_A_TURN * step * whole.normal], axis=1)
+    num = min(_NUM_NEIGHBOURS, len(chosen))
+    distance, nearest = cKDTree(place[chosen]).query(place, k=list(range(1, num + 1)))
+    weight = 1 / (distance**2 + _SOFT)
+    weight /= weight.sum(axis=1, keepdims=True)
+    first = np.arange(0, weight.size + 1, num)
+    shape = (len(place), len(chosen))
+    rays = whole.rays
+    few = rays and replace(rays, links=rays.links[chosen], numbers=rays.numbers[chosen])
+    return Sparse(
+        Receivers(whole.normal[chosen], whole.tangent[chosen], whole.wo[chosen], whole.visible[chosen], few),
+        csr_array((weight.ravel().astype(np.float32), nearest.ravel(), first), shape=shape),
+    )
+
+
+def _sparse(images: ViewImages, material: int, reflected: F32 | None) -> Sparse:
+    """Of a material of a view, kept in the cache with the operators."""
+
+    def choose() -> Sparse:
+        return choose_sparse(images.view, material, reflected)
+
+    return images.cache.get(_key(images, material), Sparse, _bytes_of(images, material), choose)
+
+
+def _key(images: ViewImages, material: int) -> tuple[Hashable, ...]:
+    return images.transfer.key, images.view.name, material, "sparse"
+
+
+def _bytes_of(images: ViewImages, material: int) -> int:
+    """Memory that `Sparse` takes at most, but for the few samples themselves."""
+    rows = images.view.rows(material)
+    return int(rows.stop - rows.start) * (_NUM_NEIGHBOURS * 12 + 8)
+
+
+def can_glimpse(images: ViewImages) -> bool:
+    """Whether the cache has room for it beside other things."""
+    return 2 * sum(_bytes_of(images, k) for k in range(len(images.by_name))) <= images.cache.budget_bytes
+
+
+def is_prepared(images: ViewImages) -> bool:
+    """Whether the samples have been chosen: the first glimpse of a view takes a second more."""
+    seen = [material.index for material in images.by_name.values() if material.num_samples]
+    return all(images.cache.find(_key(images, index), Sparse) is not None for index in seen)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One term, as it was when the glimpse was asked for."""
+
+    material: MaterialImage
+    image: TermImage
+    term: Term
+    bands: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """A need of images of all terms in one light; made like a `Need`, adopted by the picture."""
+
+    key: tuple[Hashable, ...]
+    images: ViewImages
+    light: Light
+    parts: Sequence[_Part]
+
+    what = "Environment"
+    state: Literal["shading"] = "shading"
+    refines = False
+
+    @classmethod
+    def of(cls, images: ViewImages) -> Glimpse:
+        """Of the look as it is now."""
+        parts = [
+            _Part(material, image, image.term, image.target)
+            for material in images.by_name.values()
+            for image in material.terms
+            if material.num_samples
+        ]
+        return cls((images.transfer.key, images.view.name, images.light), images, images.light, parts)
+
+    def make(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> list[F32]:
+        """Images of all parts. (tiles, 3, samples) float32 each
+
+        Args:
+            progress: called with the share done. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        transfer = self.images.transfer
+        lights, reflected = transfer.lights_in(self.light.environment), transfer.reflected_in(*self.light)
+        found = []
+        for k, part in enumerate(self.parts):
+            sparse = _sparse(self.images, part.material.index, reflected)
+            receivers = sparse.lit_by(reflected)
+            shaded = shade(part.term, part.bands, lights, receivers, lambda share: None, cancelled)
+            found.append(_spread(shaded, sparse.weights))
+            progress((k + 1) / len(self.parts))
+        return found
+
+    def adopt(self, made: Sequence[F32]) -> None:
+        """Show them where there is nothing better, also where the hand has turned the light further meanwhile."""
+        for part, image in zip(self.parts, made, strict=True):
+            if part.image.effective is None and any(part.image is known for known in part.material.terms):
+                part.image.glimpse(image)
+
+
+def _spread(shaded: Shaded, weights: Any) -> F32:
+    """An image of all samples from that of the few. (tiles, 3, samples) float32"""
+    num_samples, num_shaded = weights.shape
+    few = shaded.image.transpose(0, 2, 1).reshape(-1, 3)[:num_shaded]
+    tiles, samples = tiles_of(num_samples)
+    rows = np.zeros((tiles * samples, 3), np.float32)
+    rows[:num_samples] = weights @ few
+    return np.ascontiguousarray(rows.reshape(tiles, samples, 3).transpose(0, 2, 1))
