@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
-from server_fakes import SIZE, Control
+from server_fakes import SIZE, Control, FakeTransfer
 from session_client import Baked
 
 from server.app import create_app
@@ -99,3 +99,16 @@ def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[s
     answer = client.post("/api/truths", json=request)
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_light_between_surfaces_is_not_compared_with_brute_force_that_has_none(
+    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeTransfer, "__init__", _gathered(FakeTransfer.__init__))
+    answer = client.post("/api/truths", json={"bake": baked.bake, "view": "front"})
+    assert answer.status_code == 422, answer.text
+    assert "direct bake" in answer.json()["detail"]
+
+
+def _gathered(init: Callable[..., None]) -> Callable[..., None]:
+    return lambda self, *args, **more: init(self, *args, **{**more, "method": "gather"})
