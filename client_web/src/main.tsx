@@ -32,7 +32,8 @@ function start(): void {
   const place = placeFromUrl(location.search);
   if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
-  // the hand has left the control: the next edit is another step
+  // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
+  window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());
   window.addEventListener("popstate", () => location.reload());
   render(<App />, document.getElementById("app") as HTMLElement);

@@ -52,6 +52,45 @@ def test_dragging_a_slider_changes_the_picture_and_ends_exact(editor: Editor) ->
     assert editor.page.evaluate("window.relumeStats.latencies.length") > drawn
 
 
+def test_a_drag_that_rests_on_the_way_is_one_step(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    steps = editor.page.locator(".tile.step")
+    before = steps.count()
+    box = editor.slider(SIGMA).bounding_box()
+    assert box is not None
+    mouse, y = editor.page.mouse, box["y"] + box["height"] / 2
+    mouse.move(box["x"] + 0.3 * box["width"], y)
+    mouse.down()
+    for at in (0.5, 0.7):
+        editor.page.wait_for_timeout(1000)
+        mouse.move(box["x"] + at * box["width"], y)
+    mouse.up()
+    expect(steps).to_have_count(before + 1)
+
+
+def test_keys_are_the_pages_again_after_a_number_and_after_a_list(editor: Editor) -> None:
+    editor.choose("Ball", 0)
+    focused = "document.activeElement.tagName"
+    number = editor.page.locator(".inspector input.number").first
+    number.fill("0.3")
+    number.press("Enter")
+    assert editor.page.evaluate(focused) == "BODY"
+    tone_map = editor.page.get_by_role("combobox", name="Tone map")
+    tone_map.click()
+    tone_map.select_option(index=1)
+    assert editor.page.evaluate(focused) == "BODY"
+    tone_map.focus()
+    editor.page.keyboard.press("ArrowUp")
+    assert editor.page.evaluate(focused) == "SELECT"
+
+
+def test_panels_do_not_scroll_sideways(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    for panel in (".inspector", ".outline"):
+        style = editor.page.locator(panel).evaluate("element => getComputedStyle(element).overflowX")
+        assert style == "hidden", panel
+
+
 def test_keys_do_what_dragging_does(editor: Editor) -> None:
     editor.choose("Ball", 1)
     slider = editor.slider(SIGMA)

@@ -88,7 +88,6 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
     const here = spotOf(frame, svg, event);
     setSpot(here);
     if (gesture.current !== null) {
-      history.hold();
       const events = tool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
       for (const each of events?.length ? events : [event]) gesture.current.move(spotOf(frame, svg, each));
       return;

@@ -58,7 +58,7 @@ export function Inspector() {
   return (
     <aside class="panel inspector" aria-label="Inspector">
       <header class="panel-head">
-        <h2>{material}</h2>
+        <h2 class="spacer">{material}</h2>
         <button aria-pressed={libraryOpen.value} onClick={() => void openLibrary()}>
           Library
         </button>

@@ -29,10 +29,9 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, o
   };
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();
-    if (event.key === "Enter") {
-      take();
-      onDone?.();
-    } else if (event.key === "Escape") {
+    // the field is left, so that the next key is the page's again
+    if (event.key === "Enter") input.current?.blur();
+    else if (event.key === "Escape") {
       setDraft(null);
       onDone?.();
     } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {

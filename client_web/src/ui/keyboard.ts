@@ -14,7 +14,15 @@ function actionOf(event: KeyboardEvent): Action | undefined {
   return ACTIONS.find((action) => action.keys.includes(chord(event)));
 }
 
+/** Whether the pointer was used last. */
+let byPointer = false;
+
+function point(): void {
+  byPointer = true;
+}
+
 function down(event: KeyboardEvent): void {
+  byPointer = false;
   if (event.defaultPrevented || event.altKey) return;
   if (event.key === "Escape" && helpOpen.value) helpOpen.value = false;
   const action = actionOf(event);
@@ -30,15 +38,24 @@ function up(event: KeyboardEvent): void {
   for (const action of ACTIONS) if (action.keys.includes(event.key.toLowerCase())) action.release?.();
 }
 
+/** A list that the pointer chose from gives the keys back: else the next letter would choose again. */
+function chosen({ target }: Event): void {
+  if (target instanceof HTMLSelectElement && byPointer) target.blur();
+}
+
 export function useKeyboard(): void {
   useEffect(() => {
     const release = () => ACTIONS.forEach((action) => action.release?.());
     window.addEventListener("keydown", down);
     window.addEventListener("keyup", up);
+    window.addEventListener("pointerdown", point, { capture: true });
+    window.addEventListener("change", chosen);
     window.addEventListener("blur", release);
     return () => {
       window.removeEventListener("keydown", down);
       window.removeEventListener("keyup", up);
+      window.removeEventListener("pointerdown", point, { capture: true });
+      window.removeEventListener("change", chosen);
       window.removeEventListener("blur", release);
     };
   }, []);
