@@ -159,7 +159,7 @@ class Glimpse:
             CancelledError: `cancelled` said so.
         """
         transfer = self.images.transfer
-        lights, reflected = transfer.lights_in(self.light.environment), transfer.reflected_in(*self.light)
+        lights, reflected = transfer.rough_lights_in(self.light.environment), transfer.reflected_in(*self.light)
         found = []
         for k, part in enumerate(self.parts):
             sparse = _sparse(self.images, part.material.index, reflected)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from relume import environments
 from relume.errors import ParameterError, StoreError
-from relume.light.environment import lookup, turned
+from relume.light.environment import lookup, shrunk, turned
+from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
 from relume.store import open_store
@@ -25,6 +26,7 @@ from relume.transfer.stored import read_cells, read_lights, read_tiles
 from relume.transfer.view import View, open_view
 
 _LIGHTS_KEPT = 4
+_ROUGH_WIDTH = 512
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,18 @@ class Transfer:
         """The triangles of an environment: the tiles of the bake, weighed again."""
         return self.lights if environment == BAKED_ENVIRONMENT else self._weighed(environment)
 
+    def rough_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+        """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
+        rough = shrunk(self.radiance_of(environment.map), _ROUGH_WIDTH)
+        return weigh(self._tiles, rough, environment.rotation)
+
+    @cached_property
+    def _tiles(self) -> Tiles:
+        return read_tiles(self.store)
+
     @cached_property
     def _weighed(self) -> Callable[[EnvironmentKey], TriangleLights]:
-        tiles = read_tiles(self.store)
-        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(tiles, self.radiance_of(key.map), key.rotation))
+        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(self._tiles, self.radiance_of(key.map), key.rotation))
 
     def reflected_in(self, environment: EnvironmentKey, reflectances: Reflectances) -> NDArray[np.float32] | None:
         """Radiance of the gather cells; None where there are none."""

@@ -8,7 +8,7 @@ from tiny_scenes import studio
 
 from relume.color import luminance
 from relume.errors import PlanError
-from relume.light.environment import texel_directions, texel_solid_angles
+from relume.light.environment import shrunk, texel_directions, texel_solid_angles
 from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
 from relume.light.triangles import subdivide, weigh
 
@@ -276,3 +276,12 @@ def test_codes_that_do_not_tile_the_sphere_are_told(codes):
 @pytest.mark.parametrize("num_lights", [8, 11, 500])
 def test_chosen_tiles_are_whole(num_lights):
     assert choose_tiles(studio(), num_lights).is_whole()
+
+
+def test_a_shrunk_map_weighs_as_much():
+    whole = studio().repeat(4, axis=0).repeat(4, axis=1)
+    small = shrunk(whole, studio().shape[1])
+    np.testing.assert_allclose(small, studio(), rtol=1e-6)
+    assert shrunk(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
+    tiles = choose_tiles(studio(), 60)
+    np.testing.assert_allclose(weigh(tiles, small).power.sum(0), weigh(tiles, whole).power.sum(0), rtol=1e-2)

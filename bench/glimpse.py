@@ -1,0 +1,69 @@
+"""glimpse.*: a picture of turned light by a few samples, against shading all of them.
+
+The built-in scene at 640×480, 1,000 lights, the environment turned to 50°. `glimpse.speedup`: shading all materials ÷
+the median glimpse on the way there; `glimpse.error`: relative RMSE of the last glimpse against the shaded picture. The
+first glimpse, which chooses the samples, is in the context.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.points import relative_rmse
+from bench.timing import seconds
+from relume.look import validate
+from relume.scene.demo import demo_scene
+from relume.store import bake_here
+from relume.transfer.base import Recipe
+from relume.transfer.cache import FrozenCache
+from relume.transfer.direct import DirectMethod
+from relume.transfer.opened import Transfer, open_transfer
+from relume.transfer.picture import Picture
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Turn in five steps, then rest."""
+    size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
+    scene = demo_scene()
+    view = scene.cameras[0].name
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = Recipe("direct", (view,), size, num_lights)
+        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"))
+        picture = Picture(transfer, view, FrozenCache(4 << 30))
+        _settle(picture)
+        first, *glimpses = [seconds(partial(_turn, picture, transfer, angle)) for angle in range(10, 51, 10)]
+        rough = picture.image()
+        whole = seconds(partial(_settle, picture))
+        error = relative_rmse(rough, picture.image())
+    context = {
+        "size": list(size),
+        "view_samples": transfer.views[view].num_surface_samples,
+        "first_s": first,
+        "glimpse_s": float(np.median(glimpses)),
+        "all_s": whole,
+    }
+    return [
+        Figure("glimpse.speedup", whole / float(np.median(glimpses)), "ratio", context),
+        Figure("glimpse.error", error, "relative RMSE", {"size": list(size)}),
+    ]
+
+
+def _turn(picture: Picture, transfer: Transfer, angle: float) -> None:
+    """One position of the hand: the glimpse alone."""
+    document = copy.deepcopy(transfer.default_look)
+    document["environment"]["rotation"] = float(angle)
+    picture.set_look(validate(document, transfer.default_look))
+    picture.freeze(lambda share: None, lambda: False)
+    picture.advance(None)
+
+
+def _settle(picture: Picture) -> None:
+    while not picture.advance(None).exact or picture.waiting() is not None:
+        if picture.waiting() is not None:
+            picture.freeze(lambda share: None, lambda: False)
