@@ -33,7 +33,7 @@ const THIRD = 1 / 3;
 
 function expose(stops: number): void {
   const now = look.value?.display.exposure ?? 0;
-  edit("Exposure", "/display/exposure", Number((now + stops).toFixed(3)));
+  edit("Exposure", "/display/exposure", Number((now + stops).toFixed(6)));
 }
 
 function moveWipe(by: number): void {
