@@ -1,7 +1,8 @@
 """Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.warm`.
 
-Bakes a thumbnail of the built-in scene and shows each term with each of its curves. The compiled kernels lie in the
-cache that `relume.numerics` has chosen; every later process loads them from there.
+Bakes a thumbnail of the built-in scene and shows each term with each of its curves, and along each parameter that moves
+several. The compiled kernels lie in the cache that `relume.numerics` has chosen; every later process loads them from
+there.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from relume.brdf.registry import TERMS
+from relume.brdf.sweep import moved_curves
 from relume.look import complete, validate
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.demo import demo_scene
@@ -26,7 +28,10 @@ CACHE_BYTES = 1 << 28
 
 
 def warm() -> None:
-    """Bake with every method, edit each analytic term by each curve. Cost: 1 min of one core, 2 s when compiled."""
+    """Bake with every method, edit each analytic term by each curve and along parameters.
+
+    Cost: a minute of one core, 10 s when everything is compiled.
+    """
     with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
         folder = Path(name)
         save_scene(demo_scene(), folder / "scene")
@@ -45,6 +50,9 @@ def _edit_everything(transfer: Transfer, picture: Picture) -> None:
         _show(picture)
         for curve in term.curves:
             picture.touch(f"/materials/{material}/terms/0/curves/{curve.name}")
+            _show(picture)
+        for parameter in (one for one in term.parameters if len(moved_curves(term, one.name)) > 1):
+            picture.touch(f"/materials/{material}/terms/0/params/{parameter.name}")
             _show(picture)
     tone_map(picture.image(), 0.0, "agx")
 
