@@ -1,4 +1,4 @@
-/** Thumbnails of the looks that were shown, made when their exact picture is there. */
+/** Thumbnails of the looks that were shown: of the picture as it is when the hand rests, and again when it is exact. */
 import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
@@ -8,7 +8,10 @@ import { thumbnail } from "./image";
 import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
 
 const REST_MS = 350;
+const REST_INEXACT_MS = 700;
 const images = new WeakMap<Look, string>();
+/** Looks whose thumbnail is not of their exact picture. */
+const inexact = new WeakSet<Look>();
 /** Counts up with every thumbnail. */
 export const thumbnailsMade = signal(0);
 let timer = 0;
@@ -32,12 +35,17 @@ effect(() => {
   drawn.value;
   const current = look.value;
   clearTimeout(timer);
-  if (!exact.value || current === null || images.has(current)) return;
-  timer = window.setTimeout(() => {
-    if (look.peek() !== current || !exact.peek() || held.peek()) return;
-    const image = thumbnail(stage.active.pixels, current.display);
-    images.set(current, image);
-    giveToSaved(current, image);
-    thumbnailsMade.value += 1;
-  }, REST_MS);
+  if (current === null || (images.has(current) && !(exact.value && inexact.has(current)))) return;
+  timer = window.setTimeout(() => take(current), exact.value ? REST_MS : REST_INEXACT_MS);
 });
+
+function take(current: Look): void {
+  if (look.peek() !== current || held.peek() || !stage.active.isThere) return;
+  const image = thumbnail(stage.active.pixels, current.display);
+  images.set(current, image);
+  if (exact.peek()) {
+    inexact.delete(current);
+    giveToSaved(current, image);
+  } else inexact.add(current);
+  thumbnailsMade.value += 1;
+}
