@@ -20,7 +20,7 @@ from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 from relume.transfer.frozen import Frozen, freeze
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 from relume.transfer.stream import columns_of, stream
 
 

@@ -13,7 +13,7 @@ from relume.basis.daubechies import analysis
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
 from relume.transfer.frozen import Frozen, freeze
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 
 F64 = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relume.environments.studio import studio
 from relume.imageio import png_bytes, to_bytes, tone_map
 from relume.light.triangles import TriangleLights, subdivide
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 from relume.transfer.shade import shade
 from relume.transfer.term_image import TermImage
 

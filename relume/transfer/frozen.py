@@ -17,7 +17,9 @@ from relume.brdf.term import Term
 from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.contraction import contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import Receivers
 from relume.transfer.stream import TILE_SAMPLES
 
 F32 = NDArray[np.float32]

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from relume.brdf.term import Term
 from relume.transfer.frozen import tiles_of
 from relume.transfer.material_image import MaterialImage
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import View

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.transfer.along import Along, AlongCurve
+from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, frozen_bytes
 from relume.transfer.material_image import MaterialImage
-from relume.transfer.projector import Receivers, contract
+from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import Light, ViewImages

@@ -1,4 +1,4 @@
-"""The kernels of `relume.transfer.gathered`: gather rays listed with their light, weighed by curves, put into bands.
+"""The kernels of `relume.transfer.ray_projector`: rays listed with their light, weighed, put into bands.
 
 A ray is a direction, where a light triangle has an extent: it falls into one band of every curve.
 """
@@ -79,7 +79,7 @@ def _spread(settings, setting_of, band, weight, num, out):  # type: ignore[no-un
 def project_rays(  # type: ignore[no-untyped-def]
     first, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
 ):
-    """Add listed rays to their points; curves as in `relume.transfer.projector.Contraction`.
+    """Add listed rays to their points; curves as in `relume.transfer.contraction.Contraction`.
 
     Args:
         first, wi, wo, power: from `list_rays`. shading: quotients, one row for all channels, or three. (1 or 3, K)

@@ -30,8 +30,10 @@ from relume.brdf.term import Curve, Term
 from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges
+from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, tiles_of
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import Receivers
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -13,8 +13,8 @@ from relume.trace.cell_tree import CellTree
 from relume.trace.coherent import RayCounts
 from relume.trace.gather_rays import Pattern, make_pattern
 from relume.transfer.base import StoreReader
-from relume.transfer.gathered import CellLight, GatherRays
-from relume.transfer.projector import Receivers
+from relume.transfer.gathered import CellLight
+from relume.transfer.receivers import GatherRays, Receivers
 
 F32 = NDArray[np.float32]
 

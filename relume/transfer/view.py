@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.errors import ChunkDamagedError
 from relume.trace.view_samples import BACKGROUND
 from relume.transfer.base import StoreReader
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 from relume.transfer.stored import read_gather_rays, read_receivers
 
 F32 = NDArray[np.float32]

@@ -16,8 +16,9 @@ from relume.brdf.registry import TERMS
 from relume.errors import CancelledError, MemoryBudgetError
 from relume.light.triangles import subdivide
 from relume.transfer.cache import FrozenCache
+from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, freeze, frozen_bytes
-from relume.transfer.projector import Projector, contract
+from relume.transfer.projector import Projector
 from relume.transfer.stream import columns_of, stream
 
 RNG = np.random.default_rng(0)

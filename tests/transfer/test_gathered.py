@@ -25,11 +25,13 @@ from relume.trace.gather_rays import local_ray, make_pattern, shift_of, weight_o
 from relume.trace.geometry import merge
 from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
-from relume.transfer.gathered import CellLight, GatherRays
+from relume.transfer.contraction import contract
+from relume.transfer.gathered import CellLight
 from relume.transfer.glimpse import Glimpse
 from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import GatherRays, Receivers
 from relume.transfer.registry import METHODS
 from relume.transfer.render import render_image
 from relume.transfer.thinned import thinned

@@ -22,7 +22,9 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.light.environment import texel_directions
 from relume.light.triangles import subdivide
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.contraction import contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import Receivers
 
 DOCUMENT = {"model": "cook_torrance", "params": {"sigma": 0.05}}
 TERM = TERMS["cook_torrance"]

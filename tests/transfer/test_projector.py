@@ -13,7 +13,9 @@ from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Angle
 from relume.light.triangles import subdivide
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.contraction import contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import Receivers
 
 NUM_POINTS = 40
 # every curve that enters the transport, and every pair of a term's

@@ -13,7 +13,8 @@ from relume.brdf.registry import TERMS
 from relume.brdf.sweep import bands_at, moved_curves, slider_values
 from relume.errors import CancelledError
 from relume.light.triangles import subdivide
-from relume.transfer.projector import Projector, contract
+from relume.transfer.contraction import contract
+from relume.transfer.projector import Projector
 from relume.transfer.slider import MAX_ERROR, MAX_NODES, linearise
 from relume.transfer.stream import columns_of, stream
 

@@ -21,7 +21,7 @@ from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
 from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
-from relume.transfer.projector import Receivers
+from relume.transfer.receivers import Receivers
 from relume.transfer.registry import METHODS
 
 EDITED = {

@@ -8,7 +8,9 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.light.environment import texel_directions, texel_solid_angles
-from relume.transfer.projector import Projector, Receivers, contract
+from relume.transfer.contraction import contract
+from relume.transfer.projector import Projector
+from relume.transfer.receivers import Receivers
 from relume.transfer.view import View
 
 

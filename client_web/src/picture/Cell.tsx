@@ -12,7 +12,7 @@ import { stage } from "./stage";
 import { pan, zoomAt } from "./transform";
 import { Waiting } from "./Waiting";
 import { WipeHandle } from "./WipeHandle";
-import { moveTo, transformOf } from "./zoom";
+import { moveTo, transformOf } from "./places";
 
 const CLICK_PX = 4;
 const PAN_PX = 48;

@@ -2,7 +2,7 @@
 import { drawn, wipe } from "../state/store";
 import type { Screen } from "./screen";
 import { shownWidth, toScreen } from "./transform";
-import { transformOf } from "./zoom";
+import { transformOf } from "./places";
 
 const STEP = 0.02;
 

@@ -1,7 +1,7 @@
 /** What lies under the pointer. */
 import type { Screen } from "./screen";
 import { toPicture } from "./transform";
-import { transformOf } from "./zoom";
+import { transformOf } from "./places";
 
 export interface Hit {
   /** In the canvas, CSS pixels. */

@@ -6,7 +6,7 @@ import * as store from "../state/store";
 import type { Picture } from "./picture";
 import { Renderer } from "./renderer";
 import { MARGIN_ALONE, MARGIN_BESIDE, shownWidth, toScreen, type Canvas } from "./transform";
-import { transformOf } from "./zoom";
+import { transformOf } from "./places";
 
 const MAX_WAIT_MS = 250;
 const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];

@@ -1,19 +1,9 @@
-/** Zoom as buttons and keys know it. Each view has its own, and another one beside others. */
-import { alonePlaces, besidePlaces, sideBySide } from "../state/store";
+/** Zoom of the active view, as buttons and keys know it. */
+import { moveTo, transformOf } from "./places";
 import { stage } from "./stage";
-import { FIT, shownWidth, zoomAt, type Canvas, type Transform } from "./transform";
+import { FIT, shownWidth, zoomAt, type Canvas } from "./transform";
 
-const places = () => (sideBySide.value ? besidePlaces : alonePlaces);
 const NOWHERE: Canvas = { width: 1, height: 1, aspect: 1, margin: 0 };
-
-export function transformOf(view: string): Transform {
-  return places().value.get(view) ?? FIT;
-}
-
-export function moveTo(view: string, transform: Transform): void {
-  const table = places();
-  table.value = new Map(table.peek()).set(view, transform);
-}
 
 /** The canvas of the view that keys mean. */
 const canvas = () => stage.active.screen?.size() ?? NOWHERE;
