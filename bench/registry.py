@@ -45,6 +45,7 @@ GROUPS = (
     Group("bench.bandwidth", ("frame.bandwidth_ratio",)),
     Group("bench.incremental", ("frame.incremental_rmse",)),
     Group("bench.curve_switch", ("freeze.curve_switch_s",)),
+    Group("bench.curve_switch_terms", ("freeze.terms_s",)),
     Group("bench.glimpse", ("glimpse.speedup", "glimpse.error")),
     Group("bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
     Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
