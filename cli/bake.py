@@ -78,12 +78,14 @@ def _recipe(
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:
     from cli.follow import follow
+    from cli.interrupts import noted_interrupts
 
     began = time.monotonic()
     try:
-        service.start()
-        with service.subscribe(identity) as changes:
-            status = follow(changes, label)
+        with noted_interrupts() as asked:
+            service.start()
+            with service.subscribe(identity) as changes:
+                status = follow(changes, label, asked.is_set)
     except KeyboardInterrupt:
         return _interrupted(service, settings, identity)
     return _report(status, settings, time.monotonic() - began)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
@@ -9,8 +11,8 @@ from worker.board import Subscription
 from worker.status import BakeStatus
 
 
-def follow(changes: Subscription, label: str) -> BakeStatus:
-    """Show progress until the bake ends, and return its last status. KeyboardInterrupt passes through."""
+def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = lambda: False) -> BakeStatus:
+    """Show progress until the bake ends, and return its last status. Raises KeyboardInterrupt when `interrupted`."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[detail]}"))
     with Progress(*columns, console=console, transient=True) as progress:
@@ -18,6 +20,8 @@ def follow(changes: Subscription, label: str) -> BakeStatus:
         while not (status := changes.latest).final:
             progress.update(bar, completed=status.progress, detail=detail(status))
             changes.get(timeout=0.5)
+            if interrupted():
+                raise KeyboardInterrupt
     return status
 
 

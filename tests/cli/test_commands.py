@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.interrupts import noted_interrupts
 from cli.main import main
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh
@@ -190,6 +191,13 @@ def wait_for_state(data: Path, state: str) -> None:
             return
         time.sleep(0.05)
     pytest.fail(f"the bake did not become {state}")
+
+
+def test_interrupt_is_noted_and_raised_nowhere_else() -> None:
+    with noted_interrupts() as asked:
+        assert not asked.is_set()
+        os.kill(os.getpid(), signal.SIGINT)
+        assert asked.wait(10)
 
 
 def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data: Path) -> None:
