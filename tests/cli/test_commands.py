@@ -211,7 +211,8 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     assert "cancelled; finished parts are kept" in err
     assert "Traceback" not in err
     assert only_bake(data).state == "cancelled"
-    assert subprocess.run([*RELUME, *LONG], capture_output=True, check=False).returncode == 0
+    again = subprocess.run([*RELUME, *LONG], capture_output=True, check=False, text=True)
+    assert again.returncode == 0, again.stderr
     assert only_bake(data).state == "ready"
 
 
