@@ -13,6 +13,8 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+from relume.errors import CancelledError
+
 # two shares even out a core that is busy with something else; more cost more to hand out than they win
 _SHARES_A_THREAD = 2
 
@@ -52,6 +54,36 @@ def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> 
     Ranges must not depend on each other. The first exception is raised here after all ranges have ended.
     """
     _run(kernel, count, grain, "kernel")
+
+
+def for_steps(
+    kernel: Callable[[int, int], object],
+    count: int,
+    grain: int,
+    progress: Callable[[float], object],
+    cancelled: Callable[[], bool],
+    what: str,
+) -> None:
+    """`for_ranges` for long work that is watched and may be stopped.
+
+    Args:
+        progress: called with the share done after each range. cancelled: asked before each.
+        what: the work is called, in the error.
+    Raises:
+        CancelledError: `cancelled` said so.
+    """
+    lock, done = threading.Lock(), 0
+
+    def step(start: int, stop: int) -> None:
+        nonlocal done
+        if cancelled():
+            raise CancelledError(f"{what} was cancelled")
+        kernel(start, stop)
+        with lock:
+            done += stop - start
+            progress(done / count)
+
+    for_ranges(step, count, grain)
 
 
 def for_shares(kernel: Callable[[int, int], object], count: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,8 +13,7 @@ from relume.basis.bands import MAX_ANGLE
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
-from relume.errors import CancelledError
-from relume.parallel import for_ranges
+from relume.parallel import for_steps
 from relume.reference.kernel import add_lights, list_visible
 from relume.reference.texels import Texels
 from relume.trace.geometry import Geometry
@@ -115,11 +113,8 @@ def reference_radiance(
     """
     tables = [[_tabulate(document) for document in terms] for terms in materials]
     radiance = np.zeros((len(materials), points.num_points, 3))
-    lock, done = threading.Lock(), [0]
 
     def packet(start: int, stop: int) -> None:
-        if cancelled():
-            raise CancelledError("the reference was cancelled")
         lights = texels
         if 0 < spp < texels.num_texels:
             lights = texels.chosen(spp, np.random.default_rng((_SEED, pass_index, start)))
@@ -127,11 +122,8 @@ def reference_radiance(
         for first in range(0, lights.num_texels, _TEXELS_AT_ONCE):
             rows = slice(first, first + _TEXELS_AT_ONCE)
             _add_texels(geometry, lights.direction[rows], lights.power[rows], some, tables, radiance[:, start:stop])
-        with lock:
-            done[0] += stop - start
-            progress(done[0] / points.num_points)
 
-    for_ranges(packet, points.num_points, _POINTS_A_PACKET)
+    for_steps(packet, points.num_points, _POINTS_A_PACKET, progress, cancelled, "the reference")
     return radiance
 
 

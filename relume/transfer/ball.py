@@ -70,6 +70,6 @@ def _shaded(documents: Sequence[Mapping[str, Any]], receivers: Receivers) -> NDA
     for document in documents:
         image = TermImage(document, receivers.normal[:, 2].astype(np.float64))
         shaded = shade(image.term, image.target, _lights(), receivers, lambda share: None, lambda: False)
-        rows = shaded.image.transpose(0, 2, 1).reshape(-1, 3)[:num] * np.asarray(document["color"])
+        rows = shaded.rows(num) * np.asarray(document["color"])
         radiance += rows if image.outgoing is None else rows * image.outgoing.T
     return radiance

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from relume.basis.daubechies import forward
 from relume.brdf.term import Term
-from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
-from relume.parallel import for_ranges
+from relume.parallel import for_steps
 from relume.transfer.contraction import contract
 from relume.transfer.projector import Projector
 from relume.transfer.receivers import Receivers
@@ -80,12 +79,10 @@ def freeze(
     tiles, samples = tiles_of(num_samples)
     transport = np.empty((tiles, 3, num_bands, samples), np.float32)
     squares = np.zeros((3, num_bands))
-    lock, done = threading.Lock(), [0]
+    lock = threading.Lock()
 
     def step(first: int, last: int) -> None:
         """Project, transform and lay out padded samples [first, last)."""
-        if cancelled():
-            raise CancelledError("freezing was cancelled")
         projector = Projector(term, contraction, lights, receivers)
         for begin, end in _within_tiles(first, last, samples):
             filled = max(begin, min(end, num_samples))
@@ -97,11 +94,8 @@ def freeze(
             transport[tile, :, :, offset : offset + end - begin] = rows.transpose(0, 2, 1)
             with lock:
                 np.add(squares, np.einsum("csj,csj->cj", rows, rows, dtype=np.float64), out=squares)
-        with lock:
-            done[0] += last - first
-            progress(done[0] / (tiles * samples))
 
-    for_ranges(step, tiles * samples, _SAMPLES_A_STEP)
+    for_steps(step, tiles * samples, _SAMPLES_A_STEP, progress, cancelled, "freezing")
     return Frozen(transport, np.sqrt(squares))
 
 

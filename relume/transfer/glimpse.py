@@ -18,7 +18,6 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from relume.brdf.term import Term
-from relume.transfer.frozen import tiles_of
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade
@@ -178,9 +177,4 @@ class Glimpse:
 
 def _spread(shaded: Shaded, weights: Any) -> F32:
     """An image of all samples from that of the few. (tiles, 3, samples) float32"""
-    num_samples, num_shaded = weights.shape
-    few = shaded.image.transpose(0, 2, 1).reshape(-1, 3)[:num_shaded]
-    tiles, samples = tiles_of(num_samples)
-    rows = np.zeros((tiles * samples, 3), np.float32)
-    rows[:num_samples] = weights @ few
-    return np.ascontiguousarray(rows.reshape(tiles, samples, 3).transpose(0, 2, 1))
+    return Shaded.of(weights @ shaded.rows(weights.shape[1])).image

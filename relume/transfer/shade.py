@@ -7,7 +7,6 @@ The same sums as freezing makes, in another order, so that a picture does not ch
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -15,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
-from relume.parallel import for_ranges
+from relume.parallel import for_steps
 from relume.transfer.contraction import contract
 from relume.transfer.frozen import tiles_of
 from relume.transfer.projector import Projector
@@ -33,6 +31,18 @@ class Shaded:
     """An image of one term, before colour, texture and outgoing curves. (tiles, 3, samples) float32"""
 
     image: F32
+
+    @classmethod
+    def of(cls, rows: F32) -> Shaded:
+        """From one row for each sample, padded with zeros to whole tiles. rows: (n, 3)"""
+        tiles, samples = tiles_of(len(rows))
+        padded = np.zeros((tiles * samples, 3), np.float32)
+        padded[: len(rows)] = rows
+        return cls(np.ascontiguousarray(padded.reshape(tiles, samples, 3).transpose(0, 2, 1)))
+
+    def rows(self, num_samples: int) -> F32:
+        """One row for each sample. (num_samples, 3)"""
+        return self.image.transpose(0, 2, 1).reshape(-1, 3)[:num_samples]
 
     @property
     def num_bytes(self) -> int:
@@ -63,18 +73,11 @@ def shade(
         CancelledError: `cancelled` said so.
     """
     num_samples = len(receivers.normal)
-    tiles, samples = tiles_of(num_samples)
-    rows = np.zeros((tiles * samples, 3), np.float32)
+    rows = np.zeros((num_samples, 3), np.float32)
     contraction = contract(term, bands, None)
-    lock, done = threading.Lock(), [0]
 
     def step(start: int, stop: int) -> None:
-        if cancelled():
-            raise CancelledError("shading was cancelled")
         rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)[:, 0]
-        with lock:
-            done[0] += stop - start
-            progress(done[0] / num_samples)
 
-    for_ranges(step, num_samples, _SAMPLES_A_STEP)
-    return Shaded(np.ascontiguousarray(rows.reshape(tiles, samples, 3).transpose(0, 2, 1)))
+    for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "shading")
+    return Shaded.of(rows)

@@ -13,7 +13,6 @@ solid angle, to 10⁻³.
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -27,9 +26,8 @@ from relume.brdf.curves import curve_bands, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
 from relume.brdf.term import Curve, Term
-from relume.errors import CancelledError
 from relume.light.triangles import TriangleLights
-from relume.parallel import for_ranges
+from relume.parallel import for_steps
 from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.projector import Projector
@@ -132,21 +130,15 @@ class Linearised:
         num_samples = len(receivers.normal)
         tiles, samples = tiles_of(num_samples)
         rows = np.zeros((tiles * samples, self.num_columns, 3), np.float32)
-        lock, done = threading.Lock(), [0]
 
         def step(start: int, stop: int) -> None:
-            if cancelled():
-                raise CancelledError("freezing was cancelled")
             projected = Projector(term, contraction, lights, receivers).project(start, stop)
             if alone is not None:
                 matrices = at_nodes[alone].astype(np.float32)
                 projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
             rows[start:stop] = projected
-            with lock:
-                done[0] += stop - start
-                progress(done[0] / num_samples)
 
-        for_ranges(step, num_samples, _SAMPLES_A_STEP)
+        for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "freezing")
         importance = np.sqrt(np.einsum("nsc,nsc->cs", rows, rows, dtype=np.float64))
         transport = rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1)
         return Frozen(np.ascontiguousarray(transport), importance)
