@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,6 +13,11 @@ Side = Annotated[int, Field(ge=1, le=16384)]
 Preset = Literal["preview", "good", "final"]
 ImageFormat = Literal["exr", "png", "webp"]
 MAX_LOOKS = 1000
+
+
+def moment(posix_s: float) -> str:
+    """A time as all bodies write it: ISO 8601, UTC."""
+    return datetime.fromtimestamp(posix_s, UTC).isoformat()
 
 
 class Body(BaseModel):

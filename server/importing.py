@@ -16,12 +16,16 @@ import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from relume.errors import RelumeError, SceneError
 
+if TYPE_CHECKING:  # the import process itself has no use for it
+    from server.settings import Settings
+
 MAX_OUTPUT_BYTES = 64 * 1024
 UPLOAD_PREFIX = "upload-"
+Kind = Literal["scene", "environment"]
 
 
 @dataclass(frozen=True)
@@ -37,12 +41,26 @@ class Order:
 
     data: str
     database: str
-    kind: Literal["scene", "environment"]
+    kind: Kind
     file: str
     environment: str | None
     name: str
     seconds: int
     max_bytes: int
+
+    @classmethod
+    def of(cls, settings: Settings, kind: Kind, file: Path, name: str, environment: Path | None = None) -> Order:
+        """An order within a server's limits."""
+        return cls(
+            data=str(settings.data.resolve()),
+            database=settings.database_url,
+            kind=kind,
+            file=str(file),
+            environment=None if environment is None else str(environment),
+            name=name,
+            seconds=settings.import_seconds,
+            max_bytes=settings.import_bytes,
+        )
 
 
 def import_in_process(order: Order) -> str:

@@ -17,6 +17,7 @@ from relume.imageio import png_bytes
 from relume.transfer.base import Plan, Recipe
 from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
 from server.errors import NotReadyError
+from server.png import FOREVER, PngResponse
 from server.services import Services, Shared
 from worker.presets import PRESETS
 from worker.scenes import get_scene
@@ -81,26 +82,24 @@ def cancel_bake(bake: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
-@router.get(
-    "/{bake}/views/{view}/materials.png", response_class=Response, responses={200: {"content": {"image/png": {}}}}
-)
-async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> Response:
+@router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse)
+async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> PngResponse:
     """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
         if view not in transfer.views:
             raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
         png = await run_in_threadpool(lambda: png_bytes(transfer.views[view].material_ids()))
-    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=31536000, immutable"})
+    return PngResponse(png, headers=FOREVER)
 
 
-@router.get("/{bake}/environment.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
-async def own_environment(bake: Id, services: Shared) -> Response:
+@router.get("/{bake}/environment.png", response_class=PngResponse)
+async def own_environment(bake: Id, services: Shared) -> PngResponse:
     """The light that the scene came with, as small as those of /api/environments."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
         png = await run_in_threadpool(lambda: thumbnail(transfer.radiance_of(None)))
-    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=31536000, immutable"})
+    return PngResponse(png, headers=FOREVER)
 
 
 def ready_bake(services: Services, bake: str) -> BakeStatus:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi import Path as PathPart
@@ -16,8 +15,9 @@ from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.shelf import SHELF, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.thumbnail import thumbnail
 from relume.shelf import check_name
-from server.bodies import EnvironmentBody, Id
+from server.bodies import EnvironmentBody, Id, moment
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
+from server.png import A_DAY, PngResponse
 from server.services import Services, Shared
 from server.uploads import keep_upload, plain_stem
 from worker.paths import environments_path
@@ -26,7 +26,6 @@ router = APIRouter(prefix="/api/environments", tags=["environments"])
 MapFile = Annotated[UploadFile, File(description="equirectangular environment map, .hdr or .exr")]
 MapName = Annotated[str, Form(max_length=200)]
 AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported environment, or name of a built-in one")]
-PNG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/png": {}}}}
 
 
 @router.post("", status_code=201)
@@ -44,17 +43,9 @@ def _import(environment: UploadFile, name: str, services: Services) -> str:
     settings = services.settings
     name = check_name(name or plain_stem(environment.filename) or "Environment")
     with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        order = Order(
-            data=str(settings.data.resolve()),
-            database=settings.database_url,
-            kind="environment",
-            file=str(keep_upload(environment, Path(folder) / "environment")),
-            environment=None,
-            name=name,
-            seconds=settings.import_seconds,
-            max_bytes=settings.import_bytes,
+        return import_in_process(
+            Order.of(settings, "environment", keep_upload(environment, Path(folder) / "environment"), name)
         )
-        return import_in_process(order)
 
 
 @router.get("")
@@ -72,14 +63,14 @@ def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
     return _body(get_record(environments_path(services.settings.data), environment))
 
 
-@router.get("/{environment}/thumbnail.png", response_class=Response, responses=PNG)
-def get_thumbnail(environment: AnyId, services: Shared) -> Response:
+@router.get("/{environment}/thumbnail.png", response_class=PngResponse)
+def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
     """A small tone-mapped picture, 192 × 96."""
     if environment in BUILT_IN:
         png = _built_in_thumbnail(environment)
     else:
         png = thumbnail_path(environments_path(services.settings.data), environment).read_bytes()
-    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+    return PngResponse(png, headers=A_DAY)
 
 
 @router.delete("/{environment}", status_code=204)
@@ -106,7 +97,7 @@ def _body(record: EnvironmentRecord) -> EnvironmentBody:
         id=record.id,
         map=record.map,
         name=record.name,
-        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        created=moment(record.created),
         warnings=list(record.warnings),
         thumbnail=f"/api/environments/{record.id}/thumbnail.png",
     )

@@ -6,13 +6,14 @@ from dataclasses import asdict
 from functools import lru_cache
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.look.library import navigation_map, presets
 from relume.look.terms import complete_term
 from server.bodies import MapPoint, MaterialBody, MaterialMapBody
+from server.png import A_DAY, PngResponse
 
 router = APIRouter(prefix="/api/materials", tags=["materials"])
 Part = Annotated[str, Path(max_length=100)]
@@ -45,13 +46,11 @@ def material_at(
     return navigation_map().at(f0, sigma)
 
 
-@router.get(
-    "/{table}/{material}/thumbnail.png", response_class=Response, responses={200: {"content": {"image/png": {}}}}
-)
-async def thumbnail(table: Part, material: Part) -> Response:
+@router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse)
+async def thumbnail(table: Part, material: Part) -> PngResponse:
     """A ball of a library material."""
     png = await run_in_threadpool(_thumbnail, f"{table}/{material}")
-    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+    return PngResponse(png, headers=A_DAY)
 
 
 @lru_cache(maxsize=1024)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
-from server.bodies import LookEntry
+from server.bodies import LookEntry, moment
 from server.looks import SavedLook, check_name, parse_document
 from server.services import Shared
 
@@ -25,7 +24,7 @@ def list_looks(services: Shared) -> list[LookEntry]:
         LookEntry(
             name=look.name,
             etag=look.etag,
-            modified=datetime.fromtimestamp(look.modified, UTC).isoformat(),
+            modified=moment(look.modified),
             bytes=len(look.document.encode()),
         )
         for look in services.looks.list()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,8 +13,9 @@ from fastapi.concurrency import run_in_threadpool
 from relume.look.terms import complete_term
 from relume.measured.shelf import SHELF, MaterialRecord, get_record, keep, records
 from relume.shelf import check_name
-from server.bodies import Id, MeasuredBody
+from server.bodies import Id, MeasuredBody, moment
 from server.importing import UPLOAD_PREFIX
+from server.png import A_DAY, PngResponse
 from server.services import Services, Shared
 from server.uploads import keep_upload, plain_stem
 from worker.paths import materials_path
@@ -55,12 +55,12 @@ def get_measured(material: Id, services: Shared) -> MeasuredBody:
     return _body(get_record(materials_path(services.settings.data), material))
 
 
-@router.get("/{material}/thumbnail.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
-async def get_thumbnail(material: Id, services: Shared) -> Response:
+@router.get("/{material}/thumbnail.png", response_class=PngResponse)
+async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball of the material."""
     record = get_record(materials_path(services.settings.data), material)
     png = await run_in_threadpool(_thumbnail, record)
-    return Response(png, media_type="image/png", headers={"Cache-Control": "public, max-age=86400"})
+    return PngResponse(png, headers=A_DAY)
 
 
 @lru_cache(maxsize=256)
@@ -86,7 +86,7 @@ def _body(record: MaterialRecord) -> MeasuredBody:
         id=record.id,
         data=record.data,
         name=record.name,
-        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        created=moment(record.created),
         terms=_terms(record),
         thumbnail=f"/api/materials/measured/{record.id}/thumbnail.png",
         lobes_error=record.lobes_error,

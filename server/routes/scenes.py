@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView
+from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView, moment
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import MAX_WIDTH, thumbnail
@@ -47,17 +46,10 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
     with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        order = Order(
-            data=str(settings.data.resolve()),
-            database=settings.database_url,
-            kind="scene",
-            file=str(keep_upload(scene, Path(folder) / "scene")),
-            environment=None if environment is None else str(keep_upload(environment, Path(folder) / "environment")),
-            name=name.strip() or plain_stem(scene.filename) or "Scene",
-            seconds=settings.import_seconds,
-            max_bytes=settings.import_bytes,
-        )
-        return import_in_process(order)
+        file = keep_upload(scene, Path(folder) / "scene")
+        lit_by = None if environment is None else keep_upload(environment, Path(folder) / "environment")
+        name = name.strip() or plain_stem(scene.filename) or "Scene"
+        return import_in_process(Order.of(settings, "scene", file, name, lit_by))
 
 
 @router.get("")
@@ -106,7 +98,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
     return SceneBody(
         id=record.id,
         name=record.name,
-        created=datetime.fromtimestamp(record.created, UTC).isoformat(),
+        created=moment(record.created),
         views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
         materials=[SceneMaterial(name=m["name"], terms=m["terms"]) for m in record.materials],
         lights=[],
