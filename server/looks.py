@@ -19,7 +19,7 @@ from server.tables import LookRow
 
 MAX_LOOK_BYTES = 256 * 1024
 MAX_LOOKS = 10_000
-PARTS = ("materials", "environment", "lights", "display")
+PARTS = ("materials", "environment", "lights", "transport", "display")
 
 
 @dataclass(frozen=True)

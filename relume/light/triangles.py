@@ -45,6 +45,10 @@ class TriangleLights:
         """M."""
         return int(self.nodes.shape[2])
 
+    def none(self) -> TriangleLights:
+        """None of them: no light comes from the environment itself."""
+        return TriangleLights(self.nodes[:, :, :0], self.direction[:0], self.power[:0])
+
     @cached_property
     def radius(self) -> F32:
         """Angle within which of its direction all of a light lies: that to its farthest corner, radians. (M,)"""

@@ -8,15 +8,17 @@ from typing import Any, get_args
 from relume import environments
 from relume.errors import ParameterError
 from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_rgb, fail, names_text
-from relume.look.model import Look, ToneMap
+from relume.look.model import Look, Show, ToneMap
 from relume.look.terms import complete_term
 from relume.scene.model import Material
 
 MAX_TERMS = 16
 MAX_SCALE = 1e4
 MAX_EXPOSURE = 20.0
-_SECTIONS = ("materials", "environment", "lights", "display")
+MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
+_SECTIONS = ("materials", "environment", "lights", "transport", "display")
 _DEFAULT_ENVIRONMENT: dict[str, Any] = {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+_DEFAULT_TRANSPORT: dict[str, Any] = {"show": "all", "bounces": MAX_BOUNCES}
 
 
 def default_look(scene_materials: Sequence[Material], light_names: Sequence[str] = ()) -> dict[str, Any]:
@@ -32,6 +34,7 @@ def default_look(scene_materials: Sequence[Material], light_names: Sequence[str]
         },
         "environment": dict(_DEFAULT_ENVIRONMENT),
         "lights": {name: {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True} for name in light_names},
+        "transport": dict(_DEFAULT_TRANSPORT),
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
 
@@ -65,6 +68,7 @@ def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[st
             partial.get("environment", {}), default["environment"], known["environment"]
         ),
         "lights": _complete_lights(partial.get("lights", {}), default["lights"]),
+        "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),
     }
 
@@ -120,6 +124,17 @@ def _complete_light(pointer: Pointer, given: Any, default: Mapping[str, Any]) ->
     check_rgb((*pointer, "color"), merged["color"], 0.0, MAX_COLOR)
     if not isinstance(merged["on"], bool):
         raise fail((*pointer, "on"), merged["on"], "true or false")
+    return merged
+
+
+def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    pointer = ("transport",)
+    merged = _merged(pointer, given, {**_DEFAULT_TRANSPORT, **default})  # older stores know of no transport
+    if merged["show"] not in get_args(Show):
+        raise fail((*pointer, "show"), merged["show"], f"one of {names_text(get_args(Show))}")
+    bounces = merged["bounces"]
+    if not isinstance(bounces, int) or isinstance(bounces, bool) or not 0 <= bounces <= MAX_BOUNCES:
+        raise fail((*pointer, "bounces"), bounces, f"a whole number from 0 to {MAX_BOUNCES}")
     return merged
 
 

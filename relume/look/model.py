@@ -12,6 +12,7 @@ from typing_extensions import TypedDict  # pydantic asks for this one before Pyt
 
 Rgb = tuple[float, float, float]
 ToneMap = Literal["agx", "filmic", "none"]
+Show = Literal["all", "direct", "first_bounce", "further_bounces"]
 
 
 class DrawnCurve(TypedDict):
@@ -89,6 +90,44 @@ class LightLook(_Frozen):
     on: bool
 
 
+class Paths(NamedTuple):
+    """Which light paths a picture shows: light reaches a surface straight from a light, or by way of other surfaces.
+
+    Attributes:
+        direct: whether straight ones count.
+        first, last: how many surfaces the others have on their way; none of them counts where last < first.
+    """
+
+    direct: bool
+    first: int
+    last: int
+
+    @property
+    def reflect(self) -> bool:
+        """Whether any paths between surfaces count."""
+        return self.last >= self.first
+
+    def without_reflections(self) -> Paths:
+        """The straight ones of them."""
+        return Paths(self.direct, 1, 0)
+
+
+class TransportLook(_Frozen):
+    """Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any,
+    those with one, or those with more."""
+
+    show: Show
+    bounces: int
+
+    @property
+    def paths(self) -> Paths:
+        """The same as numbers; equal wherever the picture is."""
+        first = 2 if self.show == "further_bounces" else 1
+        most = {"direct": 0, "first_bounce": 1}.get(self.show, self.bounces)
+        paths = Paths(self.show in ("all", "direct"), first, min(most, self.bounces))
+        return paths if paths.reflect else paths.without_reflections()
+
+
 class DisplayLook(_Frozen):
     """How radiance becomes a picture: `exposure` in stops, then the tone map."""
 
@@ -102,4 +141,5 @@ class Look(_Frozen):
     materials: dict[str, MaterialLook]
     environment: EnvironmentLook
     lights: dict[str, LightLook]
+    transport: TransportLook
     display: DisplayLook

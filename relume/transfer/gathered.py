@@ -7,15 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.bounces import bounced, irradiance
+from relume.light.bounces import bounce, bounced, irradiance
 from relume.light.triangles import TriangleLights
 from relume.trace.cell_tree import NO_CELL
 
 F32 = NDArray[np.float32]
-
-# of light between white walls 1e-3 is left after 22 bounces, where they reflect 0.73
-NUM_BOUNCES = 24
-
 
 Reflectances = tuple[tuple[float, ...], ...]
 """Of each material, from `relume.brdf.albedo.reflectances_of`."""
@@ -46,18 +42,24 @@ class CellLight:
             plain += of_texture * multiplier
         return np.asarray(np.clip(plain, 0.0, 1.0), np.float32)
 
-    def radiance(self, lights: TriangleLights, reflectances: Reflectances, num_bounces: int = NUM_BOUNCES) -> F32:
-        """What every cell sends out; row `NO_CELL` is black.
+    def irradiance(self, lights: TriangleLights) -> F32:
+        """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32"""
+        points, of_points = self.normal.reshape(-1, 3), self.visible.reshape(self.normal[..., 0].size, -1)
+        arriving = irradiance(points, of_points, lights).reshape(self.normal.shape)
+        return np.asarray(arriving.mean(axis=1, dtype=np.float64), np.float32)
+
+    def radiance(self, irradiance: F32, reflectances: Reflectances, first: int, last: int) -> F32:
+        """What every cell sends out of light that surfaces have reflected `first` to `last` times, its own included.
 
         Args:
-            num_bounces: reflections between cells; none leaves what they reflect of the lights themselves.
+            irradiance: from `irradiance`. first: at least 1. last: not less.
         Returns:
-            (NO_CELL + 1, 3) float32
+            Row `NO_CELL` is black. (NO_CELL + 1, 3) float32
         """
-        points, of_points = self.normal.reshape(-1, 3), self.visible.reshape(self.normal[..., 0].size, -1)
-        arriving = irradiance(points, of_points, lights).reshape(self.normal.shape).mean(axis=1, dtype=np.float64)
         reflectance = self.reflectance(reflectances)
-        direct = (reflectance / np.pi * arriving).astype(np.float32)
+        sent = (reflectance / np.pi * irradiance).astype(np.float32)
+        for _ in range(first - 1):
+            sent = bounce(self.links, reflectance, sent)
         radiance = np.zeros((NO_CELL + 1, 3), np.float32)
-        radiance[: len(direct)] = bounced(self.links, reflectance, direct, num_bounces)
+        radiance[: len(sent)] = bounced(self.links, reflectance, sent, last - first)
         return radiance

@@ -18,12 +18,14 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from relume.brdf.term import Term
+from relume.trace.cell_tree import NO_CELL
+from relume.transfer.light import Light
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import View
-from relume.transfer.view_images import Light, ViewImages
+from relume.transfer.view_images import ViewImages
 
 F32 = NDArray[np.float32]
 
@@ -55,21 +57,23 @@ class Sparse:
     def lit_by(self, reflected: F32 | None) -> Receivers:
         """The few samples with the radiance of the gather cells as it is now."""
         rays = self.receivers.rays
-        if rays is None or reflected is None:
-            return self.receivers
-        return replace(self.receivers, rays=replace(rays, radiance=reflected))
+        lit = None if rays is None or reflected is None else replace(rays, radiance=reflected)
+        return replace(self.receivers, rays=lit)
 
 
-def choose_sparse(view: View, material: int, reflected: F32 | None) -> Sparse:
-    """One sample of each square of pixels that a material is seen in; reads the store, see `View.receivers`.
+def choose_sparse(view: View, material: int, *, has_rays: bool) -> Sparse:
+    """One sample of each square of pixels that a material is seen in; reads the store.
 
     Those between take the mean of the nearest, by place in the picture and by normal.
+
+    Args:
+        has_rays: whether gather rays were baked; they bring nothing before `Sparse.lit_by`.
     """
     rows = view.rows(material)
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
     _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
-    whole = view.receivers(material, reflected)
+    whole = view.receivers(material, np.zeros((NO_CELL + 1, 3), np.float32) if has_rays else None)
     place = np.concatenate([np.stack([x, y], axis=1), _PIXELS_A_TURN * step * whole.normal], axis=1)
     num = min(_NUM_NEIGHBOURS, len(chosen))
     distance, nearest = cKDTree(place[chosen]).query(place, k=list(range(1, num + 1)))
@@ -85,11 +89,11 @@ def choose_sparse(view: View, material: int, reflected: F32 | None) -> Sparse:
     )
 
 
-def _sparse(images: ViewImages, material: int, reflected: F32 | None) -> Sparse:
+def _sparse(images: ViewImages, material: int) -> Sparse:
     """Of a material of a view, kept in the cache with the operators."""
 
     def choose() -> Sparse:
-        return choose_sparse(images.view, material, reflected)
+        return choose_sparse(images.view, material, has_rays=images.transfer.cells is not None)
 
     return images.cache.get(_key(images, material), Sparse, _bytes_of(images, material), choose)
 
@@ -158,12 +162,11 @@ class Glimpse:
             CancelledError: `cancelled` said so.
         """
         transfer = self.images.transfer
-        lights, reflected = transfer.rough_lights_in(self.light.environment), transfer.reflected_in(*self.light)
+        lights, reflected = transfer.rough_lights_of(self.light), transfer.reflected_in(self.light)
         found = []
         for k, part in enumerate(self.parts):
-            sparse = _sparse(self.images, part.material.index, reflected)
-            receivers = sparse.lit_by(reflected)
-            shaded = shade(part.term, part.bands, lights, receivers, lambda share: None, cancelled)
+            sparse = _sparse(self.images, part.material.index)
+            shaded = shade(part.term, part.bands, lights, sparse.lit_by(reflected), lambda share: None, cancelled)
             found.append(_spread(shaded, sparse.weights))
             progress((k + 1) / len(self.parts))
         return found

@@ -13,11 +13,12 @@ from relume.brdf.term import Term
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, frozen_bytes
+from relume.transfer.light import Light
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
-from relume.transfer.view_images import Light, ViewImages
+from relume.transfer.view_images import ViewImages
 
 
 class Candidate(NamedTuple):
@@ -77,10 +78,11 @@ class Need:
             CancelledError: `cancelled` said so.
         """
         images, active = self.images, self.active
-        lights = images.transfer.lights_in(self.light.environment)
+        lights = images.transfer.lights_of(self.light)
 
         def receivers() -> Receivers:
-            return images.view.receivers(self.material.index, images.transfer.reflected_in(*self.light))
+            reflected = images.transfer.reflected_in(self.light)
+            return images.view.receivers(self.material.index, reflected, is_lit=self.light.paths.direct)
 
         def frozen(along: Along) -> Frozen:
             return along.freeze(self.term, self.bands, lights, receivers(), progress, cancelled)

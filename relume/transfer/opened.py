@@ -21,7 +21,8 @@ from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
 from relume.store import open_store
 from relume.transfer.base import StoreReader
 from relume.transfer.derived import DerivedImages
-from relume.transfer.gathered import CellLight, Reflectances
+from relume.transfer.gathered import CellLight
+from relume.transfer.light import Light
 from relume.transfer.stored import read_cells, read_lights, read_tiles
 from relume.transfer.view import View, open_view
 
@@ -76,10 +77,16 @@ class Transfer:
         """The triangles of an environment: the tiles of the bake, weighed again."""
         return self.lights if environment == BAKED_ENVIRONMENT else self._weighed(environment)
 
-    def rough_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+    def lights_of(self, light: Light) -> TriangleLights:
+        """Those of them by which light comes straight to the picture."""
+        lights = self.lights_in(light.environment)
+        return lights if light.paths.direct else lights.none()
+
+    def rough_lights_of(self, light: Light) -> TriangleLights:
         """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
-        rough = shrunk(self.radiance_of(environment.map), _ROUGH_WIDTH)
-        return weigh(self._tiles, rough, environment.rotation)
+        rough = shrunk(self.radiance_of(light.environment.map), _ROUGH_WIDTH)
+        lights = weigh(self._tiles, rough, light.environment.rotation)
+        return lights if light.paths.direct else lights.none()
 
     @cached_property
     def _tiles(self) -> Tiles:
@@ -89,18 +96,23 @@ class Transfer:
     def _weighed(self) -> Callable[[EnvironmentKey], TriangleLights]:
         return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(self._tiles, self.radiance_of(key.map), key.rotation))
 
-    def reflected_in(self, environment: EnvironmentKey, reflectances: Reflectances) -> NDArray[np.float32] | None:
-        """Radiance of the gather cells; None where there are none."""
-        if self.cells is None:
+    def reflected_in(self, light: Light) -> NDArray[np.float32] | None:
+        """Radiance of the gather cells; None where they send nothing to the picture."""
+        if not light.paths.reflect:
             return None
         with self._lock:
-            return self._reflected(environment, reflectances)
+            return self._reflected(light)
 
     @cached_property
-    def _reflected(self) -> Callable[[EnvironmentKey, Reflectances], NDArray[np.float32]]:
-        assert self.cells is not None
-        radiance = self.cells.radiance
-        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key, reflectances: radiance(self.lights_in(key), reflectances))
+    def _reflected(self) -> Callable[[Light], NDArray[np.float32]]:
+        cells = self.cells
+        assert cells is not None
+        arriving = lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: cells.irradiance(self.lights_in(key)))
+
+        def radiance(light: Light) -> NDArray[np.float32]:
+            return cells.radiance(arriving(light.environment), light.reflectances, light.paths.first, light.paths.last)
+
+        return lru_cache(maxsize=_LIGHTS_KEPT)(radiance)
 
     def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
         """Radiance of a view's samples of an environment. (n, 3) float32"""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
-from relume.look import Look
+from relume.look import EnvironmentKey, Look
 from relume.transfer.cache import FrozenCache
 from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
@@ -60,7 +60,7 @@ class Picture:
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._shown_environment = self._images.light.environment
+        self._background: EnvironmentKey | None = None
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
         self._is_turning = self._lacks_glimpse = False
@@ -152,11 +152,11 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        environment = images.light.environment
-        if environment != self._shown_environment or not np.array_equal(self._gain, self._look.environment.gain):
-            self._gain, self._shown_environment = np.array(self._look.environment.gain), environment
-            first = self._view.num_surface_samples
-            self._radiance[:, first:] = self._transfer.background_in(environment, self._view).T
+        background = images.light.environment if images.light.paths.direct else None
+        if background != self._background or not np.array_equal(self._gain, self._look.environment.gain):
+            self._gain, self._background = np.array(self._look.environment.gain), background
+            outside = self._radiance[:, self._view.num_surface_samples :]
+            outside[:] = 0 if background is None else self._transfer.background_in(background, self._view).T
             tiles.update(self._view.all_tiles)
         return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
 

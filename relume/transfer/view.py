@@ -58,14 +58,18 @@ class View:
         """The samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
-    def receivers(self, material: int, reflected: F32 | None = None) -> Receivers:
+    def receivers(self, material: int, reflected: F32 | None = None, *, is_lit: bool = True) -> Receivers:
         """A material's samples as points that light arrives at; reads the store.
 
         Args:
             reflected: radiance of gather cells, whose light arrives too; from `Transfer.reflected_in`.
+            is_lit: whether light comes from the environment itself; else no bits are read.
         """
         rows = self.rows(material)
-        visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
+        if is_lit:
+            visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
+        else:
+            visible = np.empty((rows.stop - rows.start, 0), np.uint8)
         receivers = read_receivers(self.store, self.index, rows.start, rows.stop, visible)
         if reflected is None:
             return receivers

@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import NamedTuple
 
-from relume.brdf.albedo import reflectances_of
 from relume.errors import ParameterError
-from relume.look import EnvironmentKey, Look, validate
+from relume.look import Look, validate
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
-from relume.transfer.gathered import Reflectances
+from relume.transfer.light import Light, light_of
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import CurvePointer, ParameterPointer
 from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
-
-
-class Light(NamedTuple):
-    """What arrives at surfaces: pictures of equal light need the same operators.
-
-    Attributes:
-        reflectances: of all materials, for light that they reflect onto each other; none where that was not baked.
-    """
-
-    environment: EnvironmentKey
-    reflectances: Reflectances
 
 
 class ViewImages:
@@ -60,10 +47,7 @@ class ViewImages:
             material.set_documents(look.materials[name].terms)
 
     def _light_of(self, look: Look) -> Light:
-        if self.transfer.cells is None:
-            return Light(look.environment.key, ())
-        terms = (look.materials[name].terms for name in self.transfer.material_names)
-        return Light(look.environment.key, tuple(map(reflectances_of, terms)))
+        return light_of(look, self.transfer.material_names, has_cells=self.transfer.cells is not None)
 
     def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, TermImage]:
         """The material and the term of a pointer in the look as it is now.

@@ -45,6 +45,7 @@ def test_default_look_has_every_field(default):
     assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
     assert default["environment"] == {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
     assert default["lights"] == {"Key": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}}
+    assert default["transport"] == {"show": "all", "bounces": 24}
     assert default["display"] == {"exposure": 0.0, "tone_map": "agx"}
     assert json.loads(json.dumps(default)) == default
     assert complete(default, default) == default
@@ -110,6 +111,10 @@ def points(count):
         ("", [], "the look", "an object"),
         ("", {"material": {}}, "/material", "'materials'"),
         ("/materials", 3, "/materials", "material"),
+        ("/transport", {"depth": 3}, "/transport/depth", "'bounces'"),
+        ("/transport/show", "shadows", "/transport/show", "'further_bounces'"),
+        ("/transport/show", ["all"], "/transport/show", "'further_bounces'"),
+        *(("/transport/bounces", bad, "/transport/bounces", "0 to 24") for bad in (-1, 25, 1.5, True, None, NAN)),
         ("/materials", {"Cup": {}}, "/materials", "'Teapot'"),
         ("/materials/Teapot", None, "/materials/Teapot", "an object"),
         ("/materials/Teapot/terms", {}, "/materials/Teapot/terms", "at most 16"),
@@ -362,3 +367,25 @@ def test_scene_with_a_bad_term_is_refused_with_its_pointer():
     with pytest.raises(ParameterError) as caught:
         default_look([Material("Cup", ({"model": "ggx", "params": {"roughness": 0.0}},))])
     assert caught.value.name == "/materials/Cup/terms/0/params/roughness"
+
+
+@pytest.mark.parametrize(
+    ("transport", "paths"),
+    [
+        ({}, (True, 1, 24)),
+        ({"bounces": 1}, (True, 1, 1)),
+        ({"bounces": 0}, (True, 1, 0)),
+        ({"show": "direct"}, (True, 1, 0)),
+        ({"show": "first_bounce"}, (False, 1, 1)),
+        ({"show": "first_bounce", "bounces": 0}, (False, 1, 0)),
+        ({"show": "further_bounces", "bounces": 3}, (False, 2, 3)),
+        ({"show": "further_bounces", "bounces": 1}, (False, 1, 0)),
+    ],
+)
+def test_shown_paths_are_equal_where_the_picture_is(default, transport, paths):
+    assert validate({"transport": transport}, default).transport.paths == paths
+
+
+def test_a_store_that_knows_no_transport_shows_all_of_it(default):
+    older = {name: part for name, part in default.items() if name != "transport"}
+    assert complete({}, older)["transport"] == default["transport"]

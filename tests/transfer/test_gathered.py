@@ -28,6 +28,7 @@ from relume.transfer.cache import FrozenCache
 from relume.transfer.contraction import contract
 from relume.transfer.gathered import CellLight
 from relume.transfer.glimpse import Glimpse
+from relume.transfer.light import light_of
 from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
 from relume.transfer.projector import Projector
@@ -69,7 +70,8 @@ def receivers(cells, lights):
             below = local_ray(pattern, ray, *shift_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
                 links[p, ray] = NO_CELL
-    rays = GatherRays(links, pattern, np.arange(50, 80, dtype=np.uint32), cells.radiance(lights, REFLECTANCES))
+    reflected = cells.radiance(cells.irradiance(lights), REFLECTANCES, 1, 24)
+    rays = GatherRays(links, pattern, np.arange(50, 80, dtype=np.uint32), reflected)
     return Receivers(dark.normal, dark.tangent, dark.wo, np.zeros_like(dark.visible), rays)
 
 
@@ -146,11 +148,19 @@ def test_reflected_light_adds_to_the_lights_own(lights, receivers):
 
 
 def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
-    black = cells.radiance(lights, ((0.0,) * 9,) * 2, 5)
+    arriving = cells.irradiance(lights)
+    black = cells.radiance(arriving, ((0.0,) * 9,) * 2, 1, 5)
     assert not black.any()
-    by_bounces = [cells.radiance(lights, REFLECTANCES, n).sum() for n in (0, 1, 2, 24, 25)]
+    by_bounces = [cells.radiance(arriving, REFLECTANCES, 1, n).sum() for n in (1, 2, 3, 25, 26)]
     assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
     assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
+
+
+def test_first_and_further_reflections_are_all_of_them(cells, lights):
+    arriving = cells.irradiance(lights)
+    first, further, both = (cells.radiance(arriving, REFLECTANCES, *which) for which in ((1, 1), (2, 6), (1, 6)))
+    np.testing.assert_allclose(first + further, both, rtol=1e-5)
+    assert np.all(further.sum(axis=0) > 0)
 
 
 def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
@@ -205,8 +215,7 @@ def test_gathered_light_is_that_of_path_tracing(corner, gathered):
     """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
     view, look = gathered.views["front"], default_look(gathered)
     geometry, texels = merge(corner), texels_of(corner.environment)
-    reflectances = tuple(reflectances_of(look.materials[name].terms) for name in gathered.material_names)
-    reflected = gathered.reflected_in(look.environment.key, reflectances)
+    reflected = gathered.reflected_in(light_of(look, gathered.material_names, has_cells=True))
     found, expected, variance = [], [], []
     for index, name in enumerate(gathered.material_names):
         rows = view.rows(index)
@@ -268,6 +277,58 @@ def test_without_reflection_a_picture_is_the_direct_one(corner, gathered, tmp_pa
     )
     assert brighter.min() > -1e-5
     assert brighter.mean() > 0.02
+
+
+def showing(transfer, show, bounces=24):
+    """The picture of some paths only."""
+
+    def change(document):
+        document["transport"] = {"show": show, "bounces": bounces}
+
+    return render_image(transfer, "front", look_of(transfer, change))
+
+
+def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
+    whole = render_image(gathered, "front", default_look(gathered))
+    parts = [showing(gathered, show) for show in ("direct", "first_bounce", "further_bounces")]
+    np.testing.assert_allclose(sum(parts), whole, rtol=1e-4, atol=1e-6)
+    assert all(part.mean() > 0.005 * whole.mean() for part in parts)
+
+
+def test_bounces_are_counted_from_direct_light(corner, gathered, tmp_path):
+    direct = showing(gathered, "direct")
+    np.testing.assert_array_equal(showing(gathered, "all", 0), direct)
+    other = baked(corner, "direct", tmp_path)
+    np.testing.assert_array_equal(direct, render_image(other, "front", default_look(other)))
+    one = showing(gathered, "all", 1)
+    np.testing.assert_allclose(one - direct, showing(gathered, "first_bounce"), atol=2e-5)
+    assert not showing(gathered, "further_bounces", 1).any()
+    assert not showing(gathered, "first_bounce", 0).any()
+    for show in ("first_bounce", "further_bounces"):
+        assert not showing(other, show).any()
+    np.testing.assert_array_equal(showing(other, "all", 3), direct)
+
+
+def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
+    """From direct light alone, glimpsed before there are rays in it, to all light."""
+    monkeypatch.setattr("relume.transfer.glimpse._MOST_SHADED", 300)
+    picture = Picture(gathered, "front", FrozenCache(BUDGET))
+    for show in ("direct", "all", "further_bounces"):
+
+        def change(document, show=show):
+            document["transport"]["show"] = show
+
+        picture.set_look(look_of(gathered, change))
+        if show == "all":
+            picture.advance(None)
+            need = picture.waiting()
+            assert isinstance(need, Glimpse)
+            picture.adopt(need, need.make(lambda share: None, lambda: False))
+            picture.advance(None)
+            glimpse = picture.image()
+            exact = settle(picture).image()
+            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "direct"), exact)
+        np.testing.assert_array_equal(settle(picture).image(), showing(gathered, show))
 
 
 def test_a_thinned_bake_has_the_same_light(gathered):
