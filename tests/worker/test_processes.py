@@ -1,5 +1,6 @@
 """Real processes, really killed: the store that comes out is the same, bit for bit."""
 
+import gc
 import hashlib
 import json
 import os
@@ -8,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -175,3 +177,6 @@ class Cluster:
 
     def __exit__(self, *_: object) -> None:
         self.kill()
+        with warnings.catch_warnings():  # Dask's client leaves its socket to a killed scheduler to the collector
+            warnings.simplefilter("ignore", ResourceWarning)
+            gc.collect()
