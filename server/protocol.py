@@ -155,12 +155,14 @@ class ViewInfo(Message):
 class HelloMessage(Message):
     """server → client: first message. `revision` is the last one of a resumed session, else 0.
 
-    `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked.
+    `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
+    light of the bake.
     """
 
     type: Literal["hello"] = "hello"
     session: str
     bake: str
+    method: str
     scene: str
     look: dict[str, Any]
     revision: int

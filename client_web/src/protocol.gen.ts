@@ -189,11 +189,12 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` is the last one of a resumed session, else 0. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. */
+/** server → client: first message. `revision` is the last one of a resumed session, else 0. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake. */
 export interface HelloMessage {
   type: "hello";
   session: string;
   bake: string;
+  method: string;
   scene: string;
   look: Record<string, unknown>;
   revision: number;

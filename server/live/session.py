@@ -76,6 +76,7 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: s
     return HelloMessage(
         session=secrets.token_hex(8),
         bake=bake,
+        method=transfer.method,
         scene=transfer.scene_id,
         look=desk.document,
         revision=desk.revision,

@@ -21,7 +21,7 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         hello = session.receive()
         assert isinstance(hello, dict)
         assert hello["type"] == "hello"
-        assert hello["scene"] == baked.scene
+        assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
         assert hello["views"] == [{"name": n, "width": WIDTH, "height": HEIGHT} for n in ("front", "left")]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
         assert not hello["resumed"]

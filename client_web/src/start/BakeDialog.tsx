@@ -39,7 +39,14 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
           ))}
         </ul>
       )}
-      <PresetList key={scene.id} scene={scene} views={viewsToBake(scene)} action="Open and bake" onChoose={onOpen} />
+      <PresetList
+        key={scene.id}
+        scene={scene}
+        method="direct"
+        views={viewsToBake(scene)}
+        action="Open and bake"
+        onChoose={onOpen}
+      />
     </section>
   );
 }

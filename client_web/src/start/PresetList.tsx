@@ -1,9 +1,10 @@
-/** What can be baked: which views, and the three presets with what each will cost, before anything starts. */
-import { useEffect, useState } from "preact/hooks";
+/** What can be baked: which light, which views, and the three presets with what each will cost, before anything starts. */
+import { useEffect, useId, useState } from "preact/hooks";
 import { planBake } from "../net/api";
 import { MAX_VIEWS_SHOWN, type DryRunBody, type SceneBody } from "../protocol";
 import type { BakeChoice, Preset } from "../state/open";
 import { formatBytes, formatCount, formatSeconds } from "../ui/scale";
+import { METHODS, type Method } from "./methods";
 
 const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "preview", label: "Preview", help: "to find the look" },
@@ -13,13 +14,13 @@ const PRESETS: { name: Preset; label: string; help: string }[] = [
 
 type Plans = Partial<Record<Preset, DryRunBody | Error>>;
 
-function usePlans(scene: string, views: readonly string[]): Plans {
+function usePlans(scene: string, method: Method, views: readonly string[]): Plans {
   const [plans, setPlans] = useState<Plans>({});
   useEffect(() => {
     let stale = false;
     setPlans({});
     for (const { name } of PRESETS) {
-      planBake({ scene, method: "direct", preset: name, views: [...views] }).then(
+      planBake({ scene, method, preset: name, views: [...views] }).then(
         (plan) => !stale && setPlans((before) => ({ ...before, [name]: plan })),
         (error: Error) => !stale && setPlans((before) => ({ ...before, [name]: error })),
       );
@@ -27,7 +28,7 @@ function usePlans(scene: string, views: readonly string[]): Plans {
     return () => {
       stale = true;
     };
-  }, [scene, views]);
+  }, [scene, method, views]);
   return plans;
 }
 
@@ -42,6 +43,27 @@ function Plan({ plan }: { plan: DryRunBody | Error | undefined }) {
       <br />
       up to {formatCount(plan.plan.rays)} rays · {time} · {formatBytes(plan.plan.store_bytes)}
     </span>
+  );
+}
+
+interface MethodsProps {
+  chosen: Method;
+  onChoose(method: Method): void;
+}
+
+function Methods({ chosen, onChoose }: MethodsProps) {
+  const group = useId();
+  return (
+    <fieldset class="bake-methods">
+      <legend>Light</legend>
+      {METHODS.map(({ name, label, help }) => (
+        <label key={name}>
+          <input type="radio" name={group} checked={name === chosen} onChange={() => onChoose(name)} />
+          <b>{label}</b>
+          <small>{help}</small>
+        </label>
+      ))}
+    </fieldset>
   );
 }
 
@@ -74,17 +96,20 @@ function Views({ all, chosen, onChoose }: ViewsProps) {
 
 interface Props {
   scene: SceneBody;
-  /** The views that are chosen at first. */
+  /** What is chosen at first. */
+  method: Method;
   views: readonly string[];
   action: string;
   onChoose(choice: BakeChoice): void;
 }
 
-export function PresetList({ scene, views, action, onChoose }: Props) {
+export function PresetList({ scene, method: initial, views, action, onChoose }: Props) {
+  const [method, setMethod] = useState(initial);
   const [chosen, setChosen] = useState([...views]);
-  const plans = usePlans(scene.id, chosen);
+  const plans = usePlans(scene.id, method, chosen);
   return (
     <>
+      <Methods chosen={method} onChoose={setMethod} />
       {scene.views.length > 1 && (
         <Views all={scene.views.map((view) => view.name)} chosen={chosen} onChoose={setChosen} />
       )}
@@ -98,7 +123,7 @@ export function PresetList({ scene, views, action, onChoose }: Props) {
             <button
               class={name === "good" ? "primary" : ""}
               disabled={plans[name] instanceof Error}
-              onClick={() => onChoose({ preset: name, views: chosen })}
+              onClick={() => onChoose({ method, preset: name, views: chosen })}
             >
               {action}
             </button>

@@ -113,22 +113,25 @@ function welcome(of: Session, message: HelloMessage): void {
   tellViews(of, shown, store.focusedView.peek());
   if (of === session) {
     store.freezing.value = null;
-    showViews(of, message.views, message.view);
-  } else pendingViews = message.views;
+    showBake(of, message);
+  } else pending = message;
   of.send({ type: "stream", format: "auto", quality: 80 });
   const curve = store.curvePath.peek();
   if (curve !== null) of.send({ type: "touch", curve });
 }
 
-let pendingViews: HelloMessage["views"] = [];
+/** Of a bake whose first picture is on its way. */
+let pending: HelloMessage | null = null;
 
-function showViews(of: Session, views: HelloMessage["views"], fallback: string): void {
-  const shown = shownOf(views, fallback);
+/** Follow a session from now on: its bake and views. */
+function showBake(of: Session, { views, view, method }: HelloMessage): void {
+  const shown = shownOf(views, view);
   batch(() => {
     store.views.value = views;
     store.shownViews.value = shown;
     if (!shown.includes(store.viewName.peek())) store.viewName.value = shown[0] as string;
     store.bake.value = of.bake;
+    store.method.value = method;
   });
 }
 
@@ -154,10 +157,11 @@ function swap(to: Session): void {
   store.freezing.value = null;
   forgetWaiting();
   for (const picture of stage.shown) picture.exactRevision = -1;
-  showViews(to, pendingViews, store.viewName.peek());
+  if (pending !== null) showBake(to, pending);
+  pending = null;
   store.coming.value = null;
   store.connection.value = "open";
-  note("The finer bake is in place.");
+  note("The new bake is in place.");
 }
 
 function handlersOf(self: () => Session): SessionHandlers {

@@ -3,6 +3,7 @@ import * as api from "../net/api";
 import { bakeEnd, followBake } from "../net/events";
 import { stage } from "../picture/stage";
 import { MAX_VIEWS_SHOWN, type BakeBody, type SceneBody } from "../protocol";
+import type { Method } from "../start/methods";
 import { attempt, showError } from "../ui/toasts";
 import { connect, disconnect, whenBakeIsReady } from "./live";
 import { recall } from "./place";
@@ -12,6 +13,7 @@ import { availableOf } from "./views";
 
 export type Preset = "preview" | "good" | "final";
 export interface BakeChoice {
+  method: Method;
   preset: Preset;
   views: string[];
 }
@@ -40,7 +42,7 @@ function reset(scene: SceneBody): void {
   store.history.clear();
   store.scene.value = scene;
   store.look.value = store.defaultLook.value = null;
-  store.bake.value = store.coming.value = null;
+  store.bake.value = store.coming.value = store.method.value = null;
   store.selectedMaterial.value = store.selectedCurve.value = store.solo.value = null;
   store.alonePlaces.value = store.besidePlaces.value = new Map();
   store.pointedView.value = null;
@@ -90,18 +92,18 @@ function swapTo(bake: string): void {
   connect(bake);
 }
 
-// somebody else's bake of this scene takes over only where it is finer
+// somebody else's bake of this scene takes over only where it is finer, of the same light
 whenBakeIsReady((id) => {
   const current = store.bake.peek();
   if (current === null || id === current) return;
   void attempt(async () => {
     const [other, shown] = await Promise.all([api.getBake(id), api.getBake(current)]);
-    if (pixels(other) > pixels(shown)) swapTo(id);
+    if (other.recipe.method === shown.recipe.method && pixels(other) > pixels(shown)) swapTo(id);
   });
 });
 
-async function bakePreview(scene: SceneBody, views: string[]): Promise<string> {
-  const preview = await api.startBake({ scene: scene.id, method: "direct", preset: "preview", views });
+async function bakePreview(scene: SceneBody, choice: BakeChoice): Promise<string> {
+  const preview = await api.startBake({ scene: scene.id, ...choice, preset: "preview" });
   store.coming.value = preview;
   const end = preview.state === "ready" ? preview : await bakeEnd(preview.id, (news) => (store.coming.value = news));
   if (end.state === "ready") return end.id;
@@ -110,7 +112,7 @@ async function bakePreview(scene: SceneBody, views: string[]): Promise<string> {
 
 /** Bake a scene and take the result over when it is ready. */
 export async function startFullBake(scene: SceneBody, choice: BakeChoice): Promise<void> {
-  const full = await api.startBake({ scene: scene.id, method: "direct", ...choice });
+  const full = await api.startBake({ scene: scene.id, ...choice });
   if (full.state === "ready") swapTo(full.id);
   else follow(full);
 }
@@ -130,11 +132,11 @@ export async function openScene(
     const ready = bakes.filter((bake) => bake.state === "ready");
     const shown = ready.find((bake) => bake.id === place.bake) ?? ready[0];
     const running = bakes.find((bake) => bake.state === "running" || bake.state === "queued");
-    opened = shown?.id ?? (await bakePreview(scene, choice?.views ?? viewsToBake(scene)));
+    const wanted = choice ?? { method: "direct", preset: "good", views: viewsToBake(scene) };
+    opened = shown?.id ?? (await bakePreview(scene, wanted));
     connect(opened);
-    if (choice !== undefined) await startFullBake(scene, choice);
-    else if (running !== undefined) follow(running);
-    else if (shown === undefined) await startFullBake(scene, { preset: "good", views: viewsToBake(scene) });
+    if (choice === undefined && running !== undefined) follow(running);
+    else if (choice !== undefined || shown === undefined) await startFullBake(scene, wanted);
   });
 }
 

@@ -10,8 +10,9 @@ export const page = signal<"start" | "editor">("start");
 export const models = signal<ModelInfo[]>([]);
 export const scene = signal<SceneBody | null>(null);
 
-/** The bake that the picture shows, and one that is on its way. */
+/** The bake that the picture shows, and which light it has; and one that is on its way. */
 export const bake = signal<string | null>(null);
+export const method = signal<string | null>(null);
 export const coming = signal<Pick<BakeBody, "id" | "state" | "progress" | "seconds_left" | "problem"> | null>(null);
 export const bakes = signal<BakeBody[]>([]);
 

@@ -1,29 +1,32 @@
-/** Bake the open scene finer or coarser; the plan stands beside each preset. */
+/** What light the open bake has and how large it is; bake the scene again with other light, finer or coarser. */
 import { useState } from "preact/hooks";
 import { PresetList } from "../start/PresetList";
 import { startFullBake } from "../state/open";
-import { scene, view, views } from "../state/store";
+import { wordsOf } from "../start/methods";
+import { method, scene, view, views } from "../state/store";
 import { attempt } from "./toasts";
 
 export function BakeMenu() {
   const [open, setOpen] = useState(false);
   const current = scene.value;
   const size = view.value;
+  const words = wordsOf(method.value);
   return (
     <div class="menu" onKeyDown={(event) => event.key === "Escape" && setOpen(false)}>
       <button
         aria-expanded={open}
         disabled={current === null}
-        title="Bake again, finer or coarser"
+        title={size === null ? "Bake" : `${words.label}. Bake again, with other light or another size`}
         onClick={() => setOpen(!open)}
       >
-        {size === null ? "Bake" : `${size.width}×${size.height}`} ▾
+        {size === null ? "Bake" : `${size.width}×${size.height}, ${words.short}`} ▾
       </button>
       {open && current !== null && (
         <div class="menu-body">
           <p>Bake this scene again. The picture stays; the new bake takes its place when it is ready.</p>
           <PresetList
             scene={current}
+            method={words.name}
             views={views.value.map((baked) => baked.name)}
             action="Bake"
             onChoose={(choice) => {

@@ -1,0 +1,30 @@
+/** What a bake may follow of light, in words. */
+export type Method = "direct" | "gather";
+
+interface MethodWords {
+  name: Method;
+  label: string;
+  /** Beside a size, where room is small. */
+  short: string;
+  help: string;
+}
+
+export const METHODS: readonly MethodWords[] = [
+  {
+    name: "direct",
+    label: "Direct light",
+    short: "direct",
+    help: "Light from its sources with its shadows. Quick to bake, and to edit.",
+  },
+  {
+    name: "gather",
+    label: "With reflected light",
+    short: "reflected",
+    help: "Surfaces light each other too, and take on each other’s colours. Takes longer and more memory.",
+  },
+];
+
+/** The words of a bake's method; those of direct light for one that this editor does not know. */
+export function wordsOf(method: string | null): MethodWords {
+  return METHODS.find(({ name }) => name === method) ?? (METHODS[0] as MethodWords);
+}
