@@ -42,7 +42,7 @@ def reference(
     if view is not None and view not in record.views:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
     loaded = load_scene(scene_path(service.data_dir, record.id))
-    document = complete_look(partial, default_look(loaded.materials))
+    document = complete_look(partial, default_look(loaded.materials, loaded.lights))
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("reference", total=1.0)
         image = reference_image(

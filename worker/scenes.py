@@ -29,6 +29,7 @@ class SceneRecord:
         views: camera names, in order.
         materials: {"name", "terms"} each, in the order of material ids.
         variants: partial looks that the file brought, by name.
+        lights: names of the scene's own.
     """
 
     id: str
@@ -39,6 +40,7 @@ class SceneRecord:
     warnings: tuple[str, ...]
     num_triangles: int
     variants: dict[str, dict[str, Any]]
+    lights: tuple[str, ...] = ()
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -50,6 +52,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         "warnings": list(scene.warnings),
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
+        "lights": [light.name for light in scene.lights],
     }
     row = SceneRow(id=scene.id, name=scene.name, created=time.time(), summary=json.dumps(summary))
     try:
@@ -102,4 +105,5 @@ def _record(row: SceneRow) -> SceneRecord:
         warnings=tuple(summary["warnings"]),
         num_triangles=summary["num_triangles"],
         variants=summary.get("variants", {}),  # rows of before there were any
+        lights=tuple(summary.get("lights", ())),
     )

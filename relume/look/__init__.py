@@ -1,12 +1,23 @@
 """The look: the JSON document that users edit. Documents are values: nothing here changes one, new ones share parts."""
 
 from relume.look.document import complete, default_look, validate
-from relume.look.model import BAKED_ENVIRONMENT, EnvironmentKey, Look, MaterialLook, Paths, TermLook
+from relume.look.model import (
+    BAKED_ENVIRONMENT,
+    EnvironmentKey,
+    LightGeometry,
+    LightLook,
+    Look,
+    MaterialLook,
+    Paths,
+    TermLook,
+)
 from relume.look.patch import apply_patch
 
 __all__ = [
     "BAKED_ENVIRONMENT",
     "EnvironmentKey",
+    "LightGeometry",
+    "LightLook",
     "Look",
     "MaterialLook",
     "Paths",

@@ -48,10 +48,10 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
     if is_number(value):
         check_number(pointer, value, minimum, maximum)
     else:
-        check_rgb(pointer, value, minimum, maximum, "a number or three numbers")
+        check_triple(pointer, value, minimum, maximum, "a number or three numbers")
 
 
-def check_rgb(pointer: Pointer, value: Any, minimum: float, maximum: float, what: str = "three numbers") -> None:
+def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, what: str = "three numbers") -> None:
     """Three numbers in [minimum, maximum]."""
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise fail(pointer, value, f"{what} in [{minimum:g}, {maximum:g}]")

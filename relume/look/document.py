@@ -7,13 +7,13 @@ from typing import Any, get_args
 
 from relume import environments
 from relume.errors import ParameterError
-from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_rgb, fail, names_text
+from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
+from relume.look.lights import MAX_SCALE, complete_lights, default_lights
 from relume.look.model import Look, Show, ToneMap
 from relume.look.terms import complete_term
-from relume.scene.model import Material
+from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
-MAX_SCALE = 1e4
 MAX_EXPOSURE = 20.0
 MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
 _SECTIONS = ("materials", "environment", "lights", "transport", "display")
@@ -21,11 +21,11 @@ _DEFAULT_ENVIRONMENT: dict[str, Any] = {"map": None, "scale": 1.0, "color": [1.0
 _DEFAULT_TRANSPORT: dict[str, Any] = {"show": "all", "bounces": MAX_BOUNCES}
 
 
-def default_look(scene_materials: Sequence[Material], light_names: Sequence[str] = ()) -> dict[str, Any]:
+def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Light] = ()) -> dict[str, Any]:
     """The complete look of a scene that nobody has edited.
 
     Raises:
-        ParameterError: a material's own terms are not valid.
+        ParameterError: a material's own terms, or a light's fields, are not valid.
     """
     return {
         "materials": {
@@ -33,7 +33,7 @@ def default_look(scene_materials: Sequence[Material], light_names: Sequence[str]
             for material in scene_materials
         },
         "environment": dict(_DEFAULT_ENVIRONMENT),
-        "lights": {name: {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True} for name in light_names},
+        "lights": default_lights(scene_lights, [material.name for material in scene_materials]),
         "transport": dict(_DEFAULT_TRANSPORT),
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
@@ -67,7 +67,7 @@ def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[st
         "environment": _complete_environment(
             partial.get("environment", {}), default["environment"], known["environment"]
         ),
-        "lights": _complete_lights(partial.get("lights", {}), default["lights"]),
+        "lights": complete_lights(partial.get("lights", {}), default["lights"], known["lights"]),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),
     }
@@ -102,7 +102,7 @@ def _complete_environment(given: Any, default: Mapping[str, Any], known: Mapping
     if merged["map"] != known.get("map"):
         _check_map(("environment", "map"), merged["map"])
     check_number(("environment", "scale"), merged["scale"], 0.0, MAX_SCALE)
-    check_rgb(("environment", "color"), merged["color"], 0.0, MAX_COLOR)
+    check_triple(("environment", "color"), merged["color"], 0.0, MAX_COLOR)
     check_number(("environment", "rotation"), merged["rotation"], -360.0, 360.0)
     return merged
 
@@ -111,20 +111,6 @@ def _check_map(pointer: Pointer, name: Any) -> None:
     if name is not None and not (isinstance(name, str) and environments.is_known(name)):
         known = names_text(environments.known_names())
         raise fail(pointer, name, f"null for the scene's own, or an environment that is here: {known}")
-
-
-def _complete_lights(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    _check_names(("lights",), given, default, "light")
-    return {name: _complete_light(("lights", name), given.get(name, {}), default[name]) for name in default}
-
-
-def _complete_light(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    merged = _merged(pointer, given, default)
-    check_number((*pointer, "scale"), merged["scale"], 0.0, MAX_SCALE)
-    check_rgb((*pointer, "color"), merged["color"], 0.0, MAX_COLOR)
-    if not isinstance(merged["on"], bool):
-        raise fail((*pointer, "on"), merged["on"], "true or false")
-    return merged
 
 
 def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,12 +5,14 @@ Terms stay dictionaries, so that `relume.brdf.curves` reads the same thing from 
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, NotRequired
+from typing import Annotated, Literal, NamedTuple, NotRequired
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
 
 Rgb = tuple[float, float, float]
+Xyz = tuple[float, float, float]
+LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
 Show = Literal["all", "direct", "first_bounce", "further_bounces"]
 
@@ -82,12 +84,85 @@ class EnvironmentLook(_Frozen):
         return self.scale * red, self.scale * green, self.scale * blue
 
 
-class LightLook(_Frozen):
-    """A local light's multipliers."""
+class LightGeometry(NamedTuple):
+    """Where a local light is and how it is shaped, fields that its kind has not left as they are here: lights of equal
+    geometry differ by a factor for each channel alone. Fields as in the look."""
+
+    kind: LightKind
+    position: Xyz = (0.0, 0.0, 0.0)
+    direction: Xyz = (0.0, -1.0, 0.0)
+    cone: tuple[float, float] = (0.0, 90.0)
+    rotation: float = 0.0
+    size: tuple[float, float] = (0.0, 0.0)
+    material: str = ""
+
+
+class _LightLook(_Frozen):
+    """What lights of all kinds have; `emission` in the unit of the kind."""
 
     scale: float
     color: Rgb
     on: bool
+    emission: Rgb
+
+    @property
+    def gain(self) -> Rgb:
+        """What multiplies each channel of a light of unit emission: scale · color · emission, nothing where off."""
+        scale = self.scale if self.on else 0.0
+        red, green, blue = (scale * c * e for c, e in zip(self.color, self.emission, strict=True))
+        return red, green, blue
+
+    @property
+    def geometry(self) -> LightGeometry:
+        """All the rest."""
+        return LightGeometry(**{name: value for name, value in vars(self).items() if name in LightGeometry._fields})
+
+
+class PointLook(_LightLook):
+    """Shines alike in all directions; emission is radiant intensity, W/sr."""
+
+    kind: Literal["point"]
+    position: Xyz
+
+
+class SpotLook(_LightLook):
+    """A point that shines into a cone of half-angles inner and outer, degrees; emission is W/sr along the axis."""
+
+    kind: Literal["spot"]
+    position: Xyz
+    direction: Xyz
+    cone: tuple[float, float]
+
+
+class DirectionalLook(_LightLook):
+    """Light from infinitely far that travels along `direction`; emission is irradiance across it, W/m²."""
+
+    kind: Literal["directional"]
+    direction: Xyz
+
+
+class RectangleLook(_LightLook):
+    """Shines to the side that `direction` points to; emission is radiance. The camera does not see it.
+
+    `rotation` turns it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or +Z where
+    `direction` is vertical. `size`: width and height, metres.
+    """
+
+    kind: Literal["rectangle"]
+    position: Xyz
+    direction: Xyz
+    rotation: float
+    size: tuple[float, float]
+
+
+class MeshLook(_LightLook):
+    """All surfaces of a material shine, and are seen to; emission is radiance."""
+
+    kind: Literal["mesh"]
+    material: str
+
+
+LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
 
 
 class Paths(NamedTuple):

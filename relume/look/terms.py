@@ -17,7 +17,7 @@ from relume.look.checks import (
     check_number,
     check_number_or_rgb,
     check_object,
-    check_rgb,
+    check_triple,
     fail,
     names_text,
 )
@@ -43,7 +43,7 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
     if term is None:
         raise fail((*pointer, "model"), model, f"one of {names_text(TERMS)}")
     color = given.get("color", [1.0, 1.0, 1.0])
-    check_rgb((*pointer, "color"), color, 0.0, MAX_COLOR)
+    check_triple((*pointer, "color"), color, 0.0, MAX_COLOR)
     texture = given.get("texture", term.texture)
     if texture is not None and texture not in _TEXTURES:
         raise fail((*pointer, "texture"), texture, f"null or one of {names_text(_TEXTURES)}")

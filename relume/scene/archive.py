@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from relume.errors import SceneError
 from relume.replacing import Replacing
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -37,15 +37,16 @@ def make_scene(
     environment: Environment,
     warnings: Sequence[str] = (),
     variants: Mapping[str, dict[str, Any]] | None = None,
+    lights: Sequence[Light] = (),
 ) -> Scene:
     """Checks the parts and joins them to a scene that knows its id.
 
     Raises:
         SceneError: the parts do not make a scene (see `relume.scene.checks`).
     """
-    check_scene(meshes, materials, cameras, environment)
+    check_scene(meshes, materials, cameras, environment, lights)
     parts = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
-    scene = Scene("", name, *parts)
+    scene = Scene("", name, *parts, tuple(lights))
     document, arrays = _describe(scene)
     return replace(scene, id=scene_id(document, arrays))
 
@@ -92,7 +93,7 @@ def load_scene(folder: str | Path) -> Scene:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, zipfile.BadZipFile) as problem:
         detail = str(problem).partition("\n")[0] or type(problem).__name__
         raise SceneError(f"the scene in {folder.name!r} is damaged ({detail}); {REMEDY}") from None
-    check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment)
+    check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment, scene.lights)
     if scene_id(*_describe(scene)) != scene.id:
         raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
     return scene
@@ -130,6 +131,8 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     }
     if scene.variants:
         document["variants"] = scene.variants
+    if scene.lights:
+        document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
     return document, arrays
 
 
@@ -151,6 +154,7 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
         Environment(str(document["environment"]["name"]), arrays["environment"]),
         tuple(str(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
+        tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
     )
 
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from relume.errors import SceneError
-from relume.scene.model import Camera, Environment, Material, Mesh
+from relume.scene.model import Camera, Environment, Light, Material, Mesh
 
 MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
+MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
 
 
 def check_mesh(mesh: Mesh, num_materials: int) -> None:
@@ -49,8 +50,23 @@ def check_environment(environment: Environment) -> None:
         raise SceneError(f"environment {environment.name!r} holds texels that are no light; repair the image")
 
 
+def check_lights(lights: Sequence[Light]) -> None:
+    """Raises SceneError where there are too many, or one has no name that a look can use."""
+    if len(lights) > MAX_LIGHTS:
+        raise SceneError(
+            f"the scene has {len(lights):,} lights, {MAX_LIGHTS} are allowed; remove those that matter least"
+        )
+    names = [light.name for light in lights]
+    if len(set(names)) != len(names) or not all(1 <= len(name) <= MAX_LIGHT_NAME for name in names):
+        raise SceneError(f"the lights need names of 1 to {MAX_LIGHT_NAME} characters, each its own; rename them")
+
+
 def check_scene(
-    meshes: Sequence[Mesh], materials: Sequence[Material], cameras: Sequence[Camera], environment: Environment
+    meshes: Sequence[Mesh],
+    materials: Sequence[Material],
+    cameras: Sequence[Camera],
+    environment: Environment,
+    lights: Sequence[Light],
 ) -> None:
     """Raises SceneError with what to do where the parts do not make a scene."""
     if not meshes:
@@ -70,3 +86,4 @@ def check_scene(
     for camera in cameras:
         check_camera(camera)
     check_environment(environment)
+    check_lights(lights)

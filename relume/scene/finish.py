@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene
 
 MAX_WARNINGS = 200
 
@@ -19,9 +19,10 @@ def finished_scene(
     environment: Environment,
     warnings: Sequence[str],
     variants: Mapping[str, dict[str, Any]] | None = None,
+    lights: Sequence[Light] = (),
 ) -> Scene:
     """As `make_scene`, the environment's warnings first and no more than `MAX_WARNINGS`. Raises SceneError."""
     listed = [*environment.warnings, *warnings]
     if len(listed) > MAX_WARNINGS:
         listed = [*listed[:MAX_WARNINGS], f"and {len(listed) - MAX_WARNINGS:,} more of the kind"]
-    return make_scene(name, meshes, materials, cameras, environment, listed, variants)
+    return make_scene(name, meshes, materials, cameras, environment, listed, variants, lights)

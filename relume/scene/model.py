@@ -1,4 +1,4 @@
-"""A scene as relume sees it: triangles in world space, materials by name, cameras, one environment.
+"""A scene as relume sees it: triangles in world space, materials by name, cameras, one environment, local lights.
 
 Right-handed, +Y up, metres. Importers produce it, bakes read it; nothing changes it afterwards.
 """
@@ -99,6 +99,18 @@ class Environment:
 
 
 @dataclass(frozen=True)
+class Light:
+    """A named local light.
+
+    Attributes:
+        fields: `kind` and what else is not that kind's default, as they stand in a look document.
+    """
+
+    name: str
+    fields: dict[str, Any]
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything a bake needs.
 
@@ -116,3 +128,4 @@ class Scene:
     environment: Environment
     warnings: tuple[str, ...] = ()
     variants: dict[str, dict[str, Any]] = field(default_factory=dict)
+    lights: tuple[Light, ...] = ()

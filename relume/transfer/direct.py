@@ -96,7 +96,7 @@ class DirectMethod:
             "size": list(recipe.size),
             "num_lights": recipe.num_lights,
             "relightable": recipe.relightable,
-            "look": default_look(scene.materials),
+            "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "views": [{"name": view, "eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views],
         }

@@ -101,7 +101,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
         created=moment(record.created),
         views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
         materials=[SceneMaterial(name=m["name"], terms=m["terms"]) for m in record.materials],
-        lights=[],
+        lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=list(record.warnings),
         triangles=record.num_triangles,

@@ -14,12 +14,15 @@ from pydantic import ValidationError
 
 from relume.errors import EditError, ParameterError
 from relume.look import Look, apply_patch, complete, default_look, validate
-from relume.scene.model import Material
+from relume.scene.model import Light, Material
 
 MATERIALS = [
     Material("Teapot", ({"model": "lambert", "color": [0.1, 0.02, 0.02]}, {"model": "cook_torrance"})),
     Material("a/b~c", ({"model": "ggx", "color": [1, 1, 1], "texture": None, "params": {"f0": [1, 0.8, 0.3]}},)),
 ]
+KEY = Light("Key", {"kind": "spot", "position": [1.0, 2.0, 3.0]})
+PANEL = Light("Panel", {"kind": "mesh", "material": "Teapot", "emission": [5.0, 5.0, 4.0]})
+LIGHTS = [KEY, PANEL]
 NAN, INF = math.nan, math.inf
 SIGMA = "/materials/Teapot/terms/1/params/sigma"
 CURVES = "/materials/Teapot/terms/1/curves"
@@ -27,7 +30,7 @@ CURVES = "/materials/Teapot/terms/1/curves"
 
 @pytest.fixture
 def default():
-    return default_look(MATERIALS, ["Key"])
+    return default_look(MATERIALS, LIGHTS)
 
 
 def replace(path, value):
@@ -44,7 +47,10 @@ def test_default_look_has_every_field(default):
     }
     assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
     assert default["environment"] == {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
-    assert default["lights"] == {"Key": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}}
+    plain = {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}
+    spot = {"kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -1.0, 0.0], "cone": [20.0, 30.0]}
+    panel = {"kind": "mesh", "material": "Teapot", "emission": [5.0, 5.0, 4.0]}
+    assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}
     assert default["transport"] == {"show": "all", "bounces": 24}
     assert default["display"] == {"exposure": 0.0, "tone_map": "agx"}
     assert json.loads(json.dumps(default)) == default
@@ -60,7 +66,7 @@ def test_partial_look_keeps_what_it_does_not_name(default):
     full = complete(partial, default)
     assert [t["model"] for t in full["materials"]["Teapot"]["terms"]] == ["lambert"]
     assert full["materials"]["a/b~c"] == default["materials"]["a/b~c"]
-    assert full["lights"]["Key"] == {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": False}
+    assert full["lights"] == {**default["lights"], "Key": {**default["lights"]["Key"], "on": False}}
     assert full["display"] == {"exposure": 2, "tone_map": "agx"}
     assert complete({}, default) == default
 
@@ -178,8 +184,31 @@ def points(count):
         ("/environment/map", "../studio", "/environment/map", "null for the scene's own"),
         ("/environment/map", ["studio"], "/environment/map", "'sunset'"),
         ("/environment/tilt", 1, "/environment/tilt", "'rotation'"),
-        ("/lights/Moon", {}, "/lights", "'Key'"),
+        ("/lights", [], "/lights", "each light"),
+        ("/lights", {f"L{k}": {"kind": "point"} for k in range(63)}, "/lights", "at most 64"),
+        ("/lights/Moon", 3, "/lights/Moon", "an object"),
+        ("/lights/Moon", {}, "/lights/Moon/kind", "'point'"),
+        ("/lights/Moon", {"kind": ["point"]}, "/lights/Moon/kind", "'point'"),
+        ("/lights/Moon", {"kind": "mesh", "material": "Teapot"}, "/lights/Moon/kind", "'point'"),
+        ("/lights/" + "x" * 81, {"kind": "point"}, "/lights/" + "x" * 80, "1 to 80"),
+        ("/lights/Moon", {"kind": "point", "cone": [1, 2]}, "/lights/Moon/cone", "'position'"),
+        ("/lights/Moon", {"kind": "point", "emission": [1, -1, 1]}, "/lights/Moon/emission/1", "[0, 1e+06]"),
+        ("/lights/Moon", {"kind": "rectangle", "size": [1, 0]}, "/lights/Moon/size/1", "[0.0001, 10000]"),
+        ("/lights/Moon", {"kind": "rectangle", "rotation": 361}, "/lights/Moon/rotation", "[-360, 360]"),
         ("/lights/Key/on", 1, "/lights/Key/on", "true or false"),
+        ("/lights/Key/scale", NAN, "/lights/Key/scale", "[0, 10000]"),
+        ("/lights/Key/size", [1, 1], "/lights/Key/size", "'cone'"),
+        ("/lights/Key/position", [0, INF, 0], "/lights/Key/position/1", "[-1e+06, 1e+06]"),
+        ("/lights/Key/position", [0, 1], "/lights/Key/position", "three numbers"),
+        ("/lights/Key/direction", [0, 0, 1e-30], "/lights/Key/direction", "not all zero"),
+        ("/lights/Key/cone", [20], "/lights/Key/cone", "two numbers"),
+        ("/lights/Key/cone", [0, 0], "/lights/Key/cone", "above 0"),
+        ("/lights/Key/cone", [40, 30], "/lights/Key/cone", "inner ≤ outer"),
+        ("/lights/Key/cone", [20, 91], "/lights/Key/cone/1", "[0, 90]"),
+        ("/lights/Key/kind", "mesh", "/lights/Key/kind", "'spot'"),
+        ("/lights/Panel/kind", "point", "/lights/Panel/kind", "'mesh'"),
+        ("/lights/Panel/material", "a/b~c", "/lights/Panel/material", "'Teapot'"),
+        ("/lights/Panel/position", [0, 0, 0], "/lights/Panel/position", "'material'"),
         ("/display/exposure", 21, "/display/exposure", "[-20, 20]"),
         ("/display/tone_map", "reinhard", "/display/tone_map", "'agx'"),
         ("/display/tone_map", {"a": 1}, "/display/tone_map", "'agx'"),
@@ -287,6 +316,42 @@ def test_what_a_patch_removes_is_the_default_again(default):
     assert edited == default
 
 
+def test_lights_are_added_completed_and_taken_away(default):
+    lamp = {"op": "add", "path": "/lights/Lamp", "value": {"kind": "rectangle", "size": [1, 2]}}
+    added = apply_patch(default, [lamp], default)
+    assert added["lights"]["Lamp"] == {
+        "kind": "rectangle", "scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True, "emission": [1.0, 1.0, 1.0],
+        "position": [0.0, 1.0, 0.0], "direction": [0.0, -1.0, 0.0], "rotation": 0.0, "size": [1, 2],
+    }  # fmt: skip
+    moved = apply_patch(added, replace("/lights/Lamp/position/1", 1.5), default)
+    assert moved["lights"]["Lamp"]["position"] == [0.0, 1.5, 0.0]
+    assert moved["lights"]["Key"] is default["lights"]["Key"]
+    assert apply_patch(moved, [{"op": "remove", "path": "/lights/Lamp"}], default) == default
+
+
+def test_light_of_the_scene_may_change_its_kind_and_comes_back_when_removed(default):
+    edited = apply_patch(default, replace("/lights/Key", {"kind": "point"}), default)
+    assert edited["lights"]["Key"]["position"] == [0.0, 1.0, 0.0], "another kind starts from its own defaults"
+    edited = apply_patch(edited, [{"op": "remove", "path": "/lights/Key"}], default)
+    assert edited == default
+    dark = apply_patch(default, replace("/lights/Panel/on", False), default)
+    assert validate(dark, default).lights["Panel"].gain == (0.0, 0.0, 0.0)
+
+
+def test_light_s_gain_and_geometry_say_all_of_it(default):
+    edited = apply_patch(
+        default,
+        replace("/lights/Key", {"scale": 2, "color": [1, 0.5, 0], "emission": [3, 3, 3]}),
+        default,
+    )
+    key, before = validate(edited, default).lights["Key"], validate(default, default).lights["Key"]
+    assert key.gain == (6.0, 3.0, 0.0)
+    assert key.geometry == before.geometry
+    assert key.geometry.position == (1.0, 2.0, 3.0)
+    wider = validate(apply_patch(default, replace("/lights/Key/cone/1", 60), default), default)
+    assert wider.lights["Key"].geometry != before.geometry
+
+
 def test_empty_path_replaces_the_whole_look(default):
     edited = apply_patch(default, replace("/display/exposure", 3), default)
     assert apply_patch(edited, replace("", {}), default) == default
@@ -332,6 +397,9 @@ OPERATIONS = st.builds(
             "/display/exposure",
             "/environment",
             "/lights/Key/on",
+            "/lights/Lamp",
+            "/lights/Lamp/cone",
+            "/lights/Lamp/scale",
             f"{CURVES}/theta_d",
             "",
         ]
@@ -341,6 +409,8 @@ OPERATIONS = st.builds(
         st.lists(NUMBERS, min_size=3, max_size=3),
         st.just({}),
         st.just({"model": "ggx"}),
+        st.just({"kind": "spot"}),
+        st.just({"kind": "rectangle", "rotation": 30}),
         st.builds(lambda a, b: {"points": [[0, a], [b, 1.0]]}, NUMBERS, st.floats(0, 100)),
     ),
 )
@@ -349,7 +419,7 @@ OPERATIONS = st.builds(
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.lists(st.lists(OPERATIONS, max_size=4), max_size=5))
 def test_patches_in_a_row_equal_plain_json_patch_and_whole_checking(patches):
-    default = default_look(MATERIALS, ["Key"])
+    default = default_look(MATERIALS, LIGHTS)
     before = copy.deepcopy(default)
     document = default
     for patch in patches:
@@ -389,3 +459,18 @@ def test_shown_paths_are_equal_where_the_picture_is(default, transport, paths):
 def test_a_store_that_knows_no_transport_shows_all_of_it(default):
     older = {name: part for name, part in default.items() if name != "transport"}
     assert complete({}, older)["transport"] == default["transport"]
+
+
+@pytest.mark.parametrize(
+    ("fields", "pointer"),
+    [
+        ({}, "/lights/A/kind"),
+        ({"kind": ["spot"]}, "/lights/A/kind"),
+        ({"kind": "mesh", "material": "Cup"}, "/lights/A/material"),
+        ({"kind": "spot", "size": [1, 1]}, "/lights/A/size"),
+    ],
+)
+def test_scene_with_a_bad_light_is_refused_with_its_pointer(fields, pointer):
+    with pytest.raises(ParameterError) as caught:
+        default_look(MATERIALS, [Light("A", fields)])
+    assert caught.value.name == pointer

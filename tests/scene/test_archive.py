@@ -12,7 +12,7 @@ import pytest
 
 from relume.errors import SceneError
 from relume.scene.archive import load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
 
 
 def small_scene(**changes: object) -> Scene:
@@ -37,6 +37,7 @@ def small_scene(**changes: object) -> Scene:
         "cameras": [Camera("front", np.eye(4), 0.5)],
         "environment": Environment("sky", rng.random((2, 4, 3), np.float32)),
         "warnings": ["one thing"],
+        "lights": [Light("Key", {"kind": "spot", "position": [0.1, 2.0, -3.5]})],
     }
     return make_scene(**(parts | changes))  # type: ignore[arg-type]
 
@@ -58,6 +59,7 @@ def test_archive_round_trip_keeps_everything(tmp_path: Path) -> None:
     assert before.normal_map is not None
     np.testing.assert_array_equal(after.normal_map.pixels, before.normal_map.pixels)
     np.testing.assert_array_equal(loaded.cameras[0].to_world, scene.cameras[0].to_world)
+    assert loaded.lights == scene.lights
     np.testing.assert_array_equal(loaded.environment.radiance, scene.environment.radiance)
 
 
@@ -76,12 +78,13 @@ def test_id_changes_with_content_but_not_with_warnings() -> None:
     wider = Camera("front", np.eye(4), 0.6)
     others = [
         small_scene(name="other"),
+        small_scene(lights=[]),
         small_scene(environment=brighter),
         small_scene(meshes=[moved]),
         small_scene(materials=[matte]),
         small_scene(cameras=[wider]),
     ]
-    assert len({scene.id, *(other.id for other in others)}) == 6
+    assert len({scene.id, *(other.id for other in others)}) == 7
     assert small_scene(warnings=[]).id == scene.id
 
 
@@ -153,3 +156,17 @@ def test_make_scene_refuses_parts_that_do_not_fit() -> None:
     for change in changes:
         with pytest.raises(SceneError):
             small_scene(**change)
+
+
+@pytest.mark.parametrize(
+    ("lights", "message"),
+    [
+        ([Light(f"L{k}", {"kind": "point"}) for k in range(65)], "65 lights, 64 are allowed"),
+        ([Light("A", {"kind": "point"}), Light("A", {"kind": "spot"})], "each its own"),
+        ([Light("", {"kind": "point"})], "1 to 80"),
+        ([Light("x" * 81, {"kind": "point"})], "1 to 80"),
+    ],
+)
+def test_lights_without_usable_names_or_too_many_make_no_scene(lights: list[Light], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        small_scene(lights=lights)
