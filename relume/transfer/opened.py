@@ -84,9 +84,12 @@ class Transfer:
 
     def rough_lights_of(self, light: Light) -> TriangleLights:
         """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
-        rough = shrunk(self.radiance_of(light.environment.map), _ROUGH_WIDTH)
-        lights = weigh(self._tiles, rough, light.environment.rotation)
+        lights = weigh(self._tiles, self._rough_radiance(light.environment.map), light.environment.rotation)
         return lights if light.paths.direct else lights.none()
+
+    @cached_property
+    def _rough_radiance(self) -> Callable[[str | None], NDArray[np.float32]]:
+        return lru_cache(maxsize=_LIGHTS_KEPT)(lambda name: shrunk(self.radiance_of(name), _ROUGH_WIDTH))
 
     @cached_property
     def _tiles(self) -> Tiles:
