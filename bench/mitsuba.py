@@ -52,7 +52,8 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
     """Hand the scene's first view over as arrays and let the peer render.
 
     Args:
-        job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted.
+        job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
+            and "seen" where reflected light alone is (peer_mitsuba_render.py); "finer", texels for each of the map's.
     Returns:
         What it wrote to result.json in `folder`.
     """
@@ -61,7 +62,7 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
     for k, mesh in enumerate(scene.meshes):
         arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
     np.savez(folder / "scene.npz", allow_pickle=False, **arrays)
-    whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, **job}
+    whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, "finer": 1, **job}
     (folder / "job.json").write_text(json.dumps(whole))
     script = Path(__file__).with_name("peer_mitsuba_render.py")
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(llvm)}

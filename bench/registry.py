@@ -79,6 +79,8 @@ GROUPS = (
     Group("bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
     Group("bench.demo", ("demo.bake_s", "demo.first_picture_s")),
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
+    Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
+    Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
 )
 

@@ -34,6 +34,12 @@ TARGETS = {
     "bake.ray_saving": "≥ 3",
     "bake.two_workers_speedup": "≥ 1.8",
     "store.bytes_per_view_sample": "≤ 600",
+    "gather.bake_s": "≤ 20 s",
+    "gather.store_mb": "≤ 116 MB",
+    "gather.freeze_s": "≤ 0.5 s",
+    "gather.brdf_fps": "≥ 60",
+    "gather.rmse_diffuse": "≤ 2 %",
+    "gather.rmse_glossy": "≤ 5 %",
     "demo.bake_s": "≤ 30 s",
     "demo.first_picture_s": "≤ 10 s",
 }
@@ -43,7 +49,7 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.", "paper.", "pca.")) or name == "frame.incremental_rmse"
+        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse")) or name == "frame.incremental_rmse"
         else "performance.md"
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,22 @@ F64 = NDArray[np.float64]
 
 WHITE, GREEN, RED = (0.73, 0.71, 0.68), (0.12, 0.45, 0.15), (0.63, 0.065, 0.05)
 SKYLIGHT = 0.45  # half the side of the opening in the roof; the room is 2 m wide, high and deep
+# half diffuse, half a highlight whose exponent is to be edited: [3, 300] in Nguyen 2010
+GLOSSY_FLOOR: tuple[dict[str, Any], ...] = (
+    {"model": "lambert", "color": [0.36, 0.35, 0.33]},
+    {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "params": {"exponent": 100.0}},
+)
 SUN = np.array([0.22, 1.0, 0.12])
 SUN_RADIUS = np.radians(4.0)
 
 
 @cache
-def cornell_box() -> Scene:
-    """The room from x, z = −1 to 1 and y = 0 to 2, open towards the viewer; view "front", for square pictures."""
+def cornell_box(is_floor_glossy: bool = False) -> Scene:
+    """The room from x, z = −1 to 1 and y = 0 to 2, open towards the viewer; view "front", for square pictures.
+
+    Args:
+        is_floor_glossy: its floor has the terms `GLOSSY_FLOOR`.
+    """
     parts: list[tuple[str, Surface, Sequence[float]]] = [
         ("Floor", _rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
         ("Walls", merged([_rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), _roof()]), WHITE),
@@ -35,6 +45,8 @@ def cornell_box() -> Scene:
     ]
     meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(parts)]
     materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in parts]
+    if is_floor_glossy:
+        materials[0] = Material("Floor", GLOSSY_FLOOR)
     camera = look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
     return make_scene("Cornell box", meshes, materials, [camera], sunny_sky())
 

@@ -1,0 +1,145 @@
+"""gather.*: what somebody waits who edits a picture with light between surfaces.
+
+The Cornell box under the sky at 400×400 with 2,000 lights and 16,000 gather cells, its floor half glossy. The bake is
+in one process with all threads, after a tiny one that compiles. The edit: the exponent of the floor's highlight moves
+between 3 and 300, from the look to the encoded bytes, all bounces kept; its operator is frozen once before.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.timing import percentiles, seconds
+from relume.look import validate
+from relume.parallel import num_threads
+from relume.scene.cornell import cornell_box
+from relume.scene.model import Scene
+from relume.store import bake_here
+from relume.transfer.base import Recipe, Task, Written
+from relume.transfer.cache import FrozenCache
+from relume.transfer.gather import GatherMethod
+from relume.transfer.opened import Transfer, open_transfer
+from relume.transfer.picture import Picture
+
+_NAMES = ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")
+FLOOR = "/materials/Floor/terms/1"
+_SPEED = "frames/s"
+
+
+class Baked(NamedTuple):
+    """A bake, and how it went.
+
+    Attributes:
+        wall_s: of it. context: its parts.
+    """
+
+    path: Path
+    wall_s: float
+    context: dict[str, Any]
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, open, freeze, drag."""
+    scene = cornell_box(is_floor_glossy=True)
+    with tempfile.TemporaryDirectory() as folder:
+        bake(scene, recipe_of(tiny=True), Path(folder) / "warm.zarr")
+        baked = bake(scene, recipe_of(tiny), Path(folder) / "gather.zarr")
+        size_mb = store_mb(baked.path)
+        transfer = open_transfer(baked.path)
+        picture = opened(transfer)
+        freeze_s = _freeze_s(transfer, picture)
+        frames_s = edit_frames_s(transfer, picture, 5 if tiny else 120)
+    p50, p95 = percentiles(frames_s)
+    size = {"size": list(recipe_of(tiny).size), "cells": baked.context["cells"]}
+    return [
+        Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
+        Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/links")[1]}),
+        Figure(_NAMES[2], freeze_s, "s", {**size, "floor_samples": _floor_samples(transfer)}),
+        Figure(_NAMES[3], 1 / p50, _SPEED, {**size, "ms_p50": 1e3 * p50, "ms_p95": 1e3 * p95}),
+    ]
+
+
+def recipe_of(tiny: bool) -> Recipe:
+    """What is measured, or a bake of a second."""
+    return Recipe("gather", ("front",), *(((40, 40), 60) if tiny else ((400, 400), 2000)))
+
+
+def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
+    """Bake in this process; wall and tracing seconds of every stage."""
+    method, stages = (
+        GatherMethod(),
+        {name: {"wall_s": 0.0, "tracing_s": 0.0, "rays": 0} for name in GatherMethod.stages},
+    )
+    last = time.perf_counter()
+
+    def note(task: Task, written: Written) -> None:
+        nonlocal last
+        stage, now = stages[GatherMethod.stages[task.stage]], time.perf_counter()
+        stage["wall_s"] += now - last
+        stage["tracing_s"] += written.trace_s
+        stage["rays"] += written.num_rays
+        last = now
+
+    wall_s = seconds(lambda: bake_here(method, scene, recipe, target, note))
+    cells = open_transfer(target).store.shape("cells/material")[0]
+    return Baked(target, wall_s, {"cells": cells, "size": list(recipe.size), "lights": recipe.num_lights, **stages})
+
+
+def store_mb(path: Path) -> float:
+    """Content of all files, 10⁶ bytes."""
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file()) / 1e6
+
+
+def opened(transfer: Transfer) -> Picture:
+    """A picture at rest."""
+    picture = Picture(transfer, "front", FrozenCache(4 << 30))
+    settle(picture)
+    return picture
+
+
+def settle(picture: Picture) -> None:
+    """Make all that is lacking."""
+    while not picture.advance(None).exact or picture.waiting() is not None:
+        if picture.waiting() is not None:
+            picture.freeze(lambda share: None, lambda: False)
+
+
+def _freeze_s(transfer: Transfer, picture: Picture) -> float:
+    """Seconds of the floor's operators, the slower one; both are made once before, which compiles.
+
+    The last one made stays the one that the picture follows.
+    """
+    warm, taken = opened(transfer), []
+    for pointer in ("curves/theta_h", "params/exponent"):
+        warm.touch(f"{FLOOR}/{pointer}")
+        settle(warm)
+        picture.touch(f"{FLOOR}/{pointer}")
+        taken.append(seconds(partial(settle, picture)))
+    return max(taken)
+
+
+def edit_frames_s(transfer: Transfer, picture: Picture, num_frames: int) -> list[float]:
+    """Seconds of each frame of a drag, from the look to the encoded bytes."""
+    taken = []
+    for exponent in np.geomspace(3, 300, num_frames):
+        document = copy.deepcopy(transfer.default_look)
+        document["materials"]["Floor"]["terms"][1]["params"]["exponent"] = float(exponent)
+        look = validate(document, transfer.default_look)
+        began = time.perf_counter()
+        picture.set_look(look)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        taken.append(time.perf_counter() - began)
+    return taken[1:]
+
+
+def _floor_samples(transfer: Transfer) -> int:
+    rows = transfer.views["front"].rows(transfer.material_names.index("Floor"))
+    return int(rows.stop - rows.start)

@@ -1,0 +1,62 @@
+"""gather.rmse_diffuse and gather.rmse_glossy: the picture's reflected light against Mitsuba's path tracer.
+
+The bake of bench/gather.py. Diffuse: the whole picture, its floor's highlight taken away. Glossy: the highlight of the
+floor alone (exponent 100) over the floor's pixels, lit by surfaces that reflect diffusely. Direct light is in neither,
+and Mitsuba has as many bounces as we have. Its own noise is taken off: `bench.indirect.error_without_noise`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure, skipped
+from bench.gather import bake, recipe_of
+from bench.indirect import bsdf, error_without_noise, reflected, reflected_by_mitsuba
+from bench.mitsuba import missing
+from relume.scene.cornell import GLOSSY_FLOOR, cornell_box
+from relume.transfer.opened import Transfer, open_transfer
+
+_NAMES = ("gather.rmse_diffuse", "gather.rmse_glossy")
+_UNIT = "relative RMSE"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake, two renders."""
+    if (why := missing()) is not None:
+        return skipped(_NAMES, _UNIT, why)
+    scene, recipe = cornell_box(is_floor_glossy=True), recipe_of(tiny)
+    spp = {"diffuse": 2, "glossy": 2} if tiny else {"diffuse": 320, "glossy": 128}
+    diffuse, glossy = GLOSSY_FLOOR
+    beyond = [bsdf(scene.materials[mesh.material].terms[0]["color"]) for mesh in scene.meshes]
+    highlight = bsdf((0, 0, 0), glossy["color"], glossy["params"]["exponent"])
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path)
+        plain, both = (reflected(transfer, terms) for terms in ({"Floor": (diffuse,)}, {}))
+        theirs = {
+            "diffuse": reflected_by_mitsuba(scene, recipe.size, beyond, beyond, spp["diffuse"], folder),
+            "glossy": reflected_by_mitsuba(scene, recipe.size, [highlight, *beyond[1:]], beyond, spp["glossy"], folder),
+        }
+        on_floor = _is_all_floor(transfer)
+    found = {
+        "diffuse": error_without_noise(plain, theirs["diffuse"]),
+        "glossy": error_without_noise((both - plain)[on_floor], theirs["glossy"][:, on_floor]),
+    }
+    return [
+        Figure(f"gather.rmse_{kind}", error["error"], _UNIT, {**error, "size": list(recipe.size), "spp": 2 * spp[kind]})
+        for kind, error in found.items()
+    ]
+
+
+def _is_all_floor(transfer: Transfer) -> Any:
+    """Pixels that nothing else has a part in. (height, width) bool"""
+    view = transfer.views["front"]
+    is_floor = np.zeros(view.num_view_samples, bool)
+    is_floor[view.rows(transfer.material_names.index("Floor"))] = True
+    pixel_of = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
+    share = np.bincount(pixel_of, view.weight * is_floor[view.order], view.width * view.height)
+    return share.reshape(view.height, view.width) > 1 - 1e-6
