@@ -105,7 +105,8 @@ class BrushMessage(Message):
 
 class TouchMessage(Message):
     """client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now
-    on; or has a slider in hand, which moves this `parameter`: freeze along it, the open curve stays open."""
+    on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the
+    environment: prepare for it, the open curve stays open."""
 
     type: Literal["touch"]
     curve: Pointer | None = None
@@ -144,12 +145,20 @@ class Problem(BaseModel):
     detail: str
 
 
+class CameraInfo(Message):
+    """Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians."""
+
+    to_world: list[float]
+    yfov: float
+
+
 class ViewInfo(Message):
-    """A baked view and its size in pixels."""
+    """A baked view, its size in pixels and its camera."""
 
     name: str
     width: int
     height: int
+    camera: CameraInfo
 
 
 class HelloMessage(Message):
@@ -194,13 +203,18 @@ class ProblemMessage(Message):
 
 
 class ProbeAnswer(Message):
-    """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel."""
+    """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel.
+
+    `position` and `normal` are of the surface that covers most of it, world space; null for background.
+    """
 
     type: Literal["probe"] = "probe"
     view: str
     x: int
     y: int
     material: str | None
+    position: tuple[float, float, float] | None
+    normal: tuple[float, float, float] | None
     radiance: tuple[float, float, float]
     curve: str | None
     bands: list[list[float]] | None

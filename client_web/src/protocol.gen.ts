@@ -79,7 +79,7 @@ export interface StreamMessage {
   quality?: number;
 }
 
-/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has a slider in hand, which moves this `parameter`: freeze along it, the open curve stays open. */
+/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */
 export interface TouchMessage {
   type: "touch";
   curve?: string | null;
@@ -129,6 +129,12 @@ export interface BakeMessage {
   state: string;
   progress: number;
   seconds_left: number | null;
+}
+
+/** Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians. */
+export interface CameraInfo {
+  to_world: number[];
+  yfov: number;
 }
 
 /** An editable factor of a term; an outgoing one multiplies the finished pixel. */
@@ -284,13 +290,15 @@ export interface PlanBody {
   seconds: number | null;
 }
 
-/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. */
+/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
 export interface ProbeAnswer {
   type: "probe";
   view: string;
   x: number;
   y: number;
   material: string | null;
+  position: [number, number, number] | null;
+  normal: [number, number, number] | null;
   radiance: [number, number, number];
   curve: string | null;
   bands: number[][] | null;
@@ -398,11 +406,12 @@ export interface TruthFigures {
   significant: number;
 }
 
-/** A baked view and its size in pixels. */
+/** A baked view, its size in pixels and its camera. */
 export interface ViewInfo {
   name: string;
   width: number;
   height: number;
+  camera: CameraInfo;
 }
 
 export type ClientMessage =

@@ -25,7 +25,7 @@ from relume.errors import PlanError
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import weigh
 from relume.look import default_look
-from relume.scene.model import Scene
+from relume.scene.model import Camera, Scene
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
@@ -98,7 +98,7 @@ class DirectMethod:
             "relightable": recipe.relightable,
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
-            "views": [{"name": view, "eye": cameras[view].to_world[:3, 3].tolist()} for view in recipe.views],
+            "views": [_described(cameras[view]) for view in recipe.views],
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
@@ -178,6 +178,11 @@ class DirectMethod:
                 rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
                 self._sampled = Sampled(store, _targets(store), rows)
             return self._sampled
+
+
+def _described(camera: Camera) -> dict[str, Any]:
+    """A view among a store's attributes."""
+    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
 
 
 def _targets(store: StoreReader) -> Targets:

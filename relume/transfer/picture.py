@@ -19,6 +19,8 @@ from relume.transfer.opened import Transfer
 from relume.transfer.pointer import (
     ROTATION,
     CurvePointer,
+    EnvironmentPointer,
+    LightPointer,
     ParameterPointer,
     moved_parameter,
     parse_curve,
@@ -78,18 +80,18 @@ class Picture:
         self._look = look
 
     def touch(self, pointer: str) -> None:
-        """Prepare a curve, a parameter or the environment's rotation ahead of its first edit.
+        """Prepare what a hand takes hold of ahead of its first edit.
 
         Args:
-            pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h", or `ROTATION`.
+            pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h"; see `parse_pointer`.
         Raises:
             ParameterError: there is no such curve or parameter in this look.
             MemoryBudgetError: its operator is larger than the cache may be.
         """
-        self._is_turning = pointer == ROTATION
-        if self._is_turning:
-            return
         touched = parse_pointer(pointer)
+        self._is_turning = touched == ROTATION
+        if isinstance(touched, LightPointer | EnvironmentPointer):
+            return
         check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
         self._touched = touched
 
@@ -182,7 +184,7 @@ class Picture:
         return curve_bands(term.document, declared), generated_bands(term.document, declared)
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
-        """What makes up a pixel; see `relume.transfer.probe.probe`."""
+        """What makes up a pixel, and where its surface is; see `relume.transfer.probe.probe`."""
         return probe(self._images, self._radiance, self._gain, self._touched, x, y)
 
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:

@@ -1,11 +1,13 @@
-"""JSON Pointers to what a hand may hold: /materials/NAME/terms/K/curves/CURVE or …/params/PARAMETER."""
+"""JSON Pointers to what a hand may hold: a curve or parameter of a term, a light, a field of the environment."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from relume.errors import ParameterError
 from relume.look import Look
+from relume.look.model import EnvironmentLook
 
 
 @dataclass(frozen=True)
@@ -17,8 +19,7 @@ class _TermPointer:
     name: str
 
     def _written(self, group: str) -> str:
-        material = self.material.replace("~", "~0").replace("/", "~1")
-        return f"/materials/{material}/terms/{self.term}/{group}/{self.name}"
+        return f"/materials/{_escaped(self.material)}/terms/{self.term}/{group}/{self.name}"
 
 
 class CurvePointer(_TermPointer):
@@ -35,25 +36,62 @@ class ParameterPointer(_TermPointer):
         return self._written("params")
 
 
-ROTATION = "/environment/rotation"
+@dataclass(frozen=True)
+class LightPointer:
+    """A light of a look."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return f"/lights/{_escaped(self.name)}"
+
+
+@dataclass(frozen=True)
+class EnvironmentPointer:
+    """A field of a look's environment."""
+
+    field: str
+
+    def __str__(self) -> str:
+        return f"/environment/{self.field}"
+
+
+Pointer = CurvePointer | ParameterPointer | LightPointer | EnvironmentPointer
+
+ROTATION = EnvironmentPointer("rotation")
 _KINDS: dict[str, type[CurvePointer] | type[ParameterPointer]] = {"curves": CurvePointer, "params": ParameterPointer}
+_TERM = re.compile(
+    r"/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9][0-9]{0,2})/(?P<group>curves|params)/(?P<name>[a-z_0-9]+)"
+)
+_LIGHT = re.compile(r"/lights/(?P<name>[^/]+)")
+_ENVIRONMENT = re.compile(rf"/environment/(?P<field>{'|'.join(EnvironmentLook.model_fields)})")
 
 
-def parse_pointer(pointer: str) -> CurvePointer | ParameterPointer:
+def parse_pointer(pointer: str) -> Pointer:
     """Read a pointer.
 
     Raises:
-        ParameterError: it points to neither a curve nor a parameter.
+        ParameterError: it points to nothing that a hand may hold.
     """
-    parts = pointer.split("/")
-    if (
-        len(parts) != 7
-        or (parts[0], parts[1], parts[3]) != ("", "materials", "terms")
-        or parts[5] not in _KINDS
-        or not (parts[4].isascii() and parts[4].isdigit() and len(parts[4]) <= 4)
-    ):
-        raise ParameterError("pointer", pointer, "like /materials/NAME/terms/0/curves/theta_h, or …/params/ior")
-    return _KINDS[parts[5]](parts[2].replace("~1", "/").replace("~0", "~"), int(parts[4]), parts[6])
+    if term := _TERM.fullmatch(pointer):
+        return _KINDS[term["group"]](_unescaped(term["material"]), int(term["term"]), term["name"])
+    if light := _LIGHT.fullmatch(pointer):
+        return LightPointer(_unescaped(light["name"]))
+    if environment := _ENVIRONMENT.fullmatch(pointer):
+        return EnvironmentPointer(environment["field"])
+    raise ParameterError(
+        "pointer",
+        pointer,
+        "like /materials/NAME/terms/0/curves/theta_h, …/params/ior, /lights/NAME or /environment/rotation",
+    )
+
+
+def _escaped(token: str) -> str:
+    return token.replace("~", "~0").replace("/", "~1")
+
+
+def _unescaped(token: str) -> str:
+    return token.replace("~1", "/").replace("~0", "~")
 
 
 def parse_curve(pointer: str) -> CurvePointer:

@@ -28,7 +28,7 @@ def probe(
     x: int,
     y: int,
 ) -> dict[str, Any]:
-    """A pixel's material, radiance, and what each band of its active curve gives to it.
+    """A pixel's material, where its surface is, radiance, and what each band of its active curve gives to it.
 
     Args:
         radiance: of every view sample. (3, samples) float32. gain: multiplies each channel. (3,)
@@ -43,16 +43,20 @@ def probe(
     entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
     samples, weights = view.order[entries], view.weight[entries]
     seen = gain * (radiance[:, samples] * weights).sum(axis=1)
-    index = int(np.searchsorted(view.bounds, int(samples[np.argmax(weights)]), side="right")) - 1
+    heaviest = int(samples[np.argmax(weights)])
+    index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
+    found = {"material": None, "position": None, "normal": None, "radiance": seen, "bands": None, "curve": None}
     if index >= len(images.by_name):
-        return {"material": None, "radiance": seen, "bands": None, "curve": None}
+        return found
     name = images.transfer.material_names[index]
+    position, normal = view.surface_at(heaviest)
+    found |= {"material": name, "position": position, "normal": normal}
     for k, term in _touched_first(images, name, touched):
         bands = _contributions(images, name, term, samples, weights)
         if bands is not None and isinstance(term.active, AlongCurve):
             pointer = str(CurvePointer(name, k, term.active.name))
-            return {"material": name, "radiance": seen, "bands": gain[:, None] * bands, "curve": pointer}
-    return {"material": name, "radiance": seen, "bands": None, "curve": None}
+            return found | {"bands": gain[:, None] * bands, "curve": pointer}
+    return found
 
 
 def _touched_first(

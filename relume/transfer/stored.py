@@ -1,4 +1,4 @@
-"""Lights, receivers, gather cells and rays as a store keeps them."""
+"""Cameras, lights, receivers, gather cells and rays as a store keeps them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
-from relume.errors import StoreError
+from relume.errors import SceneError, StoreError
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
+from relume.scene.checks import check_camera
+from relume.scene.model import Camera
 from relume.trace.cell_tree import CellTree
 from relume.trace.coherent import RayCounts
 from relume.trace.gather_rays import Pattern, make_pattern
@@ -19,6 +21,18 @@ from relume.transfer.receivers import GatherRays, Receivers
 F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
+
+
+def read_camera(store: StoreReader, k: int) -> Camera:
+    """The camera of the k-th view. Raises StoreError where there is no usable one."""
+    try:
+        found = store.attributes["views"][k]
+        to_world = np.array(found["to_world"], np.float64).reshape(4, 4)
+        camera = Camera(str(found["name"]), to_world, float(found["yfov"]))
+        check_camera(camera)
+    except (KeyError, TypeError, ValueError, SceneError) as error:
+        raise StoreError(f"view {k} of the store has no camera ({error}); delete the bake, bake again") from error
+    return camera
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
@@ -76,7 +90,7 @@ def read_rays(store: StoreReader) -> RayCounts:
 
 def read_receivers(store: StoreReader, k: int, start: int, stop: int, visible: NDArray[np.uint8]) -> Receivers:
     """Samples [start, stop) of the k-th view as points that light arrives at."""
-    eye = np.asarray(store.attributes["views"][k]["eye"], np.float32)
+    eye = read_camera(store, k).to_world[:3, 3].astype(np.float32)
     position = store.read(f"views/{k}/position", start, stop)
     towards = eye - position
     return Receivers(

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ChunkDamagedError
+from relume.scene.model import Camera
 from relume.trace.view_samples import BACKGROUND
 from relume.transfer.base import StoreReader
 from relume.transfer.receivers import Receivers
-from relume.transfer.stored import read_gather_rays, read_receivers
+from relume.transfer.stored import read_camera, read_gather_rays, read_receivers
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
@@ -31,7 +32,7 @@ class View:
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
     """
 
-    name: str
+    camera: Camera
     index: int
     width: int
     height: int
@@ -43,6 +44,11 @@ class View:
     weight: F32
     textures: dict[str, F32]
     cos_theta_o: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """The camera's."""
+        return self.camera.name
 
     @property
     def num_view_samples(self) -> int:
@@ -84,6 +90,13 @@ class View:
         """Unit directions in which those samples look. (n, 3)"""
         return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
 
+    def surface_at(self, sample: int) -> tuple[F32, F32]:
+        """Position and unit normal of a sample on a surface, world space, from the store. (3,) each"""
+        position, normal = (
+            self.store.read(f"views/{self.index}/{name}", sample, sample + 1)[0] for name in ("position", "normal")
+        )
+        return position, normal
+
     def material_ids(self) -> NDArray[np.uint16]:
         """The material that covers most of each pixel, 65535 where that is the background. (height, width)"""
         material = np.full(self.num_view_samples, BACKGROUND, np.uint16)
@@ -123,7 +136,7 @@ def open_view(store: StoreReader, index: int) -> View:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
     width, height = store.attributes["size"]
-    found = store.attributes["views"][index]
+    camera = read_camera(store, index)
     prefix = f"views/{index}"
     pixel = store.read(f"{prefix}/pixel")
     material = store.read(f"{prefix}/material")
@@ -135,12 +148,11 @@ def open_view(store: StoreReader, index: int) -> View:
     if surface and int(material[surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
-    eye = np.asarray(found["eye"])
-    towards = eye - store.read(f"{prefix}/position", 0, surface)
+    towards = camera.to_world[:3, 3] - store.read(f"{prefix}/position", 0, surface)
     normal = store.read(f"{prefix}/normal", 0, surface)
     cosine = np.einsum("nc,nc->n", normal, towards) / np.linalg.norm(towards, axis=1)
     return View(
-        name=found["name"],
+        camera=camera,
         index=index,
         width=width,
         height=height,

@@ -76,7 +76,9 @@ class Answers:
                 x=probe.x,
                 y=probe.y,
                 material=found["material"],
-                radiance=tuple(float(c) for c in found["radiance"]),
+                position=_triple(found["position"]),
+                normal=_triple(found["normal"]),
+                radiance=_triple(found["radiance"]),
                 curve=found["curve"],
                 bands=None if bands is None else rounded(bands),
             )
@@ -104,3 +106,8 @@ class Answers:
             ms=times(0.0, 0.0, (time.perf_counter() - start_s) * 1e3),
         )
         return pack(header, payload)
+
+
+def _triple(values: Any) -> Any:
+    """Three numbers for a message, where there are any."""
+    return None if values is None else tuple(float(value) for value in values)

@@ -1,18 +1,21 @@
-"""Pointers into a look: which curve or parameter is meant."""
+"""Pointers into a look: whether there is such a curve, or such a thing to take hold of."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve
 from relume.errors import ParameterError
-from relume.transfer.pointer import ROTATION
-
-_POINTER = r"^/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9]\d{0,2})/%s/(?P<name>[a-z_0-9]+)$"
-CURVE, PARAMETER = re.compile(_POINTER % "curves"), re.compile(_POINTER % "params")
+from relume.transfer.pointer import (
+    CurvePointer,
+    EnvironmentPointer,
+    LightPointer,
+    ParameterPointer,
+    parse_curve,
+    parse_pointer,
+)
 
 
 def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any], Curve]:
@@ -21,27 +24,32 @@ def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any
     Raises:
         ParameterError: there is no such curve in this look.
     """
-    term, name = _term(CURVE.match(pointer), document)
+    wanted = parse_curve(pointer)
+    term = _term(wanted, document)
     curves = {curve.name: curve for curve in TERMS[term["model"]].settled(term).curves} if term else {}
-    if term is None or name not in curves:
+    if term is None or wanted.name not in curves:
         raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
-    return term, curves[name]
+    return term, curves[wanted.name]
 
 
-def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
-    """Raises ParameterError where there is no such parameter in this look; the environment's rotation counts as one."""
-    if pointer == ROTATION:
-        return
-    term, name = _term(PARAMETER.match(pointer), document)
-    if term is None or name not in {parameter.name for parameter in TERMS[term["model"]].parameters}:
-        raise ParameterError("parameter", pointer, "a pointer like /materials/Teapot/terms/1/params/ior of this look")
+def check_held(pointer: str, document: Mapping[str, Any]) -> None:
+    """Raises ParameterError where this look has no such parameter, light or field of the environment."""
+    match parse_pointer(pointer):
+        case ParameterPointer() as parameter:
+            term = _term(parameter, document)
+            is_there = term is not None and parameter.name in {p.name for p in TERMS[term["model"]].parameters}
+        case LightPointer(name):
+            is_there = name in document["lights"]
+        case EnvironmentPointer():
+            is_there = True
+        case CurvePointer():
+            is_there = False
+    if not is_there:
+        raise ParameterError("parameter", pointer, "like /materials/Teapot/terms/1/params/ior or /lights/Lamp, here")
 
 
-def _term(match: re.Match[str] | None, document: Mapping[str, Any]) -> tuple[dict[str, Any] | None, str]:
-    """The term that a pointer goes into, where there is one, and the name at its end."""
-    if match is None:
-        return None, ""
-    material = document["materials"].get(match["material"].replace("~1", "/").replace("~0", "~"))
+def _term(pointer: CurvePointer | ParameterPointer, document: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The term that a pointer goes into, where there is one."""
+    material = document["materials"].get(pointer.material)
     terms: list[dict[str, Any]] = material["terms"] if material else []
-    index = int(match["term"])
-    return terms[index] if index < len(terms) else None, match["name"]
+    return terms[pointer.term] if pointer.term < len(terms) else None

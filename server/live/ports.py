@@ -10,6 +10,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.scene.model import Camera
+
 Tile = tuple[int, int, int, int]
 F32 = NDArray[np.float32]
 
@@ -23,6 +25,8 @@ class View(Protocol):
     def width(self) -> int: ...
     @property
     def height(self) -> int: ...
+    @property
+    def camera(self) -> Camera: ...
     def material_ids(self) -> NDArray[np.uint16]:
         """(height, width); 65535 is background."""
         ...

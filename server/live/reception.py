@@ -13,7 +13,7 @@ from relume.errors import ParameterError, ProtocolError, RelumeError
 from server import protocol
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.parts import Parts
-from server.live.pointers import check_parameter, find_curve
+from server.live.pointers import check_held, find_curve
 
 MAX_BAD_MESSAGES = 50
 
@@ -88,7 +88,7 @@ class Reception:
             find_curve(message.curve, self._desk.document)
             self._wishes.touch = message.curve
         elif message.parameter is not None:
-            check_parameter(message.parameter, self._desk.document)
+            check_held(message.parameter, self._desk.document)
             self._wishes.hold = message.parameter
 
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:

@@ -18,7 +18,7 @@ from server.live.bake_news import BakeNews
 from server.live.edits import LookDesk
 from server.live.frame_loop import FrameLoop
 from server.live.parts import Parts
-from server.live.ports import Library, Transfer
+from server.live.ports import Library, Transfer, View
 from server.live.reception import Reception
 from server.live.resume import ResumeStore
 from server.live.shown import Shown
@@ -27,7 +27,7 @@ from server.live.window import Window
 from server.live.wire import Wire
 from server.live.wishes import Wishes
 from server.metrics import Metrics
-from server.protocol import HelloMessage, ViewInfo
+from server.protocol import CameraInfo, HelloMessage, ViewInfo
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +72,7 @@ async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfe
 
 
 def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: str, resumed: bool) -> HelloMessage:
-    views = [ViewInfo(name=view.name, width=view.width, height=view.height) for view in transfer.views.values()]
+    views = [_view_info(view) for view in transfer.views.values()]
     return HelloMessage(
         session=secrets.token_hex(8),
         bake=bake,
@@ -87,6 +87,11 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: s
         materials=list(transfer.material_names),
         resume=token,
     )
+
+
+def _view_info(view: View) -> ViewInfo:
+    camera = CameraInfo(to_world=view.camera.to_world.ravel().tolist(), yfov=view.camera.yfov)
+    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera)
 
 
 async def _run(house: House, websocket: WebSocket, bake: str, parts: Parts) -> None:

@@ -70,6 +70,7 @@ class FakeView:
     name: str
     width: int
     height: int
+    camera: Camera = field(default_factory=lambda: Camera("front", np.eye(4), 0.8))
 
     def material_ids(self) -> np.ndarray:
         ids = np.zeros((self.height, self.width), np.uint16)
@@ -184,6 +185,8 @@ class FakePicture:
     def probe(self, x: int, y: int) -> dict[str, Any]:
         return {
             "material": "Paper",
+            "position": np.array([1.0, 2.0, 3.0]),
+            "normal": np.array([0.0, 1.0, 0.0]),
             "radiance": [float(c) for c in self.pixels[y, x]],
             "bands": np.ones((3, 4)),
             "curve": self.wanted,

@@ -10,7 +10,7 @@ import pytest
 from relume.errors import ParameterError, ProtocolError, StoreError
 from server.live.edits import LookDesk
 from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
-from server.live.pointers import find_curve
+from server.live.pointers import check_held, find_curve
 from server.live.resume import MAX_KEPT, ResumeStore
 from server.live.shown import Shown
 from server.live.transfers import MAX_IDLE, TransferPool
@@ -149,6 +149,15 @@ def test_curve_pointers_are_resolved_or_refused() -> None:
     for pointer in (f"{TERM}/0/curves/theta_h", f"{TERM}/3/curves/alpha", f"{TERM}/02/curves/alpha", "/x"):
         with pytest.raises(ParameterError):
             find_curve(pointer, DOCUMENT)
+
+
+def test_what_a_hand_may_hold_is_of_this_look() -> None:
+    document = {**DOCUMENT, "lights": {"Desk / lamp": {}}}
+    for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 lamp", "/environment/scale"):
+        check_held(pointer, document)
+    for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/sigma", "/lights/Desk", "/environment/size"):
+        with pytest.raises(ParameterError):
+            check_held(pointer, document)
 
 
 def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failure() -> None:

@@ -22,7 +22,10 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         assert isinstance(hello, dict)
         assert hello["type"] == "hello"
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
-        assert hello["views"] == [{"name": n, "width": WIDTH, "height": HEIGHT} for n in ("front", "left")]
+        camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8}
+        assert hello["views"] == [
+            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera} for n in ("front", "left")
+        ]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
         assert not hello["resumed"]
         frame = session.frame()
@@ -143,6 +146,8 @@ def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control:
         {"parameter": IOR.replace("ior", "colour")},
         {"parameter": IOR.replace("Paper", "Nobody")},
         {"parameter": IOR.replace("/1/", "/999/")},
+        {"parameter": "/lights/Nobody"},
+        {"parameter": "/environment"},
     ],
 )
 def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
@@ -279,6 +284,7 @@ def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
         session.send(type="probe", view="front", x=3, y=4)
         probe = session.text("probe")
         assert (probe["x"], probe["y"], probe["material"]) == (3, 4, "Paper")
+        assert (probe["position"], probe["normal"]) == ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0])
         assert probe["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
         assert np.shape(probe["bands"]) == (3, 4)
         session.send(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})

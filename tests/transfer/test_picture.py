@@ -347,10 +347,28 @@ def test_probe_of_each_band_is_what_that_band_alone_gives(transfer):
     np.testing.assert_allclose(bands[:, 40:90].sum(axis=1), part[y, x], rtol=1e-3, atol=1e-5)
 
 
+def test_probe_finds_the_surface_that_the_camera_sees_there(transfer):
+    picture, view = opened(transfer), next(iter(transfer.views.values()))
+    to_camera = np.linalg.inv(view.camera.to_world)
+    height = 2 * np.tan(view.camera.yfov / 2)
+    y, x = np.nonzero(pixels_of_ball_alone(transfer))
+    for k in range(0, len(y), 37):
+        probe = picture.probe(int(x[k]), int(y[k]))
+        seen = (to_camera @ [*probe["position"], 1.0])[:3]
+        column = view.width / 2 + seen[0] / -seen[2] / height * view.height
+        row = view.height / 2 - seen[1] / -seen[2] / height * view.height
+        assert 0 <= column - x[k] <= 1
+        assert 0 <= row - y[k] <= 1
+        assert np.linalg.norm(probe["normal"]) == pytest.approx(1, rel=1e-5)
+        towards = view.camera.to_world[:3, 3] - probe["position"]
+        assert probe["normal"] @ towards > 0
+
+
 def test_probe_of_background_and_outside(transfer):
     picture = opened(transfer)
     probe = picture.probe(2, 2)
     assert (probe["material"], probe["bands"], probe["curve"]) == (None, None, None)
+    assert (probe["position"], probe["normal"]) == (None, None)
     np.testing.assert_allclose(probe["radiance"], picture.image()[2, 2], rtol=1e-5)
     for x, y in ((-1, 0), (64, 0), (0, 48), (0, -1)):
         with pytest.raises(ParameterError):

@@ -8,6 +8,7 @@ import twins
 
 from relume.color import rgb9e5_pack, rgb9e5_unpack
 from relume.errors import ParameterError
+from relume.scene.model import Camera
 from relume.transfer.resolve import encode, pack_rgb9e5, resolve
 from relume.transfer.view import View
 
@@ -23,7 +24,7 @@ def make_view(width=100, height=70, seed=0):
     pixel, weight = pixel[shuffled], weight[shuffled]
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     return View(
-        name="v", index=0, width=width, height=height, store=None,
+        camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None,
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         order=order, weight=weight[order].astype(np.float32), textures={}, cos_theta_o=np.ones(len(pixel)),
     )  # fmt: skip
