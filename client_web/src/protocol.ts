@@ -55,7 +55,13 @@ export interface Look {
   /** `map` names an environment of the server, null the scene's own. */
   environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
   lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
+  /** Which light paths are shown; `bounces` between surfaces. */
+  transport: Transport;
   display: { exposure: number; tone_map: string };
+}
+export interface Transport {
+  show: "all" | "direct" | "first_bounce" | "further_bounces";
+  bounces: number;
 }
 
 /** A library material, its terms in look-document form. */

@@ -13,5 +13,6 @@ export const LOOK: Look = {
   },
   environment: { scale: 1, color: [1, 1, 1], rotation: 0 },
   lights: {},
+  transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },
 };

@@ -7,7 +7,7 @@ import { sortFiles, stem } from "../src/start/files";
 import { gauge } from "../src/state/metrics";
 import { placeFromUrl, placeToUrl } from "../src/state/url";
 import { chord } from "../src/ui/chord";
-import { formatBytes, formatNumber, formatSeconds, fromFraction, parseNumber, tickLabel, toFraction } from "../src/ui/scale";
+import { formatBytes, formatNumber, formatSeconds, fromFraction, keyStep, parseNumber, snap, tickLabel, toFraction } from "../src/ui/scale";
 
 describe("slider scales", () => {
   const log = { minimum: 0.01, maximum: 1, scale: "log" } as const;
@@ -25,6 +25,14 @@ describe("slider scales", () => {
       expect(fromFraction(range, 7)).toBe(range.maximum);
       expect(toFraction(range, -4)).toBe(0);
     }
+  });
+
+  test("whole numbers stay whole, and a key moves by one of them", () => {
+    const whole = { minimum: 0, maximum: 24, scale: "linear", step: 1 } as const;
+    expect(fromFraction(whole, 0.49)).toBe(12);
+    expect(snap(whole, 3.7)).toBe(4);
+    expect(fromFraction(whole, toFraction(whole, 5) + keyStep(whole))).toBe(6);
+    expect(keyStep(linear)).toBe(0.01);
   });
 
   test("values are tidy", () => {

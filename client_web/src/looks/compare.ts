@@ -20,6 +20,7 @@ export function completed(partial: Partial<Look>): Look {
     materials: { ...base.materials, ...partial.materials },
     environment: { ...base.environment, ...partial.environment },
     lights: { ...base.lights, ...partial.lights },
+    transport: { ...base.transport, ...partial.transport },
     display: { ...base.display, ...partial.display },
   };
 }

@@ -3,6 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { ownEnvironmentThumbnail } from "../net/api";
 import { bake, look } from "../state/store";
 import { IconButton } from "../ui/Button";
+import { onRadioKey } from "../ui/radio";
 import { choose, environments, importing, loadEnvironments, take } from "./environments";
 
 interface Entry {
@@ -17,19 +18,6 @@ function entriesOf(current: string): Entry[] {
   const own = { map: null, name: "Own", title: "The scene’s own", picture: ownEnvironmentThumbnail(current) };
   const others = environments.value.map(({ map, name, thumbnail }) => ({ map, name, title: name, picture: thumbnail }));
   return [own, ...others];
-}
-
-const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
-
-/** Arrow keys move along and choose, as in any group of radio buttons. */
-function onArrow(event: KeyboardEvent, entries: readonly Entry[], chosen: number): void {
-  const step = STEPS[event.key];
-  if (step === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
-  event.preventDefault();
-  event.stopPropagation();
-  const next = (chosen + step + entries.length) % entries.length;
-  (event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=radio]")[next]?.focus();
-  choose((entries[next] as Entry).map);
 }
 
 function Choice({ entry, chosen, focusable }: { entry: Entry; chosen: boolean; focusable: boolean }) {
@@ -82,16 +70,19 @@ export function EnvironmentGallery() {
   if (current === null) return null;
   const entries = entriesOf(current);
   const chosen = entries.findIndex((entry) => entry.map === map);
+  const focusable = Math.max(0, chosen);
   return (
     <>
       <div
         class="environments"
         role="radiogroup"
         aria-label="Environment"
-        onKeyDown={(event) => onArrow(event, entries, Math.max(0, chosen))}
+        onKeyDown={(event) =>
+          onRadioKey(event, entries.length, focusable, (index) => choose((entries[index] as Entry).map))
+        }
       >
         {entries.map((entry, k) => (
-          <Choice key={entry.map} entry={entry} chosen={k === chosen} focusable={k === Math.max(0, chosen)} />
+          <Choice key={entry.map} entry={entry} chosen={k === chosen} focusable={k === focusable} />
         ))}
       </div>
       <div class="environment-words" role="status">

@@ -6,6 +6,7 @@ import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMat
 import { toggleSolo } from "../state/solo";
 import { IconButton } from "../ui/Button";
 import { EnvironmentPanel } from "./EnvironmentPanel";
+import { TransportPanel } from "./TransportPanel";
 
 /** A ball in the material's colours: body from its diffuse term, highlight from the rest. */
 function Swatch({ material }: { material: MaterialLook | undefined }) {
@@ -90,6 +91,7 @@ export function Outline() {
       </header>
       <Materials />
       <EnvironmentPanel />
+      <TransportPanel />
     </nav>
   );
 }

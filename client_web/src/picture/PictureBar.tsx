@@ -1,5 +1,5 @@
 /** Under the picture: the probed pixel on the left, zoom on the right. */
-import { drawn, exposure, falseColour, histogramOpen, probe, solo, toneMap } from "../state/store";
+import { drawn, exposure, falseColour, histogramOpen, probe, toneMap } from "../state/store";
 import { formatNumber } from "../ui/scale";
 import { stage } from "./stage";
 import { toDisplay } from "./tonemap";
@@ -40,11 +40,6 @@ export function PictureBar() {
     <div class="picture-bar">
       <Probe />
       <span class="spacer" />
-      {solo.value !== null && (
-        <button class="solo" title="Show all materials again (S)" onClick={() => (solo.value = null)}>
-          Only {solo.value} ×
-        </button>
-      )}
       <button
         aria-pressed={histogramOpen.value}
         title="How often each brightness occurs (H)"

@@ -5,6 +5,7 @@ import { Cell } from "./Cell";
 import { FalseColourLegend } from "./FalseColourLegend";
 import { columnsFor } from "./grid";
 import { HistogramView } from "./HistogramView";
+import { Limits } from "./Limits";
 import { PictureBar } from "./PictureBar";
 
 /** The size of an element, followed. */
@@ -35,6 +36,7 @@ export function PictureView() {
             <Cell key={place} view={name} />
           ))}
         </div>
+        <Limits />
         <FalseColourLegend />
         <HistogramView />
       </div>

@@ -105,8 +105,11 @@ function shownOf(views: HelloMessage["views"], fallback: string): string[] {
 
 /** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function welcome(of: Session, message: HelloMessage): void {
-  store.defaultLook.value ??= message.look as unknown as Look;
-  if (store.look.peek() === null) store.look.value = message.look as unknown as Look;
+  const own = message.look as unknown as Look;
+  store.defaultLook.value ??= own;
+  const kept = store.look.peek();
+  // a look that was kept by an older editor lacks what that one did not know
+  if (kept === null || Object.keys(own).some((section) => !(section in kept))) store.look.value = { ...own, ...kept };
   of.want(store.look.peek() as Look, performance.now());
   told.delete(of);
   const shown = shownOf(message.views, message.view);

@@ -2,7 +2,7 @@
  * Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
 import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
-import { formatNumber, fromFraction, toFraction, type Range } from "./scale";
+import { formatNumber, fromFraction, keyStep, snap, toFraction, type Range } from "./scale";
 
 interface Props extends Range {
   label: string;
@@ -17,12 +17,12 @@ interface Props extends Range {
 
 const FINE = 0.1;
 const STEPS: Record<string, number> = {
-  ArrowLeft: -0.01,
-  ArrowDown: -0.01,
-  ArrowRight: 0.01,
-  ArrowUp: 0.01,
-  PageDown: -0.1,
-  PageUp: 0.1,
+  ArrowLeft: -1,
+  ArrowDown: -1,
+  ArrowRight: 1,
+  ArrowUp: 1,
+  PageDown: -10,
+  PageUp: 10,
 };
 
 export function Slider(props: Props) {
@@ -57,7 +57,7 @@ export function Slider(props: Props) {
   };
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
-    if (step !== undefined) set(at + step * (event.shiftKey ? FINE : 1));
+    if (step !== undefined) set(at + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
     else if (event.key === "Enter") setTyping(true);
@@ -66,7 +66,7 @@ export function Slider(props: Props) {
     event.preventDefault();
     event.stopPropagation();
   };
-  const shown = `${formatNumber(value)}${unit === "" ? "" : ` ${unit}`}`;
+  const shown = `${props.step === 1 ? value : formatNumber(value)}${unit === "" ? "" : ` ${unit}`}`;
   return (
     <div class="slider">
       <div
@@ -101,9 +101,9 @@ export function Slider(props: Props) {
           label={`${label}, as a number`}
           minimum={props.minimum}
           maximum={props.maximum}
-          step={(props.maximum - props.minimum) / 100}
+          step={props.step ?? (props.maximum - props.minimum) / 100}
           autoFocus
-          onChange={onChange}
+          onChange={(next) => onChange(snap(props, next))}
           onDone={() => setTyping(false)}
         />
       ) : (

@@ -5,6 +5,7 @@ import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
 import { coming, connection, freezing, latencyMs, look, retryInMs, settled, solo } from "../state/store";
 import { toggleTruth, truthOpen } from "../truth/truth";
+import { limitWords } from "../outline/paths";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
 
@@ -48,7 +49,12 @@ export function StatusBar() {
   const memory = useMemory();
   // announced: only what changes seldom, without the numbers that run
   const announced = useComputed(() =>
-    [connection.value === "open" ? "Connected" : connectionWords(), freezing.value && pictureWords(), soloWords()]
+    [
+      connection.value === "open" ? "Connected" : connectionWords(),
+      freezing.value && pictureWords(),
+      soloWords(),
+      look.value && limitWords(look.value.transport),
+    ]
       .filter(Boolean)
       .join(". "),
   );

@@ -4,6 +4,8 @@ export interface Range {
   minimum: number;
   maximum: number;
   scale: "linear" | "log";
+  /** Values are multiples of it, and one key press moves by it. */
+  step?: number;
 }
 
 function isLog(range: Range): boolean {
@@ -27,7 +29,17 @@ export function fromFraction(range: Range, fraction: number): number {
   const t = Math.min(1, Math.max(0, fraction));
   const { minimum, maximum } = range;
   const value = isLog(range) ? minimum * (maximum / minimum) ** t : minimum + (maximum - minimum) * t;
-  return clampTo(range, tidy(value, isLog(range) ? value : maximum - minimum));
+  return snap(range, tidy(value, isLog(range) ? value : maximum - minimum));
+}
+
+/** The nearest value that the range has. */
+export function snap(range: Range, value: number): number {
+  return clampTo(range, range.step === undefined ? value : Math.round(value / range.step) * range.step);
+}
+
+/** How far a key press moves along the slider, of its whole way. */
+export function keyStep({ minimum, maximum, step = 0 }: Range): number {
+  return Math.max(0.01, step / (maximum - minimum));
 }
 
 /** Round to a thousandth of `span`, to a power of ten. */

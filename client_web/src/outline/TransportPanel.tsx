@@ -1,0 +1,57 @@
+/** Which light paths are shown, of a bake that has light between surfaces. */
+import { edit } from "../state/edit";
+import { defaultLook, look, method } from "../state/store";
+import { onRadioKey } from "../ui/radio";
+import { Slider } from "../ui/Slider";
+import { MAX_BOUNCES, PATHS, type Show } from "./paths";
+
+function choose(show: Show): void {
+  edit("Light paths", "/transport/show", show);
+}
+
+export function TransportPanel() {
+  const transport = look.value?.transport;
+  if (transport === undefined || method.value !== "gather") return null;
+  const chosen = PATHS.findIndex(({ show }) => show === transport.show);
+  return (
+    <>
+      <header class="panel-head">
+        <h2>Light paths</h2>
+      </header>
+      <div
+        class="group segmented"
+        role="radiogroup"
+        aria-label="Light paths"
+        onKeyDown={(event) => onRadioKey(event, PATHS.length, chosen, (index) => choose(PATHS[index]?.show ?? "all"))}
+      >
+        {PATHS.map(({ show, label, title }, index) => (
+          <button
+            key={show}
+            role="radio"
+            aria-checked={index === chosen}
+            tabIndex={index === chosen ? 0 : -1}
+            title={title}
+            onClick={() => choose(show)}
+          >
+            {label}
+          </button>
+        ))}
+      </div>
+      <div class="param alone">
+        <span class="param-label" title="How many surfaces light may meet before the one that is seen">
+          Bounces
+        </span>
+        <Slider
+          label="Bounces"
+          value={transport.bounces}
+          initial={defaultLook.value?.transport.bounces ?? MAX_BOUNCES}
+          minimum={0}
+          maximum={MAX_BOUNCES}
+          step={1}
+          scale="linear"
+          onChange={(bounces) => edit("Bounces", "/transport/bounces", bounces)}
+        />
+      </div>
+    </>
+  );
+}
