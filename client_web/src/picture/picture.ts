@@ -6,9 +6,18 @@ import { brushed, materialNames } from "../state/store";
 import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
 import { decodeRgb9e5 } from "./rgb9e5";
-import type { Screen } from "./screen";
+import type { Renderer } from "./renderer";
+import type { Canvas } from "./transform";
 
 const BACKGROUND = 65535;
+
+/** What a picture may be shown on. */
+export interface Shows {
+  readonly renderer: Renderer;
+  present(): Promise<void>;
+  redraw(): void;
+  size(): Canvas;
+}
 
 export class Picture {
   pixels = emptyPixels(1, 1);
@@ -24,7 +33,7 @@ export class Picture {
   revision = 0;
   /** The revision for which it is exact; −1 while it is not. */
   exactRevision = -1;
-  screen: Screen | null = null;
+  screen: Shows | null = null;
 
   constructor(readonly view: string) {}
 

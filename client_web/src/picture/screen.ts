@@ -3,7 +3,7 @@
 import { effect } from "@preact/signals";
 import { frameDrawn } from "../state/stats";
 import * as store from "../state/store";
-import type { Picture } from "./picture";
+import type { Picture, Shows } from "./picture";
 import { Renderer } from "./renderer";
 import { MARGIN_ALONE, MARGIN_BESIDE, shownWidth, toScreen, type Canvas } from "./transform";
 import { transformOf } from "./places";
@@ -11,7 +11,7 @@ import { transformOf } from "./places";
 const MAX_WAIT_MS = 250;
 const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
 
-export class Screen {
+export class Screen implements Shows {
   readonly renderer: Renderer;
   private box: [width: number, height: number] = [1, 1];
   /** Nothing has been drawn since the canvas was made or got another size. */
