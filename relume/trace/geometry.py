@@ -37,6 +37,12 @@ class Geometry:
     epsilon: float
 
 
+def off_surface(positions: F32) -> float:
+    """How far ray origins are moved off surfaces with these corners (n, 3), metres."""
+    # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
+    return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
+
+
 def merge(scene: Scene) -> Geometry:
     """Merge the meshes of a scene and build Embree's tree over them.
 
@@ -51,8 +57,6 @@ def merge(scene: Scene) -> Geometry:
         [mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)]
     )
     counts = [len(mesh.faces) for mesh in scene.meshes]
-    # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
-    reach = float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
     return Geometry(
         positions=positions,
         normals=np.concatenate([mesh.normals for mesh in scene.meshes]),
@@ -62,5 +66,5 @@ def merge(scene: Scene) -> Geometry:
         face_material=np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32),
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
         embree=EmbreeScene.build(positions, faces),
-        epsilon=1e-5 * reach,
+        epsilon=off_surface(positions),
     )

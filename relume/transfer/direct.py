@@ -3,6 +3,7 @@
 The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
+    scene/positions, faces, face_material                    triangles, for shadows of lights that looks add
     lights/environment                                       radiance, to weigh it again
     lights/tiles                                             relume.light.tiles.Tiles
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
@@ -82,9 +83,9 @@ class DirectMethod:
         return Plan(
             num_view_samples=samples,
             num_rays=samples * recipe.num_lights,
-            store_bytes=samples * (bits + _SURFACE_BYTES) + scene.environment.radiance.nbytes,
+            store_bytes=samples * (bits + _SURFACE_BYTES) + scene.environment.radiance.nbytes + _geometry_bytes(scene),
             # the sampling stage holds eight rays of each edge pixel with their surfaces, the others one shard
-            peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + 200) + 200_000_000,
+            peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + 200) + 200_000_000 + _geometry_bytes(scene),
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -98,6 +99,7 @@ class DirectMethod:
             "relightable": recipe.relightable,
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
+            "double_sided": [material.double_sided for material in scene.materials],
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -135,7 +137,7 @@ class DirectMethod:
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
-            return Written(self._lights(scene, recipe), 0, 0.0)
+            return Written({**self._lights(scene, recipe), **self._triangles(scene)}, 0, 0.0)
         samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
         surface = samples.surface
         arrays: dict[str, NDArray[Any]] = {
@@ -153,6 +155,10 @@ class DirectMethod:
         lights = weigh(tiles, radiance)
         arrays: dict[str, NDArray[Any]] = {f"lights/{name}": value for name, value in vars(lights).items()}
         return {**arrays, "lights/tiles": tiles.codes, "lights/environment": radiance}
+
+    def _triangles(self, scene: Scene) -> dict[str, NDArray[Any]]:
+        geometry = self.geometry_of(scene)
+        return {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         prefix = f"views/{k}"
@@ -183,6 +189,11 @@ class DirectMethod:
 def _described(camera: Camera) -> dict[str, Any]:
     """A view among a store's attributes."""
     return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+
+
+def _geometry_bytes(scene: Scene) -> int:
+    """Of the triangles, their corners and the material of each."""
+    return sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
 
 
 def _targets(store: StoreReader) -> Targets:

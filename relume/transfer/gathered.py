@@ -35,6 +35,11 @@ class CellLight:
     material: NDArray[np.uint16]
     textures: F32
 
+    @property
+    def num_cells(self) -> int:
+        """C."""
+        return len(self.material)
+
     def reflectance(self, reflectances: Reflectances) -> F32:
         """Diffuse reflectance of every cell, never above one. (C, 3) float32"""
         plain, *textured = np.array(reflectances).reshape(-1, 3, 3)[self.material].transpose(1, 0, 2)

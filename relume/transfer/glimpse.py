@@ -20,8 +20,9 @@ from scipy.spatial import cKDTree
 from relume.brdf.term import Term
 from relume.trace.cell_tree import NO_CELL
 from relume.transfer.light import Light
+from relume.transfer.local import Points
 from relume.transfer.material_image import MaterialImage
-from relume.transfer.receivers import Receivers
+from relume.transfer.receivers import GatherRays, LocalRays, Receivers
 from relume.transfer.shade import Shaded, shade
 from relume.transfer.term_image import TermImage
 from relume.transfer.view import View
@@ -40,25 +41,29 @@ class Sparse:
     """The samples of a material that are shaded, and how all others are made from them.
 
     Attributes:
+        receivers: without any rays. gathered: their gather rays, where those were baked; they bring nothing yet.
+        points: where they are.
         weights: rows sum to one. (samples, shaded samples)
     """
 
     receivers: Receivers
+    gathered: GatherRays | None
+    points: Points
     weights: Any
 
     @property
     def num_bytes(self) -> int:
         """Memory it holds."""
         few, weights = self.receivers, self.weights
-        links = 0 if few.rays is None else few.rays.links.nbytes
-        of_few = few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links
+        links = 0 if self.gathered is None else self.gathered.links.nbytes
+        of_few = 2 * few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links
         return int(of_few + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
 
-    def lit_by(self, reflected: F32 | None) -> Receivers:
-        """The few samples with the radiance of the gather cells as it is now."""
-        rays = self.receivers.rays
-        lit = None if rays is None or reflected is None else replace(rays, radiance=reflected)
-        return replace(self.receivers, rays=lit)
+    def lit_by(self, reflected: F32 | None, local: Sequence[LocalRays]) -> Receivers:
+        """The few samples in the light as it is now. reflected: radiance of the gather cells, None for none."""
+        if self.gathered is None or reflected is None:
+            return replace(self.receivers, rays=local)
+        return replace(self.receivers, rays=(replace(self.gathered, radiance=reflected), *local))
 
 
 def choose_sparse(view: View, material: int, *, has_rays: bool) -> Sparse:
@@ -73,7 +78,7 @@ def choose_sparse(view: View, material: int, *, has_rays: bool) -> Sparse:
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
     _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
-    whole = view.receivers(material, np.zeros((NO_CELL + 1, 3), np.float32) if has_rays else None)
+    whole, points = view.receivers(material), view.points(material)
     place = np.concatenate([np.stack([x, y], axis=1), _PIXELS_A_TURN * step * whole.normal], axis=1)
     num = min(_NUM_NEIGHBOURS, len(chosen))
     distance, nearest = cKDTree(place[chosen]).query(place, k=list(range(1, num + 1)))
@@ -81,10 +86,11 @@ def choose_sparse(view: View, material: int, *, has_rays: bool) -> Sparse:
     weight /= weight.sum(axis=1, keepdims=True)
     first = np.arange(0, weight.size + 1, num)
     shape = (len(place), len(chosen))
-    rays = whole.rays
-    few = rays and replace(rays, links=rays.links[chosen], numbers=rays.numbers[chosen])
+    gathered = view.gather_rays(material, np.zeros((NO_CELL + 1, 3), np.float32)) if has_rays else None
     return Sparse(
-        Receivers(whole.normal[chosen], whole.tangent[chosen], whole.wo[chosen], whole.visible[chosen], few),
+        Receivers(whole.normal[chosen], whole.tangent[chosen], whole.wo[chosen], whole.visible[chosen]),
+        gathered and replace(gathered, links=gathered.links[chosen], numbers=gathered.numbers[chosen]),
+        Points(points.position[chosen], points.normal[chosen], points.numbers[chosen]),
         csr_array((weight.ravel().astype(np.float32), nearest.ravel(), first), shape=shape),
     )
 
@@ -166,7 +172,8 @@ class Glimpse:
         found = []
         for k, part in enumerate(self.parts):
             sparse = _sparse(self.images, part.material.index)
-            shaded = shade(part.term, part.bands, lights, sparse.lit_by(reflected), lambda share: None, cancelled)
+            lit = sparse.lit_by(reflected, transfer.local.all_rays(self.light, sparse.points))
+            shaded = shade(part.term, part.bands, lights, lit, lambda share: None, cancelled)
             found.append(_spread(shaded, sparse.weights))
             progress((k + 1) / len(self.parts))
         return found

@@ -6,8 +6,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from relume.brdf.albedo import reflectances_of
-from relume.look import EnvironmentKey, Look, Paths
+from relume.look import EnvironmentKey, LightGeometry, Look, Paths
+from relume.look.model import Rgb
 from relume.transfer.gathered import Reflectances
+
+
+class Source(NamedTuple):
+    """A local light. gain: of each channel, times its unit emission."""
+
+    geometry: LightGeometry
+    gain: Rgb
 
 
 class Light(NamedTuple):
@@ -16,11 +24,36 @@ class Light(NamedTuple):
     Attributes:
         reflectances: of all materials, for light that they reflect onto each other; none where no such light is shown.
         paths: by which light comes, those between surfaces only where they were baked.
+        local: lights that give any. environment_gain: of each channel beside them; 1 where there are none, since then
+            it multiplies the finished picture (`gain_of`).
     """
 
     environment: EnvironmentKey
     reflectances: Reflectances
     paths: Paths
+    local: tuple[Source, ...] = ()
+    environment_gain: Rgb = (1.0, 1.0, 1.0)
+
+    @property
+    def is_environment_lit(self) -> bool:
+        """Whether the environment gives any light."""
+        return any(self.environment_gain)
+
+
+def gain_of(look: Look) -> Rgb:
+    """What multiplies the finished picture: the environment's gain, where no light is beside it."""
+    return (1.0, 1.0, 1.0) if _local(look) else look.environment.gain
+
+
+def _local(look: Look) -> tuple[Source, ...]:
+    return tuple(Source(light.geometry, light.gain) for light in look.lights.values() if any(light.gain))
+
+
+def emission_of(light: Light, material: str) -> Rgb:
+    """Radiance that the surfaces of a material send to the eye themselves."""
+    gains = [gain for geometry, gain in light.local if geometry.material == material and light.paths.direct]
+    red, green, blue = (sum(channel) for channel in zip((0.0, 0.0, 0.0), *gains, strict=True))
+    return red, green, blue
 
 
 def light_of(look: Look, material_names: Sequence[str], *, has_cells: bool) -> Light:
@@ -32,7 +65,9 @@ def light_of(look: Look, material_names: Sequence[str], *, has_cells: bool) -> L
     paths = look.transport.paths
     if not has_cells:
         paths = paths.without_reflections()
+    local = _local(look)
+    light = Light(look.environment.key, (), paths, local, look.environment.gain if local else (1.0, 1.0, 1.0))
     if not paths.reflect:
-        return Light(look.environment.key, (), paths)
+        return light
     terms = (look.materials[name].terms for name in material_names)
-    return Light(look.environment.key, tuple(map(reflectances_of, terms)), paths)
+    return light._replace(reflectances=tuple(map(reflectances_of, terms)))

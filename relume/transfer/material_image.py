@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,8 @@ class MaterialImage:
         self.documents = list(documents)
         self._light = light
         self.terms = [TermImage(document, self._cos_theta_o, light) for document in documents]
+        self._emission = (0.0, 0.0, 0.0)
+        self._emitted: F32 | None = None
         self._is_current = False
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
@@ -50,6 +52,14 @@ class MaterialImage:
         for term in self.terms:
             term.set_light(light)
 
+    def set_emission(self, emission: tuple[float, float, float], shines: Callable[[int], NDArray[np.bool_]]) -> None:
+        """The surfaces send this out themselves, where `shines` says so of the material's samples."""
+        if emission == self._emission:
+            return
+        self._emission, self._is_current = emission, False
+        lit = shines(self.index) if any(emission) else np.zeros(self.num_samples, np.bool_)
+        self._emitted = np.outer(emission, lit).astype(np.float32)
+
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""
         return (term for term in self.terms if not term.is_exact())
@@ -62,8 +72,11 @@ class MaterialImage:
             color, texture, has_texture = self._factors(term)
             add_term(term.image, color, texture, term.outgoing, has_texture, self._first, k == 0, radiance)
             term.is_composed = True
+        own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:
-            radiance[:, self._first : self._first + self.num_samples] = 0
+            own[:] = 0
+        if self._emitted is not None:
+            own += self._emitted
         self._is_current = True
         return True
 

@@ -82,7 +82,8 @@ class Need:
 
         def receivers() -> Receivers:
             reflected = images.transfer.reflected_in(self.light)
-            return images.view.receivers(self.material.index, reflected, is_lit=self.light.paths.direct)
+            local = images.local_rays(self.material.index, self.light)
+            return images.view.receivers(self.material.index, reflected, local, is_lit=lights.num_lights > 0)
 
         def frozen(along: Along) -> Frozen:
             return along.freeze(self.term, self.bands, lights, receivers(), progress, cancelled)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from relume.transfer.base import StoreReader
 from relume.transfer.derived import DerivedImages
 from relume.transfer.gathered import CellLight
 from relume.transfer.light import Light
+from relume.transfer.local import LocalLights
 from relume.transfer.stored import read_cells, read_lights, read_tiles
 from relume.transfer.view import View, open_view
 
@@ -57,6 +58,11 @@ class Transfer:
         return DerivedImages(Path(self.key))
 
     @cached_property
+    def local(self) -> LocalLights:
+        """What local lights need."""
+        return LocalLights(self.store)
+
+    @cached_property
     def lights(self) -> TriangleLights:
         """The environment's triangles."""
         return read_lights(self.store)
@@ -79,13 +85,12 @@ class Transfer:
 
     def lights_of(self, light: Light) -> TriangleLights:
         """Those of them by which light comes straight to the picture."""
-        lights = self.lights_in(light.environment)
-        return lights if light.paths.direct else lights.none()
+        return _shown(self.lights_in(light.environment), light)
 
     def rough_lights_of(self, light: Light) -> TriangleLights:
         """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
-        lights = weigh(self._tiles, self._rough_radiance(light.environment.map), light.environment.rotation)
-        return lights if light.paths.direct else lights.none()
+        rough = self._rough_radiance(light.environment.map)
+        return _shown(weigh(self._tiles, rough, light.environment.rotation), light)
 
     @cached_property
     def _rough_radiance(self) -> Callable[[str | None], NDArray[np.float32]]:
@@ -110,10 +115,15 @@ class Transfer:
     def _reflected(self) -> Callable[[Light], NDArray[np.float32]]:
         cells = self.cells
         assert cells is not None
-        arriving = lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: cells.irradiance(self.lights_in(key)))
+        of_environment = lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: cells.irradiance(self.lights_in(key)))
 
         def radiance(light: Light) -> NDArray[np.float32]:
-            return cells.radiance(arriving(light.environment), light.reflectances, light.paths.first, light.paths.last)
+            arriving = np.zeros((cells.num_cells, 3), np.float32)
+            if light.is_environment_lit:
+                arriving += np.array(light.environment_gain, np.float32) * of_environment(light.environment)
+            for geometry, gain in light.local:
+                arriving += np.array(gain, np.float32) * self.local.irradiance(geometry)[:, None]
+            return cells.radiance(arriving, light.reflectances, light.paths.first, light.paths.last)
 
         return lru_cache(maxsize=_LIGHTS_KEPT)(radiance)
 
@@ -123,6 +133,15 @@ class Transfer:
             return view.background()
         towards = turned(view.background_directions(), -environment.rotation)
         return lookup(self.radiance_of(environment.map), towards.astype(np.float32))
+
+
+def _shown(lights: TriangleLights, light: Light) -> TriangleLights:
+    """The triangles of an environment by which light comes straight to the picture, beside local lights."""
+    if not (light.paths.direct and light.is_environment_lit):
+        return lights.none()
+    if light.environment_gain == (1.0, 1.0, 1.0):
+        return lights
+    return replace(lights, power=lights.power * np.array(light.environment_gain, np.float32))
 
 
 def open_transfer(path: Path) -> Transfer:

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
 from relume.look import EnvironmentKey, Look
+from relume.look.model import Rgb
 from relume.transfer.cache import FrozenCache
 from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
+from relume.transfer.light import gain_of
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import (
@@ -62,7 +64,7 @@ class Picture:
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._background: EnvironmentKey | None = None
+        self._background: tuple[EnvironmentKey, Rgb] | None = None
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
         self._is_turning = self._lacks_glimpse = False
@@ -74,8 +76,8 @@ class Picture:
         images.set_look(look)
         if images.light != before:
             self._lacks_glimpse = (is_shown or self._lacks_glimpse) and can_glimpse(images)
-        if images.light.environment != before.environment:
-            self._touched = None  # the hand has moved on to the environment
+        if (images.light.environment, images.light.local) != (before.environment, before.local):
+            self._touched = None  # the hand has moved on to a light
         self._moved = moved_parameter(self._look, look)
         self._look = look
 
@@ -154,11 +156,15 @@ class Picture:
             if material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
             exact = exact and not any(True for _ in material.changed_terms())
-        background = images.light.environment if images.light.paths.direct else None
-        if background != self._background or not np.array_equal(self._gain, self._look.environment.gain):
-            self._gain, self._background = np.array(self._look.environment.gain), background
+        light, gain = images.light, gain_of(self._look)
+        background = (light.environment, light.environment_gain) if light.paths.direct else None
+        if background != self._background or not np.array_equal(self._gain, gain):
+            self._gain, self._background = np.array(gain), background
             outside = self._radiance[:, self._view.num_surface_samples :]
-            outside[:] = 0 if background is None else self._transfer.background_in(background, self._view).T
+            outside[:] = 0
+            if light.paths.direct:
+                seen = self._transfer.background_in(light.environment, self._view)
+                outside[:] = (seen * np.array(light.environment_gain, np.float32)).T
             tiles.update(self._view.all_tiles)
         return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
 

@@ -37,9 +37,7 @@ class Projector:
         self._first = np.empty(_POINTS_A_BLOCK + 1, np.int64)
         self._light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
-        self._rays = None
-        if receivers.rays is not None:
-            self._rays = RayProjector(term, contraction, receivers, receivers.rays, _POINTS_A_BLOCK)
+        self._rays = RayProjector(term, contraction, receivers, _POINTS_A_BLOCK)
 
     def project(self, start: int, stop: int) -> F32:
         """Transport of points [start, stop) along the free curve, in its bands.
@@ -53,8 +51,7 @@ class Projector:
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-            if self._rays is not None:
-                self._rays.add(block, end, out[block - start : end - start])
+            self._rays.add(block, end, out[block - start : end - start])
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:

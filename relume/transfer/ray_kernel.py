@@ -11,12 +11,13 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import angles_into
+from relume.light.local import light_sample
 from relume.trace.cell_tree import NO_CELL
 from relume.trace.gather_rays import local_ray, shift_of, weight_of
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def list_rays(  # type: ignore[no-untyped-def]
+def list_gathered(  # type: ignore[no-untyped-def]
     normal, tangent, wo, links, pattern, numbers, radiance, start, stop, first, wi, out, power
 ):
     """List the rays of points [start, stop) that hit a cell, in the points' local frames.
@@ -45,6 +46,42 @@ def list_rays(  # type: ignore[no-untyped-def]
             out[0, end], out[1, end], out[2, end] = ox, oy, oz
             for channel in range(3):
                 power[channel, end] = weight * radiance[cell, channel]
+            end += 1
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_local(  # type: ignore[no-untyped-def]
+    normal, tangent, wo, light, pattern, gain, position, numbers, visible, start, stop, first, wi, out, power
+):
+    """List the samples of a local light that points [start, stop) see; arguments as in `LocalRays`.
+
+    Writes what `list_gathered` writes, the power of a ray being w · cos θi · gain; returns K.
+    """
+    end = 0
+    for p in range(start, stop):
+        first[p - start] = end
+        n, t, o = normal[p], tangent[p], wo[p]
+        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+        ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
+        oy = bx * o[0] + by * o[1] + bz * o[2]
+        oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+        shift_u, shift_v = shift_of(pattern, numbers[p])
+        for sample in range(pattern.uv.shape[0]):
+            if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
+                continue
+            dx, dy, dz, _, weight, _, _, _ = light_sample(
+                light, pattern, sample, shift_u, shift_v, position[p, 0], position[p, 1], position[p, 2]
+            )
+            z = n[0] * dx + n[1] * dy + n[2] * dz
+            weight *= z
+            if weight <= 0:
+                continue
+            wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
+            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            for channel in range(3):
+                power[channel, end] = weight * gain[channel]
             end += 1
     first[stop - start] = end
     return end
@@ -82,7 +119,8 @@ def project_rays(  # type: ignore[no-untyped-def]
     """Add listed rays to their points; curves as in `relume.transfer.contraction.Contraction`.
 
     Args:
-        first, wi, wo, power: from `list_rays`. shading: quotients, one row for all channels, or three. (1 or 3, K)
+        first, wi, wo, power: from `list_gathered` or `list_local`.
+        shading: quotients, one row for all channels, or three. (1 or 3, K)
         out: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
     """
     num_curves, blue_row = kinds.shape[0], shading.shape[0] - 1

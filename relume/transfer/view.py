@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,7 +13,8 @@ from relume.errors import ChunkDamagedError
 from relume.scene.model import Camera
 from relume.trace.view_samples import BACKGROUND
 from relume.transfer.base import StoreReader
-from relume.transfer.receivers import Receivers
+from relume.transfer.local import Points
+from relume.transfer.receivers import GatherRays, LocalRays, Receivers
 from relume.transfer.stored import read_camera, read_gather_rays, read_receivers
 
 F32 = NDArray[np.float32]
@@ -64,11 +66,27 @@ class View:
         """The samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
-    def receivers(self, material: int, reflected: F32 | None = None, *, is_lit: bool = True) -> Receivers:
+    def points(self, material: int) -> Points:
+        """A material's samples as points that see local lights; reads the store."""
+        rows = self.rows(material)
+        position, normal = (
+            self.store.read(f"views/{self.index}/{name}", rows.start, rows.stop) for name in ("position", "normal")
+        )
+        return Points(position, normal, np.arange(rows.start, rows.stop, dtype=np.uint32))
+
+    def receivers(
+        self,
+        material: int,
+        reflected: F32 | None = None,
+        local: Sequence[LocalRays] = (),
+        *,
+        is_lit: bool = True,
+    ) -> Receivers:
         """A material's samples as points that light arrives at; reads the store.
 
         Args:
             reflected: radiance of gather cells, whose light arrives too; from `Transfer.reflected_in`.
+            local: of lights that the samples see.
             is_lit: whether light comes from the environment itself; else no bits are read.
         """
         rows = self.rows(material)
@@ -77,10 +95,13 @@ class View:
         else:
             visible = np.empty((rows.stop - rows.start, 0), np.uint8)
         receivers = read_receivers(self.store, self.index, rows.start, rows.stop, visible)
-        if reflected is None:
-            return receivers
-        rays = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
-        return replace(receivers, rays=rays)
+        gathered = () if reflected is None else (self.gather_rays(material, reflected),)
+        return replace(receivers, rays=(*gathered, *local))
+
+    def gather_rays(self, material: int, reflected: F32) -> GatherRays:
+        """Rays of a material's samples that bring the radiance of gather cells; reads the store."""
+        rows = self.rows(material)
+        return read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
 
     def background(self) -> F32:
         """Radiance of the samples after the surfaces. (n, 3) float32"""

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from relume.errors import ParameterError
-from relume.look import Look, validate
+from relume.look import LightGeometry, Look, validate
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
-from relume.transfer.light import Light, light_of
+from relume.transfer.light import Light, emission_of, light_of
+from relume.transfer.local import SAMPLES, Points, Shadows
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import CurvePointer, ParameterPointer
+from relume.transfer.receivers import LocalRays
 from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
 
@@ -34,6 +39,8 @@ class ViewImages:
             name: MaterialImage(self.view, index, self.default.materials[name].terms, self.light)
             for index, name in enumerate(transfer.material_names)
         }
+        for name, material in self.by_name.items():
+            material.set_emission(emission_of(self.light, name), self._shines)
 
     def set_look(self, look: Look) -> None:
         """A new target for every term. Raises what `Transfer.radiance_of` raises; then nothing has changed."""
@@ -45,9 +52,28 @@ class ViewImages:
                 material.set_light(light)
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
+            material.set_emission(emission_of(light, name), self._shines)
+
+    def local_rays(self, material: int, light: Light) -> list[LocalRays]:
+        """What a material's samples see of local lights; shadows that the cache lacks are traced."""
+        if not light.local:
+            return []
+        local = self.transfer.local
+
+        def remembered(geometry: LightGeometry, points: Points) -> Shadows:
+            key = (self.transfer.key, self.view.name, material, "shadows", geometry)
+            num_bytes = len(points.position) * SAMPLES // 8
+            return self.cache.get(key, Shadows, num_bytes, lambda: local.shadows(geometry, points))
+
+        return local.all_rays(light, self.view.points(material), remembered)
 
     def _light_of(self, look: Look) -> Light:
         return light_of(look, self.transfer.material_names, has_cells=self.transfer.cells is not None)
+
+    def _shines(self, material: int) -> NDArray[np.bool_]:
+        """Which samples of a material show a side that shines, where it does."""
+        eye = self.view.camera.to_world[:3, 3].astype(np.float32)
+        return self.transfer.local.shines_at(material, eye, self.view.points(material).position)
 
     def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, TermImage]:
         """The material and the term of a pointer in the look as it is now.

@@ -72,7 +72,7 @@ def receivers(cells, lights):
                 links[p, ray] = NO_CELL
     reflected = cells.radiance(cells.irradiance(lights), REFLECTANCES, 1, 24)
     rays = GatherRays(links, pattern, np.arange(50, 80, dtype=np.uint32), reflected)
-    return Receivers(dark.normal, dark.tangent, dark.wo, np.zeros_like(dark.visible), rays)
+    return Receivers(dark.normal, dark.tangent, dark.wo, np.zeros_like(dark.visible), (rays,))
 
 
 def bands_of(model):
@@ -92,7 +92,7 @@ def image(model, bands, active, lights, receivers):
 
 def image_numpy(model, bands, receivers):
     """Ray by ray, float64."""
-    term, rays = TERMS[model], receivers.rays
+    term, (rays,) = TERMS[model], receivers.rays
     radiance = rays.radiance.astype(float)
     out = np.zeros((len(receivers.normal), 3))
     for p, frame in enumerate(twins.frames(receivers)):

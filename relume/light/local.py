@@ -1,0 +1,186 @@
+"""Local lights: what a light of unit emission gives to a point, along one or several samples of it.
+
+    E(x) = Σ_k V_k · w_k · cos θi,k
+
+    point        w = 1 / d²                                        emission W/sr
+    spot         w = s² / d²,  s = clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)   (KHR_lights_punctual)
+    directional  w = 1                                             emission W/m²
+    surface      w = A cos θl / (N d²),  N samples spread evenly   emission W/m²/sr
+
+A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are the rows of a pattern that is shifted
+for each receiver, as gather rays are: what noise is left is as fine as the pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.look import LightGeometry
+from relume.trace.gather_rays import Pattern, make_pattern
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+POINT, DIRECTIONAL, SURFACE = 0, 1, 2
+NEAREST = np.float32(1e-3)  # metres: a point light is no smaller
+_FAR = np.float32(np.inf)
+_SEED = 1
+_PI = np.float32(math.pi)
+_SHARPEST_CONE = 1e-3  # of cosines, as KHR_lights_punctual has it
+_EDGE_ON = 1e-6
+
+
+class LocalLight(NamedTuple):
+    """A light as the kernels want it.
+
+    Attributes:
+        kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
+        position: of points. (3,) float32. axis: unit, of spots, and the way that directional light goes. (3,)
+        cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
+        corner, edges: of parallelograms or triangles. (T, 3), (T, 2, 3) float32
+        share: of the area, up to each piece and with it. (T,) float32. area: of all, m².
+        is_rectangle: a parallelogram, else triangles. is_two_sided: shines to both sides.
+    """
+
+    kind: int
+    position: F32
+    axis: F32
+    cone_scale: np.float32
+    cone_offset: np.float32
+    corner: F32
+    edges: F32
+    share: F32
+    area: np.float32
+    is_rectangle: bool
+    is_two_sided: bool
+
+
+class Triangles(NamedTuple):
+    """Those of the surfaces that shine. corners: (T, 3, 3) float32. is_two_sided: to both sides."""
+
+    corners: F32
+    is_two_sided: bool
+
+
+def pattern_of(geometry: LightGeometry, num_samples: int) -> Pattern:
+    """The samples of a light: `num_samples` where it has an extent, else one."""
+    return make_pattern(num_samples if geometry.kind in ("rectangle", "mesh") else 1, 0, _SEED)
+
+
+def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> LocalLight:
+    """A light of a look. triangles: of one of kind "mesh"; a surface without area gives no light."""
+    is_rectangle = geometry.kind == "rectangle"
+    corner, edges = _outline(geometry, triangles)
+    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) * (1.0 if is_rectangle else 0.5)
+    kept, area = areas > 0, areas.sum()
+    scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
+    return LocalLight(
+        kind={"point": POINT, "spot": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE),
+        position=np.array(geometry.position, np.float32),
+        axis=_unit(geometry.direction).astype(np.float32),
+        cone_scale=np.float32(scale),
+        cone_offset=np.float32(offset),
+        corner=corner[kept].astype(np.float32),
+        edges=edges[kept].astype(np.float32),
+        share=(np.cumsum(areas[kept]) / max(area, 1e-300)).astype(np.float32),
+        area=np.float32(area),
+        is_rectangle=is_rectangle,
+        is_two_sided=triangles is not None and triangles.is_two_sided,
+    )
+
+
+def shadow_geometry(geometry: LightGeometry) -> LightGeometry:
+    """What the shadows of a light depend on: a spot has those of a point."""
+    return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
+
+
+def _outline(geometry: LightGeometry, triangles: Triangles | None) -> tuple[F64, F64]:
+    """A corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
+    if geometry.kind == "rectangle":
+        corner, edges = rectangle(geometry)
+        return corner[None], edges[None]
+    corners = np.zeros((0, 3, 3)) if triangles is None else triangles.corners.astype(np.float64)
+    return corners[:, 0], corners[:, 1:] - corners[:, :1]
+
+
+def rectangle(geometry: LightGeometry) -> tuple[F64, F64]:
+    """A corner (3,) and the edges (2, 3), width and height, whose cross product points the way the rectangle faces."""
+    facing = _unit(geometry.direction)
+    above = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _EDGE_ON else np.array([0.0, 0.0, 1.0])
+    up = above - (above @ facing) * facing
+    up /= np.linalg.norm(up)
+    along = np.cross(up, facing)
+    turn = math.radians(geometry.rotation)
+    width, height = geometry.size
+    edges = np.stack(
+        [
+            width * (math.cos(turn) * along + math.sin(turn) * up),
+            height * (math.cos(turn) * up - math.sin(turn) * along),
+        ]
+    )
+    return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
+
+
+def _unit(direction: tuple[float, float, float]) -> F64:
+    vector = np.array(direction, np.float64)
+    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not vanish
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _cone(inner: float, outer: float) -> tuple[float, float]:
+    """Scale and offset of the falloff between two half-angles, degrees."""
+    cos_outer = math.cos(math.radians(outer))
+    scale = 1 / max(_SHARPEST_CONE, math.cos(math.radians(inner)) - cos_outer)
+    return scale, -cos_outer * scale
+
+
+@nb.njit(nogil=True, cache=True)
+def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
+    """A sample of a light as a point sees it.
+
+    Returns:
+        Unit direction towards it (three), distance, w, and the normal of its surface on the point's side (three; zeros
+        where it has none).
+    """
+    zero, one = np.float32(0), np.float32(1)
+    if light.kind == DIRECTIONAL:
+        return -light.axis[0], -light.axis[1], -light.axis[2], _FAR, one, zero, zero, zero
+    if light.kind == POINT:
+        dx, dy, dz = light.position[0] - px, light.position[1] - py, light.position[2] - pz
+        distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
+        dx, dy, dz = dx / distance, dy / distance, dz / distance
+        along = -(dx * light.axis[0] + dy * light.axis[1] + dz * light.axis[2])
+        falloff = min(max(light.cone_scale * along + light.cone_offset, zero), one)
+        nearest = max(distance, NEAREST)
+        return dx, dy, dz, distance, falloff * falloff / (nearest * nearest), zero, zero, zero
+    if light.area == 0:
+        return one, zero, zero, one, zero, zero, zero, zero
+    u, v = pattern.uv[sample, 0] + shift_u, pattern.uv[sample, 1] + shift_v
+    u -= np.float32(math.floor(u))
+    v -= np.float32(math.floor(v))
+    piece = min(np.searchsorted(light.share, u, side="right"), light.share.shape[0] - 1)
+    if not light.is_rectangle:
+        below = light.share[piece - 1] if piece > 0 else zero
+        root = np.float32(math.sqrt(min((u - below) / (light.share[piece] - below), one)))
+        u, v = root * (one - v), root * v
+    e, f = light.edges[piece, 0], light.edges[piece, 1]
+    dx = light.corner[piece, 0] + u * e[0] + v * f[0] - px
+    dy = light.corner[piece, 1] + u * e[1] + v * f[1] - py
+    dz = light.corner[piece, 2] + u * e[2] + v * f[2] - pz
+    distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
+    dx, dy, dz = dx / distance, dy / distance, dz / distance
+    nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+    length = np.float32(math.sqrt(nx * nx + ny * ny + nz * nz))
+    nx, ny, nz = nx / length, ny / length, nz / length
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    if cosine < 0 and light.is_two_sided:
+        nx, ny, nz, cosine = -nx, -ny, -nz, -cosine
+    area = light.area / np.float32(pattern.uv.shape[0])
+    # a patch of this area that is as near as it is wide fills the half space: it gives no more than that
+    weight = area * max(cosine, zero) / max(distance * distance, area / _PI)
+    return dx, dy, dz, distance, weight, nx, ny, nz

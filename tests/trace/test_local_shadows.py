@@ -1,0 +1,117 @@
+"""Shadows of local lights against intersections by plain NumPy; lights that touch surfaces, and lights in walls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import quad, still_life
+
+from relume.light.local import Triangles, light_sample, make_local, pattern_of
+from relume.look import LightGeometry
+from relume.trace.embree import EmbreeScene
+from relume.trace.gather_rays import shift_of
+from relume.trace.geometry import merge
+from relume.trace.local_shadows import arriving, trace_local
+from relume.trace.view_samples import BACKGROUND, sample_view
+
+UP = np.array([0, 1, 0], np.float32)
+
+
+def crosses(triangles, start, end):
+    """Whether the segments (n, 3) meet any of the triangles (Möller, Trumbore 1997)."""
+    a, e, f = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    along = end - start
+    across = np.cross(along[:, None], f)
+    determinant = np.einsum("ntc,tc->nt", across, e)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        from_corner = start[:, None] - a
+        u = np.einsum("ntc,ntc->nt", from_corner, across) / determinant
+        turned = np.cross(from_corner, e)
+        v = np.einsum("nc,ntc->nt", along, turned) / determinant
+        t = np.einsum("ntc,tc->nt", turned, f) / determinant
+        return ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)).any(axis=1)
+
+
+@pytest.fixture(scope="module")
+def surfaces():
+    scene = still_life()
+    geometry = merge(scene)
+    samples = sample_view(scene, geometry, "front", (64, 48))
+    solid = np.flatnonzero(samples.material != BACKGROUND)[::37]
+    return geometry, samples.surface.position[solid], samples.surface.normal[solid]
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        LightGeometry("point", (0.9, 1.4, 0.6)),
+        LightGeometry("directional", direction=(-1.0, -1.0, -0.3)),
+        LightGeometry("rectangle", (0.9, 1.4, 0.6), (-1.0, -1.0, 0.0), size=(0.5, 0.8)),
+    ],
+    ids=lambda light: light.kind,
+)
+def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
+    geometry, position, normal = surfaces
+    made, pattern = make_local(light), pattern_of(light, 20)
+    numbers = np.arange(100, 100 + len(position), dtype=np.uint32)
+    seen = trace_local(geometry.embree, geometry.epsilon, made, pattern, position, normal, numbers)
+    bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(pattern.uv)].astype(bool)
+    triangles = geometry.positions[geometry.faces].astype(float)
+    wrong = 0
+    for k in range(len(pattern.uv)):
+        found = [
+            light_sample(made, pattern, k, *shift_of(pattern, n), *p) for n, p in zip(numbers, position, strict=True)
+        ]
+        direction, distance = np.array([f[:3] for f in found]), np.array([f[3] for f in found])
+        end = position + direction * np.minimum(distance, 100)[:, None]
+        asked = (np.einsum("nc,nc->n", direction, normal) > 0) & (np.array([f[4] for f in found]) > 0)
+        wrong += np.sum(bits[:, k] != (asked & ~crosses(triangles, position.astype(float), end)))
+    assert wrong <= 2e-3 * bits.size, "but for rays that graze an edge"
+    assert 0.05 < bits.mean() < 0.95
+
+
+def irradiance(geometry, light, points, normals, triangles=None, num_samples=64):
+    made, pattern = make_local(light, triangles), pattern_of(light, num_samples)
+    numbers = np.arange(len(points), dtype=np.uint32)
+    seen = trace_local(geometry, 1e-5, made, pattern, points, normals, numbers)
+    return arriving(made, pattern, points, normals, numbers, seen)
+
+
+def embree_of(*meshes):
+    first = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])
+    faces = np.concatenate([mesh.faces + np.uint32(start) for mesh, start in zip(meshes, first[:-1], strict=True)])
+    return EmbreeScene.build(np.concatenate([mesh.positions for mesh in meshes]), faces)
+
+
+CEILING = quad("ceiling", [[-1, 2, -1], [1, 2, -1], [1, 2, 1], [-1, 2, 1]], 0)
+FLOOR = np.random.default_rng(4).uniform([-1, 1e-4, -1], [1, 1e-4, 1], (300, 3)).astype(np.float32)
+NORMALS = np.tile(UP, (300, 1))
+
+
+def test_surface_that_shines_does_not_shadow_itself():
+    """The ceiling is the lamp: as bright as a rectangle where nothing is."""
+    corners = CEILING.positions[CEILING.faces]
+    lamp = LightGeometry("mesh", material="Lamp")
+    shining = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, Triangles(corners, False))
+    assert np.all(shining > 0.3)
+    open_air = embree_of(quad("far", [[90, 0, 0], [91, 0, 0], [91, 1, 0], [90, 1, 0]], 0))
+    free = irradiance(open_air, lamp, FLOOR, NORMALS, Triangles(corners, False))
+    np.testing.assert_array_equal(shining, free)
+
+
+@pytest.mark.parametrize("height", [2.0, 2.0 - 1e-6])
+def test_rectangle_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(height):
+    light = LightGeometry("rectangle", (0.0, height, 0.0), size=(0.5, 0.5))
+    found = irradiance(embree_of(CEILING), light, FLOOR, NORMALS)
+    assert np.all(found > 0.01)
+
+
+def test_light_inside_a_wall_or_above_the_ceiling_lights_nothing():
+    above = quad("above", [[-1, 2.2, -1], [1, 2.2, -1], [1, 2.2, 1], [-1, 2.2, 1]], 0)
+    wall = embree_of(CEILING, above)
+    for light in (
+        LightGeometry("point", (0, 2.1, 0)),
+        LightGeometry("rectangle", (0, 2.1, 0), size=(0.5, 0.5)),
+        LightGeometry("directional"),
+    ):
+        assert not irradiance(wall, light, 0.5 * FLOOR, NORMALS).any()
