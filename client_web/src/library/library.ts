@@ -20,6 +20,10 @@ interface Entry {
   about: string;
   thumbnail: string;
   terms: Term[];
+  /** Of its fit, or `MEASURED`. */
+  model: string;
+  /** What it is made of; measurements do not say. */
+  group: string | null;
 }
 
 export const libraryOpen = signal(false);
@@ -34,21 +38,22 @@ const uniqueOf = (values: string[]) => [...new Set(values)].sort();
 export const groups = computed(() => uniqueOf(library.value.map((material) => material.group)));
 export const fittedModels = computed(() => uniqueOf(library.value.map((material) => material.model)));
 
-function fittedEntry({ id, name, source, terms }: MaterialBody): Entry {
-  return { id, name, about: `${name}. ${source}`, thumbnail: materialThumbnail(id), terms };
+function fittedEntry({ id, name, source, terms, model: of, group: made }: MaterialBody): Entry {
+  return { id, name, about: `${name}. ${source}`, thumbnail: materialThumbnail(id), terms, model: of, group: made };
 }
 
 function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): Entry {
-  return { id, name, about: `${name}, measured. Exact until its curves are edited.`, thumbnail, terms };
+  const about = `${name}, measured. Exact until its curves are edited.`;
+  return { id, name, about, thumbnail, terms, model: MEASURED, group: null };
 }
+
+const entries = computed<Entry[]>(() => [...library.value.map(fittedEntry), ...measured.value.map(measuredEntry)]);
 
 /** One entry a material and source, of the model and group that are chosen. */
 export const shown = computed<Entry[]>(() =>
-  model.value === MEASURED
-    ? measured.value.map(measuredEntry)
-    : library.value
-        .filter((m) => m.model === model.value && (group.value === "all" || m.group === group.value))
-        .map(fittedEntry),
+  entries.value.filter(
+    (entry) => entry.model === model.value && (model.value === MEASURED || group.value === "all" || entry.group === group.value),
+  ),
 );
 
 export async function openLibrary(): Promise<void> {
@@ -76,9 +81,7 @@ export async function importMeasured(file: File): Promise<void> {
 
 /** Give an object the terms of a library material. */
 export function putOn(target: string, id: string): void {
-  const entry =
-    library.value.filter((material) => material.id === id).map(fittedEntry)[0] ??
-    measured.value.filter((material) => material.id === id).map(measuredEntry)[0];
+  const entry = entries.value.find((each) => each.id === id);
   if (entry === undefined) return;
   edit(entry.name, pointer("materials", target, "terms"), entry.terms);
   select(target);

@@ -1,4 +1,4 @@
-/** A number that is typed: Enter or leaving takes it, Escape leaves it, arrows step it. */
+/** A number that is typed: Enter or leaving takes it, Escape leaves it as it was, arrows step it. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { formatNumber, parseNumber } from "./scale";
 
@@ -16,6 +16,7 @@ interface Props {
 export function NumberField({ value, label, minimum, maximum, step, autoFocus, onChange, onDone }: Props) {
   const input = useRef<HTMLInputElement>(null);
   const [draft, setDraft] = useState<string | null>(null);
+  const refused = useRef(false);
   const wrong = draft !== null && parseNumber(draft) === null;
   useEffect(() => {
     if (autoFocus) input.current?.select();
@@ -23,17 +24,17 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, o
 
   const put = (next: number) => onChange(Math.min(maximum, Math.max(minimum, next)));
   const take = () => {
-    const next = draft === null ? null : parseNumber(draft);
+    const next = draft === null || refused.current ? null : parseNumber(draft);
     if (next !== null) put(next);
+    refused.current = false;
     setDraft(null);
   };
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();
     // the field is left, so that the next key is the page's again
-    if (event.key === "Enter") input.current?.blur();
-    else if (event.key === "Escape") {
-      setDraft(null);
-      onDone?.();
+    if (event.key === "Enter" || event.key === "Escape") {
+      refused.current = event.key === "Escape";
+      input.current?.blur();
     } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
       event.preventDefault();
       const size = step * (event.shiftKey ? 0.1 : 1);
