@@ -17,6 +17,7 @@ import "./looks/looks.css";
 import "./start/start.css";
 import "./curve/curve.css";
 import "./library/library.css";
+import "./lights/lights.css";
 import "./truth/truth.css";
 
 function App() {

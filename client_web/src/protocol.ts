@@ -27,6 +27,7 @@ export type {
 export { MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
+export type Triple = [x: number, y: number, z: number];
 export type ParamValue = number | Rgb;
 export type Point = [degrees: number, value: number];
 export type Tile = [x: number, y: number, width: number, height: number];
@@ -54,11 +55,27 @@ export interface Look {
   materials: Record<string, MaterialLook>;
   /** `map` names an environment of the server, null the scene's own. */
   environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
-  lights: Record<string, { scale: number; color: Rgb; on: boolean }>;
+  lights: Record<string, Light>;
   /** Which light paths are shown; `bounces` between surfaces. */
   transport: Transport;
   display: { exposure: number; tone_map: string };
 }
+interface AnyLight {
+  scale: number;
+  color: Rgb;
+  on: boolean;
+  emission: Rgb;
+}
+/** Directions need not be unit; degrees, metres. */
+export type Light = AnyLight &
+  (
+    | { kind: "point"; position: Triple }
+    | { kind: "spot"; position: Triple; direction: Triple; cone: [inner: number, outer: number] }
+    | { kind: "directional"; direction: Triple }
+    | { kind: "rectangle"; position: Triple; direction: Triple; rotation: number; size: [width: number, height: number] }
+    | { kind: "mesh"; material: string }
+  );
+export type LightKind = Light["kind"];
 export interface Transport {
   show: "all" | "direct" | "first_bounce" | "further_bounces";
   bounces: number;

@@ -136,6 +136,7 @@ test("a place survives the URL", () => {
     material: "a/b~c",
     term: 2,
     curve: "theta_h",
+    light: "Desk lamp",
   };
   expect(placeFromUrl(placeToUrl(place))).toEqual(place);
   const several = { ...place, beside: ["front & left", "a, b", "c=d"] };
@@ -148,6 +149,7 @@ test("a place survives the URL", () => {
     material: null,
     term: 0,
     curve: null,
+    light: null,
   });
   expect(placeFromUrl("?term=zzz").term).toBe(0);
 });

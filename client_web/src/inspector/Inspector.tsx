@@ -1,8 +1,20 @@
-/** The selected material: its terms as cards. */
+/** What is selected: a light, or a material with its terms as cards. */
 import { libraryOpen, openLibrary } from "../library/library";
+import { LightInspector } from "../lights/LightInspector";
+import { openLight } from "../lights/lights";
 import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
-import { defaultLook, history, look, models, selectedCurve, selectedMaterial, selectedTerm, terms } from "../state/store";
+import {
+  defaultLook,
+  history,
+  look,
+  models,
+  selectedCurve,
+  selectedLight,
+  selectedMaterial,
+  selectedTerm,
+  terms,
+} from "../state/store";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
 import { defaultTerm, modelsFor } from "./terms";
@@ -38,6 +50,12 @@ function AddTerm({ material }: { material: string }) {
 }
 
 export function Inspector() {
+  const [light, shown] = [openLight.value, selectedLight.value];
+  if (light !== null && shown !== null) return <LightInspector key={shown} name={shown} light={light} />;
+  return <MaterialInspector />;
+}
+
+function MaterialInspector() {
   const material = selectedMaterial.value;
   if (material === null || terms.value.length === 0) {
     return (

@@ -1,5 +1,6 @@
 /** A and B: A is a picture that was kept, B is the live one. */
 import { effect, signal } from "@preact/signals";
+import { completedLight } from "../lights/kinds";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
@@ -19,7 +20,12 @@ export function completed(partial: Partial<Look>): Look {
   return {
     materials: { ...base.materials, ...partial.materials },
     environment: { ...base.environment, ...partial.environment },
-    lights: { ...base.lights, ...partial.lights },
+    lights: {
+      ...base.lights,
+      ...Object.fromEntries(
+        Object.entries(partial.lights ?? {}).map(([name, light]) => [name, completedLight(light, base.lights[name])]),
+      ),
+    },
     transport: { ...base.transport, ...partial.transport },
     display: { ...base.display, ...partial.display },
   };

@@ -2,7 +2,7 @@
 import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
-import { drawn, exact, held, look } from "../state/store";
+import { drawn, exact, held, look, soloLight } from "../state/store";
 import { completed } from "./compare";
 import { thumbnail } from "./image";
 import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
@@ -40,7 +40,8 @@ effect(() => {
 });
 
 function take(current: Look): void {
-  if (look.peek() !== current || held.peek() || !stage.active.isThere) return;
+  // one light alone is no picture of the look
+  if (look.peek() !== current || held.peek() || soloLight.peek() !== null || !stage.active.isThere) return;
   const image = thumbnail(stage.active.pixels, current.display);
   images.set(current, image);
   if (exact.peek()) {

@@ -1,19 +1,40 @@
 /** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
+import { useRef } from "preact/hooks";
 import { ColorField } from "../inspector/ColorField";
 import { edit } from "../state/edit";
 import { hold } from "../state/live";
-import { defaultLook, look } from "../state/store";
+import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
+import { defaultLook, look, soloLight } from "../state/store";
+import { IconButton } from "../ui/Button";
 import { Slider } from "../ui/Slider";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 
 export function EnvironmentPanel() {
   const shown = look.value?.environment;
+  /** How bright it was when it was switched off. */
+  const before = useRef(1);
   const initial = defaultLook.value?.environment;
   if (shown === undefined || initial === undefined) return null;
+  const toggle = () => {
+    if (shown.scale > 0) before.current = shown.scale;
+    edit(shown.scale > 0 ? "Environment off" : "Environment on", "/environment/scale", shown.scale > 0 ? 0 : before.current);
+  };
   return (
     <>
       <header class="panel-head">
-        <h2>Environment</h2>
+        <h2 class="spacer">Environment</h2>
+        <IconButton
+          icon="lamp"
+          label={`Environment: ${shown.scale > 0 ? "switch off" : "switch on"}`}
+          pressed={shown.scale > 0}
+          onClick={toggle}
+        />
+        <IconButton
+          icon="solo"
+          label="Environment alone"
+          pressed={soloLight.value === ENVIRONMENT}
+          onClick={() => toggleLightSolo(ENVIRONMENT)}
+        />
         <ImportEnvironment />
       </header>
       <EnvironmentGallery />

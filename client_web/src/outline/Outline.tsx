@@ -1,9 +1,10 @@
-/** What is in the scene: materials to select, and the light around them. */
+/** What is in the scene: materials to select, the lights and the light around them. */
 import { toHex } from "../inspector/color";
 import type { MaterialLook } from "../protocol";
 import { select } from "../state/select";
 import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial, solo } from "../state/store";
-import { toggleSolo } from "../state/solo";
+import { toggleMaterialSolo } from "../state/solo";
+import { LightsPanel } from "../lights/LightsPanel";
 import { IconButton } from "../ui/Button";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
@@ -86,10 +87,11 @@ export function Outline() {
           keys="S"
           pressed={solo.value !== null}
           disabled={selected === null && solo.value === null}
-          onClick={toggleSolo}
+          onClick={toggleMaterialSolo}
         />
       </header>
       <Materials />
+      <LightsPanel />
       <EnvironmentPanel />
       <TransportPanel />
     </nav>

@@ -1,6 +1,8 @@
 /** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { acceptMaterials } from "../library/drop";
+import { LightHandles } from "../lights/LightHandles";
+import { placeAt, placing } from "../lights/place";
 import { hoveredMaterial, pointedView, scene, sideBySide, viewName, wipe } from "../state/store";
 import { select } from "../state/select";
 import { showAlone, workIn } from "../state/views";
@@ -103,8 +105,9 @@ function usePointer(screen: Screen | null, view: string) {
     const { moved, active } = drag.current;
     drag.current.active = false;
     if (screen === null || !active || moved || event.button !== 0) return;
-    const { material } = hitAt(screen, event);
-    if (material !== null) select(material);
+    const { px, py, material } = hitAt(screen, event);
+    if (placing.peek() !== null) void placeAt(view, px, py);
+    else if (material !== null) select(material);
   };
   const leave = () => {
     pointedView.value = hoveredMaterial.value = null;
@@ -154,6 +157,7 @@ export function Cell({ view }: { view: string }) {
         {...pointer}
       />
       {failure !== null && <p class="failure">{failure}</p>}
+      {screen !== null && <LightHandles screen={screen} />}
       {wipe.value.on && screen !== null && <WipeHandle screen={screen} />}
       <Waiting picture={stage.of(view)} />
       {beside && <Name view={view} />}

@@ -1,7 +1,7 @@
 /** What the picture leaves out, each with a way back to the whole. */
 import { limitWords } from "../outline/paths";
 import { edit } from "../state/edit";
-import { defaultLook, look, solo } from "../state/store";
+import { defaultLook, look, solo, soloLight } from "../state/store";
 
 function showAllLight(): void {
   const initial = defaultLook.peek()?.transport;
@@ -23,6 +23,13 @@ export function Limits() {
       {light !== null && <Limit words={light} title="Show all light again" onClick={showAllLight} />}
       {solo.value !== null && (
         <Limit words={`Only ${solo.value}`} title="Show all materials again (S)" onClick={() => (solo.value = null)} />
+      )}
+      {soloLight.value !== null && (
+        <Limit
+          words={`Only the light of ${soloLight.value || "the environment"}`}
+          title="Show all lights again"
+          onClick={() => (soloLight.value = null)}
+        />
       )}
     </div>
   );

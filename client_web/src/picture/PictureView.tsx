@@ -1,5 +1,6 @@
 /** The picture of one view, or those of several side by side, with what is said about them. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { PlacingBar } from "../lights/PlacingBar";
 import { shownViews, view } from "../state/store";
 import { Cell } from "./Cell";
 import { FalseColourLegend } from "./FalseColourLegend";
@@ -36,6 +37,7 @@ export function PictureView() {
             <Cell key={place} view={name} />
           ))}
         </div>
+        <PlacingBar />
         <Limits />
         <FalseColourLegend />
         <HistogramView />

@@ -6,10 +6,11 @@ import { Session, type SessionHandlers } from "../net/session";
 import { decodeIds } from "../picture/png16";
 import type { Picture } from "../picture/picture";
 import { stage } from "../picture/stage";
-import type { ClientMessage, HelloMessage, Look } from "../protocol";
+import type { ClientMessage, HelloMessage, Look, ProbeAnswer } from "../protocol";
 import { attempt, note, showError } from "../ui/toasts";
 import { onLook } from "./edit";
 import { forgetShape, showShape } from "./shape";
+import { withAllLights, withOneLight } from "./solo";
 import * as store from "./store";
 import { editSent, forgetDrawn, forgetWaiting } from "./stats";
 import { availableOf } from "./views";
@@ -20,10 +21,17 @@ let incoming: Session | null = null;
 let onBakeReady: (bake: string) => void = () => undefined;
 const exactWaiters: (() => void)[] = [];
 
-onLook((look, inputTime) => {
-  session?.want(look, inputTime);
-  incoming?.want(look, inputTime);
-});
+/** Ask for the picture of the look as it is now, or of what shall be seen of it. */
+function want(of: Session | null, look: Look, inputTime: number): void {
+  of?.want(withOneLight(look, store.soloLight.peek()), inputTime);
+}
+
+function wantNow(look: Look, inputTime: number): void {
+  want(session, look, inputTime);
+  want(incoming, look, inputTime);
+}
+
+onLook(wantNow);
 
 export function whenBakeIsReady(take: typeof onBakeReady): void {
   onBakeReady = take;
@@ -110,7 +118,7 @@ function welcome(of: Session, message: HelloMessage): void {
   const kept = store.look.peek();
   // a look that was kept by an older editor lacks what that one did not know
   if (kept === null || Object.keys(own).some((section) => !(section in kept))) store.look.value = { ...own, ...kept };
-  of.want(store.look.peek() as Look, performance.now());
+  want(of, store.look.peek() as Look, performance.now());
   told.delete(of);
   const shown = shownOf(message.views, message.view);
   tellViews(of, shown, store.focusedView.peek());
@@ -187,11 +195,12 @@ function handlersOf(self: () => Session): SessionHandlers {
       if (!current() || message.revision === null) return;
       store.history.drop();
       if (lastGood !== null) {
-        store.look.value = lastGood;
-        self().want(lastGood, performance.now());
+        store.look.value = withAllLights(lastGood);
+        want(self(), store.look.value, performance.now());
       }
     },
     probe(message) {
+      for (const take of probeWaiters) take(message);
       const at = store.probe.peek();
       if (current() && at?.view === message.view) store.probe.value = { ...at, answer: message };
     },
@@ -217,6 +226,31 @@ function handlersOf(self: () => Session): SessionHandlers {
   };
 }
 
+const probeWaiters = new Set<(answer: ProbeAnswer) => void>();
+const PROBE_MS = 3000;
+
+/** What the server says of a pixel of a shown view. The newest question wins there, so another's answer asks again. */
+export function askProbe(view: string, x: number, y: number): Promise<ProbeAnswer> {
+  return new Promise((resolve, reject) => {
+    const end = (): void => {
+      clearTimeout(timer);
+      probeWaiters.delete(take);
+    };
+    const ask = () => send({ type: "probe", view, x, y });
+    const take = (answer: ProbeAnswer): void => {
+      if (answer.view !== view || answer.x !== x || answer.y !== y) return void ask();
+      end();
+      resolve(answer);
+    };
+    const timer = window.setTimeout(() => {
+      end();
+      reject(new Error("The server did not say what is there; try again."));
+    }, PROBE_MS);
+    probeWaiters.add(take);
+    ask();
+  });
+}
+
 /** Resolves when the picture is exact for everything that was sent. */
 export function whenExact(): Promise<void> {
   if (store.exact.peek()) return Promise.resolve();
@@ -234,7 +268,7 @@ export async function withPicturesOf(of: Look, take: () => void): Promise<void> 
     await whenExact();
     take();
   } finally {
-    session?.want(store.look.peek() ?? back, performance.now());
+    want(session, store.look.peek() ?? back, performance.now());
     await new Promise((done) => requestAnimationFrame(done));
     await whenExact();
     store.held.value = false;
@@ -253,6 +287,12 @@ effect(() => {
   const bake = store.bake.value;
   if (bake === null) return;
   for (const picture of stage.shown) if (picture.idsOf !== bake) void loadIds(bake, picture);
+});
+
+effect(() => {
+  store.soloLight.value;
+  const look = store.look.peek();
+  if (look !== null) wantNow(look, performance.now());
 });
 
 effect(() => {

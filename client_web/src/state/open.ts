@@ -43,7 +43,8 @@ function reset(scene: SceneBody): void {
   store.scene.value = scene;
   store.look.value = store.defaultLook.value = null;
   store.bake.value = store.coming.value = store.method.value = null;
-  store.selectedMaterial.value = store.selectedCurve.value = store.solo.value = null;
+  store.selectedMaterial.value = store.selectedCurve.value = null;
+  store.selectedLight.value = store.solo.value = store.soloLight.value = null;
   store.alonePlaces.value = store.besidePlaces.value = new Map();
   store.pointedView.value = null;
   store.connection.value = "connecting";
@@ -67,7 +68,7 @@ function restorePlace(scene: SceneBody, place: Place): void {
     store.selectedMaterial.value = place.material;
     store.selectedTerm.value = place.term;
     store.selectedCurve.value = place.curve;
-  }
+  } else store.selectedLight.value = place.light;
 }
 
 /** Follow a bake that is meant to replace the one shown. */

@@ -46,6 +46,7 @@ export function followPlace(): void {
       material: store.selectedMaterial.value,
       term: store.selectedTerm.value,
       curve: store.selectedCurve.value,
+      light: store.selectedLight.value,
     });
     window.history.replaceState(null, "", url);
   });

@@ -1,6 +1,6 @@
-/** Selecting a material opens its most telling curve: the highlight's where there is one. */
+/** Selecting: a material opens its most telling curve, the highlight's where there is one; a light puts it away. */
 import { batch } from "@preact/signals";
-import { look, modelOf, selectedCurve, selectedMaterial, selectedTerm, terms } from "./store";
+import { look, modelOf, selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "./store";
 
 export function selectTerm(index: number): void {
   if (index === selectedTerm.value) return;
@@ -11,7 +11,15 @@ export function selectTerm(index: number): void {
   });
 }
 
+export function selectLight(name: string | null): void {
+  batch(() => {
+    if (name !== null) select(null);
+    selectedLight.value = name;
+  });
+}
+
 export function select(material: string | null): void {
+  selectedLight.value = null;
   if (material === selectedMaterial.value) return;
   const own = (material === null ? undefined : look.value?.materials[material]?.terms) ?? [];
   const index = Math.max(

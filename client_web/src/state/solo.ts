@@ -1,11 +1,43 @@
-/** Solo: one material as it is, the others in dim grey. */
-import { selectedMaterial, solo } from "./store";
+/** Solo: one material as it is, the others in dim grey; one light alone, the others dark. What is seen, no edit. */
+import type { Light, Look } from "../protocol";
+import { selectedLight, selectedMaterial, solo, soloLight } from "./store";
 
-/** The material that is alone after the switch was pressed with `selected` selected. */
+/** What is alone after the switch was pressed with `selected` selected. */
 export function nextSolo(current: string | null, selected: string | null): string | null {
   return selected === null || selected === current ? null : selected;
 }
 
-export function toggleSolo(): void {
+export function toggleMaterialSolo(): void {
   solo.value = nextSolo(solo.value, selectedMaterial.value);
+}
+
+/** What is selected, alone. */
+export function toggleSolo(): void {
+  if (selectedLight.value === null) toggleMaterialSolo();
+  else toggleLightSolo(selectedLight.value);
+}
+
+export function toggleLightSolo(source: string): void {
+  soloLight.value = nextSolo(soloLight.value, source);
+}
+
+/** The environment among the lights: no light has this name. */
+export const ENVIRONMENT = "";
+
+const whole = new WeakMap<Look, Look>();
+
+/** What the server shall show of a look while one source of light is alone; without one, the look itself. */
+export function withOneLight(look: Look, source: string | null): Look {
+  if (source === null || (source !== ENVIRONMENT && look.lights[source] === undefined)) return look;
+  const off = ([name, light]: [string, Light]) => [name, name === source ? { ...light, on: true } : { ...light, on: false }];
+  const lights = Object.fromEntries(Object.entries(look.lights).map(off)) as Look["lights"];
+  const environment = source === ENVIRONMENT ? look.environment : { ...look.environment, scale: 0 };
+  const alone = { ...look, environment, lights };
+  whole.set(alone, look);
+  return alone;
+}
+
+/** The look that a look with one light was made of; any other is itself. */
+export function withAllLights(look: Look): Look {
+  return whole.get(look) ?? look;
 }

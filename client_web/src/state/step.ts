@@ -4,11 +4,12 @@ import { tokens } from "./pointer";
 
 /** "Teapot · half angle θh · move point": material, curve and deed of an edit at a pointer of the look. */
 export function stepName(path: string, deed: string, look: Look, models: readonly ModelInfo[]): string {
-  const [table, material, , index, kind, name] = tokens(path);
-  if (table !== "materials" || material === undefined) return deed;
-  if (kind !== "curves") return `${material} · ${deed}`;
-  const term = look.materials[material]?.terms[Number(index)];
+  const [table, named, , index, kind, name] = tokens(path);
+  if (table === "lights" && named !== undefined) return `${named} · ${deed}`;
+  if (table !== "materials" || named === undefined) return deed;
+  if (kind !== "curves") return `${named} · ${deed}`;
+  const term = look.materials[named]?.terms[Number(index)];
   const curves = models.find((model) => model.model === term?.model)?.curves;
   const label = curves?.find((curve) => curve.name === name)?.label ?? name;
-  return `${material} · ${label} · ${deed.charAt(0).toLowerCase()}${deed.slice(1)}`;
+  return `${named} · ${label} · ${deed.charAt(0).toLowerCase()}${deed.slice(1)}`;
 }

@@ -39,6 +39,8 @@ export const defaultLook = signal<Look | null>(null);
 export const history = new History();
 
 export const selectedMaterial = signal<string | null>(null);
+/** The inspector shows a light or a material. */
+export const selectedLight = signal<string | null>(null);
 export const selectedTerm = signal(0);
 export const selectedCurve = signal<string | null>(null);
 export const hoveredMaterial = signal<string | null>(null);
@@ -68,6 +70,10 @@ export const falseColour = signal(false);
 export const histogramOpen = signal(false);
 /** The material that is shown alone, the others in dim grey; display only, no edit. */
 export const solo = signal<string | null>(null);
+/** The source of light that is seen alone, see `solo.ts`; no edit either. */
+export const soloLight = signal<string | null>(null);
+/** Whether lights have handles in the picture. */
+export const handlesOpen = signal(true);
 export const wipe = signal<{ on: boolean; at: number }>({ on: false, at: 0.5 });
 export const showBefore = signal(false);
 export const probe = signal<{ view: string; x: number; y: number; answer: ProbeAnswer | null } | null>(null);

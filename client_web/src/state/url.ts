@@ -9,6 +9,7 @@ export interface Place {
   material: string | null;
   term: number;
   curve: string | null;
+  light: string | null;
 }
 
 export function placeFromUrl(search: string): Place {
@@ -21,12 +22,13 @@ export function placeFromUrl(search: string): Place {
     material: query.get("material"),
     term: Math.max(0, Math.trunc(Number(query.get("term") ?? 0)) || 0),
     curve: query.get("curve"),
+    light: query.get("light"),
   };
 }
 
 export function placeToUrl(place: Place): string {
   const query = new URLSearchParams();
-  for (const key of ["scene", "bake", "view", "material", "curve"] as const) {
+  for (const key of ["scene", "bake", "view", "material", "curve", "light"] as const) {
     if (place[key] !== null && place[key] !== "") query.set(key, place[key]);
   }
   for (const view of place.beside) query.append("beside", view);

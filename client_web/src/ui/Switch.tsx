@@ -3,6 +3,13 @@ import { IconButton } from "./Button";
 import type { IconName } from "./Icon";
 
 /** A button with an icon that turns something on and off. */
-export function Switch({ icon, label, of }: { icon: IconName; label: string; of: Signal<boolean> }) {
-  return <IconButton icon={icon} label={label} pressed={of.value} onClick={() => (of.value = !of.value)} />;
+interface Props {
+  icon: IconName;
+  label: string;
+  keys?: string;
+  of: Signal<boolean>;
+}
+
+export function Switch({ of, ...button }: Props) {
+  return <IconButton {...button} pressed={of.value} onClick={() => (of.value = !of.value)} />;
 }

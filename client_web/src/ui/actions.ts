@@ -10,6 +10,7 @@ import { toggleSideBySide } from "../state/views";
 import {
   falseColour,
   filmstripOpen,
+  handlesOpen,
   helpOpen,
   histogramOpen,
   inspectorOpen,
@@ -53,7 +54,8 @@ export const ACTIONS: readonly Action[] = [
   { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
   { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
   { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
-  { group: "Picture", label: "Selected material alone", keys: ["s"], run: toggleSolo },
+  { group: "Picture", label: "Selected material or light alone", keys: ["s"], run: toggleSolo },
+  { group: "Picture", label: "Handles of lights", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
   { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => expose(-THIRD) },
   { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => expose(THIRD) },
   { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
@@ -87,6 +89,7 @@ export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Curve point: pick up and put down", "Enter, click"],
   ["Curve point: delete, reset", "Delete  R"],
   ["Stretch: scale, shift", "↑ ↓  ← →"],
+  ["Handle of a light: move, near and away", "← → ↑ ↓  Shift ↑ ↓"],
   ["Picture: pan", "← → ↑ ↓"],
   ["One of several views: show it alone", "Enter, double-click"],
 ];

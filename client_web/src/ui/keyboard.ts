@@ -1,5 +1,6 @@
 /** Keys of the whole page; controls that have the focus take theirs first. */
 import { useEffect } from "preact/hooks";
+import { stopAdding } from "../lights/place";
 import { helpOpen } from "../state/store";
 import { ACTIONS, onWipeKey, type Action } from "./actions";
 import { chord } from "./chord";
@@ -24,7 +25,10 @@ function point(): void {
 function down(event: KeyboardEvent): void {
   byPointer = false;
   if (event.defaultPrevented || event.altKey) return;
-  if (event.key === "Escape" && helpOpen.value) helpOpen.value = false;
+  if (event.key === "Escape") {
+    helpOpen.value = false;
+    stopAdding();
+  }
   const action = actionOf(event);
   if (action === undefined || (typing(event.target) && !event.ctrlKey && !event.metaKey)) return;
   // in a field, undo is the field's own

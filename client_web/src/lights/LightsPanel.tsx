@@ -1,0 +1,91 @@
+/** The lights of the scene as a mixer: each switched on and off, alone, stronger or weaker, and tinted. */
+import { fromHex, toHex } from "../inspector/color";
+import type { Light } from "../protocol";
+import { selectLight } from "../state/select";
+import { hold } from "../state/live";
+import { toggleLightSolo } from "../state/solo";
+import { defaultLook, handlesOpen, selectedLight, soloLight } from "../state/store";
+import { IconButton } from "../ui/Button";
+import { Slider } from "../ui/Slider";
+import { Switch } from "../ui/Switch";
+import { KINDS, labelOf } from "./kinds";
+import { editLight, lightPath, lights } from "./lights";
+import { adding, placing, startPlacing, stopAdding } from "./place";
+
+function Row({ name, light }: { name: string; light: Light }) {
+  const selected = name === selectedLight.value;
+  return (
+    <li class={`light ${selected ? "selected" : ""} ${light.on ? "" : "off"}`}>
+      <IconButton
+        icon="lamp"
+        label={`${name}: ${light.on ? "switch off" : "switch on"}`}
+        pressed={light.on}
+        onClick={() => editLight(light.on ? "Off" : "On", name, "on", !light.on)}
+      />
+      <button
+        class="name"
+        title={`${name}: ${labelOf(light.kind)}`}
+        aria-pressed={selected}
+        onClick={() => selectLight(selected ? null : name)}
+      >
+        {name}
+      </button>
+      <input
+        type="color"
+        aria-label={`${name}: colour`}
+        title="Tint"
+        value={toHex(light.color)}
+        onInput={(event) => editLight("Tint", name, "color", fromHex(event.currentTarget.value, light.color))}
+      />
+      <IconButton
+        icon="solo"
+        label={`${name} alone`}
+        pressed={soloLight.value === name}
+        onClick={() => toggleLightSolo(name)}
+      />
+      <Slider
+        label={`${name}: intensity`}
+        value={light.scale}
+        initial={defaultLook.value?.lights[name]?.scale ?? 1}
+        minimum={0.01}
+        maximum={100}
+        scale="log"
+        unit="×"
+        onChange={(value) => editLight("Intensity", name, "scale", value)}
+        onHold={() => hold(lightPath(name))}
+      />
+    </li>
+  );
+}
+
+function Kinds() {
+  return (
+    <div class="light-kinds" role="group" aria-label="Kind of light">
+      {KINDS.map(({ kind, label, help }) => (
+        <button key={kind} title={help} aria-pressed={placing.value === kind} onClick={() => startPlacing(kind)}>
+          {label}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+export function LightsPanel() {
+  const all = Object.entries(lights.value);
+  return (
+    <>
+      <header class="panel-head">
+        <h2>Lights</h2>
+        <span class="spacer count">{all.length > 0 && all.length}</span>
+        {all.length > 0 && <Switch icon="handles" label="Handles in the picture" keys="G" of={handlesOpen} />}
+        <IconButton icon="plus" label="Add a light" pressed={adding.value} onClick={() => (adding.value ? stopAdding() : (adding.value = true))} />
+      </header>
+      {adding.value && <Kinds />}
+      <ul class="lights">
+        {all.map(([name, light]) => (
+          <Row key={name} name={name} light={light} />
+        ))}
+      </ul>
+    </>
+  );
+}

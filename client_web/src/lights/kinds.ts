@@ -1,0 +1,110 @@
+/** The kinds of light: their words, and a new light of each. */
+import type { Light, LightKind, Rgb, Triple } from "../protocol";
+import { add, scaled, subtract, tidy } from "./vector";
+
+export const MAX_LIGHTS = 64;
+
+/** Kinds that can be added; a mesh that shines only comes with a scene. */
+export type AddedKind = Exclude<LightKind, "mesh">;
+
+interface KindWords {
+  kind: AddedKind;
+  label: string;
+  help: string;
+  /** What a click in the picture shall be on. */
+  click: string;
+}
+
+export const KINDS: readonly KindWords[] = [
+  { kind: "point", label: "Point", help: "A bulb: shines alike in all directions", click: "hang the light" },
+  { kind: "spot", label: "Spot", help: "Shines into a cone", click: "aim the spot" },
+  { kind: "rectangle", label: "Panel", help: "A rectangle that shines to its front", click: "aim the panel" },
+  { kind: "directional", label: "Sun", help: "Parallel light from far away", click: "aim the sun" },
+];
+
+export function labelOf(kind: LightKind): string {
+  return KINDS.find((each) => each.kind === kind)?.label ?? "Shining surface";
+}
+
+/** The quantity that a light's emission is. */
+export const UNITS: Record<LightKind, string> = {
+  point: "W/sr",
+  spot: "W/sr",
+  directional: "W/m²",
+  rectangle: "W/sr/m²",
+  mesh: "W/sr/m²",
+};
+
+/** What a click in a picture found, and what light there is in it. */
+export interface Clicked {
+  position: Triple;
+  /** Unit, towards the camera. */
+  normal: Triple;
+  /** From the camera, metres. */
+  distance: number;
+  /** Mean radiance of the picture. */
+  radiance: number;
+}
+
+const OFFSET = 0.2;
+const SIDE = 0.4;
+/** Irradiance of a new light, of the picture's mean radiance: as bright as what is there on a surface of middle grey. */
+const SHARE = 6;
+
+/** A light for what was clicked: off the surface by a part of the camera's distance, aimed at it, and as bright as the
+ * rest of the picture. */
+export function lightFor(kind: AddedKind, { position, normal, distance, radiance }: Clicked): Light {
+  const offset = distance * OFFSET;
+  const place = tidy(add(position, scaled(normal, offset)));
+  const direction = tidy(subtract(position, place));
+  const irradiance = SHARE * (radiance > 0 ? radiance : 1);
+  const common = { scale: 1, color: [1, 1, 1] as Rgb, on: true };
+  const grey = (value: number): Rgb => Array<number>(3).fill(Number(value.toPrecision(2))) as Rgb;
+  const intensity = grey(irradiance * offset ** 2);
+  switch (kind) {
+    case "point":
+      return { kind, ...common, emission: intensity, position: place };
+    case "spot":
+      return { kind, ...common, emission: intensity, position: place, direction, cone: [20, 30] };
+    case "directional":
+      return { kind, ...common, emission: grey(irradiance), direction };
+    case "rectangle": {
+      const side = Number((SIDE * offset).toPrecision(2));
+      const emission = grey((irradiance * offset ** 2) / side ** 2);
+      return { kind, ...common, emission, position: place, direction, rotation: 0, size: [side, side] };
+    }
+  }
+}
+
+/** The first of "Spot", "Spot 2", … that is free. */
+export function freeLightName(kind: AddedKind, taken: readonly string[]): string {
+  const label = labelOf(kind);
+  if (!taken.includes(label)) return label;
+  let n = 2;
+  while (taken.includes(`${label} ${n}`)) n += 1;
+  return `${label} ${n}`;
+}
+
+const DEFAULTS: { [K in LightKind]: Partial<Extract<Light, { kind: K }>> } = {
+  point: { position: [0, 1, 0] },
+  spot: { position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
+  directional: { direction: [0, -1, 0] },
+  rectangle: { position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
+  mesh: {},
+};
+
+/** A light with what a partial look says of it; what it does not say is as in `base`, or else as in a new light. */
+export function completedLight(partial: Partial<Light>, base: Light | undefined): Light {
+  const kind = partial.kind ?? base?.kind ?? "point";
+  const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] };
+  const start = base?.kind === kind ? base : { ...common, kind, ...DEFAULTS[kind] };
+  return { ...start, ...partial } as Light;
+}
+
+/** The same light as another kind: what both have stays. */
+export function withKind(light: Light, kind: AddedKind): Light {
+  const { scale, color, on, emission } = light;
+  const own = Object.keys(DEFAULTS[kind]);
+  const shared = Object.fromEntries(Object.entries(light).filter(([field]) => own.includes(field)));
+  return { kind, scale, color, on, emission, ...DEFAULTS[kind], ...shared } as Light;
+}
