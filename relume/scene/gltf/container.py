@@ -35,6 +35,7 @@ READ_EXTENSIONS = {
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "EXT_texture_webp",
+    "KHR_lights_punctual",
     "KHR_materials_variants",
     *UNDERSTOOD,
 }

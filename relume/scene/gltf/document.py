@@ -106,7 +106,7 @@ class Material(Part):
     normalTexture: TextureInfo | None = None  # noqa: N815
     occlusionTexture: TextureInfo | None = None  # noqa: N815
     emissiveTexture: TextureInfo | None = None  # noqa: N815
-    emissiveFactor: Annotated[list[Number], Field(max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
+    emissiveFactor: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
     alphaMode: str = "OPAQUE"  # noqa: N815
     doubleSided: bool = False  # noqa: N815
 

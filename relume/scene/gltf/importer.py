@@ -20,6 +20,7 @@ from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import Node, Primitive
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
+from relume.scene.gltf.lights import LightReader
 from relume.scene.gltf.materials import MaterialReader, Understood
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.nodes import placed_nodes
@@ -44,7 +45,8 @@ def import_gltf(
         companions: the files that it may name; none where None.
 
     Returns:
-        The scene, nodes applied: one mesh per primitive and node, cameras or one view "front".
+        The scene, nodes applied: one mesh per primitive and node, cameras or one view "front", lights and materials
+        that shine.
 
     Raises:
         SceneError: the file cannot be used; the message says why and what to do.
@@ -52,7 +54,7 @@ def import_gltf(
     reading = _Reading(read_container(data, companions or Alone()))
     materials = [understood.material for understood in reading.materials]
     parts = (name, reading.meshes, materials, reading.cameras, environment or studio())
-    return finished_scene(*parts, reading.warnings, reading.variants)
+    return finished_scene(*parts, reading.warnings, reading.variants, reading.lights)
 
 
 class _Reading:
@@ -63,6 +65,7 @@ class _Reading:
         self._accessors = AccessorReader(container)
         self.warnings: list[str] = []
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
+        self._light_reader = LightReader(container.document, self.warnings)
         self._geometry: dict[tuple[int, int], Geometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
         self._mesh_names: dict[str, int] = {}
@@ -77,6 +80,9 @@ class _Reading:
             self._place(node, to_world)
         if not self.meshes:
             raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+        for understood in self.materials:
+            self._light_reader.shine(understood.material.name, understood.emission)
+        self.lights = self._light_reader.lights
         self.variants = self._read_variants()
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, slug("front", self._camera_names)))
@@ -84,6 +90,7 @@ class _Reading:
     def _place(self, node: Node, to_world: F64) -> None:
         if node.camera is not None:
             self._place_camera(node, to_world)
+        self._light_reader.place(node, to_world)
         if "EXT_mesh_gpu_instancing" in node.extensions:
             self.warnings.append(f"the instances of node {node.name[:80]!r} are not used; it appears once")
         if node.mesh is None:
@@ -159,8 +166,6 @@ class _Reading:
         document = self._document
         if document.animations:
             self.warnings.append(f"{len(document.animations)} animations are not used; everything has its rest pose")
-        if "KHR_lights_punctual" in document.extensions or "KHR_lights_punctual" in document.extensionsUsed:
-            self.warnings.append("the file's lights are not used; light the scene by its environment")
         for extension in document.extensionsRequired:
             if extension not in READ_EXTENSIONS:
                 self.warnings.append(

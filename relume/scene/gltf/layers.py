@@ -5,6 +5,7 @@ Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy 
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
@@ -58,6 +59,12 @@ class Anisotropy(BaseModel, frozen=True):
     anisotropyTexture: TextureInfo | None = None  # noqa: N815
 
 
+class EmissiveStrength(BaseModel, frozen=True):
+    """KHR_materials_emissive_strength: multiplies what a material emits."""
+
+    emissiveStrength: Annotated[Number, Field(ge=0)] = 1.0  # noqa: N815
+
+
 class Layers(BaseModel, frozen=True):
     """All that relume understands of one material's extensions."""
 
@@ -66,16 +73,17 @@ class Layers(BaseModel, frozen=True):
     clearcoat: Clearcoat = Clearcoat()
     sheen: Sheen = Sheen()
     anisotropy: Anisotropy = Anisotropy()
+    emissive_strength: EmissiveStrength = EmissiveStrength()
 
 
-UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields} | {"KHR_materials_emissive_strength"}
+UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields}
 
 
 def read_layers(extensions: Extensions, what: str, warnings: list[str]) -> Layers:
     """The extensions that are understood; a warning for each that is not, or is not valid."""
 
     def read(model: type[M]) -> M:
-        extension = f"KHR_materials_{model.__name__.lower()}"
+        extension = f"KHR_materials_{re.sub('(?<=.)(?=[A-Z])', '_', model.__name__).lower()}"
         try:
             return model.model_validate(extensions.get(extension, {}))
         except (ValidationError, RecursionError):
@@ -91,4 +99,5 @@ def read_layers(extensions: Extensions, what: str, warnings: list[str]) -> Layer
         clearcoat=read(Clearcoat),
         sheen=read(Sheen),
         anisotropy=read(Anisotropy),
+        emissive_strength=read(EmissiveStrength),
     )

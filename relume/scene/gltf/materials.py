@@ -32,11 +32,13 @@ class Understood:
 
     Attributes:
         turn: radians, from the tangent towards the bitangent; None where the material is isotropic.
+        emission: radiance.
     """
 
     material: Material
     uv_use: UvUse
     turn: float | None = None
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class MaterialReader:
@@ -66,7 +68,14 @@ class MaterialReader:
         if over.coat > 0 and normal_map is not None:
             self._warnings.append(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
         made = Material(name, make_terms(surface, over), surface.textures, normal_map, material.doubleSided)
-        return Understood(made, use, turn if strength > 0 else None)
+        return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
+
+    def _emission(self, material: GltfMaterial, layers: Layers, what: str) -> tuple[float, float, float]:
+        factor = np.maximum(material.emissiveFactor, 0) * layers.emissive_strength.emissiveStrength
+        if factor.any():
+            factor = factor * self._mean_color(material.emissiveTexture, f"emission texture of {what}")
+        red, green, blue = factor.tolist()
+        return red, green, blue
 
     def _surface(self, material: GltfMaterial, layers: Layers, what: str) -> Surface:
         """The base layer; images only where a texture says more than one value."""
@@ -187,8 +196,6 @@ class MaterialReader:
             raise SceneError(f"the scene needs more than {MAX_TEXTURE_TEXELS:,} texels; scale its textures down")
 
     def _warn_of_the_rest(self, material: GltfMaterial, what: str) -> None:
-        if material.emissiveTexture is not None or any(material.emissiveFactor):
-            self._warnings.append(f"{what} glows; its emission is not used")
         if material.alphaMode != "OPAQUE":
             self._warnings.append(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here")
         if material.occlusionTexture is not None:

@@ -1,0 +1,120 @@
+"""KHR_lights_punctual and shining materials as the scene's local lights.
+
+The extension counts light as eyes do: candela and lux. relume's radiance is radiometric, and 683 lumens are a watt (of
+green light; what exporters that think in watts multiply by). Emission of materials is taken as radiance as it stands:
+files mean by 1 what a white surface under an environment of 1 has, not a candela per square metre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
+
+from relume.errors import SceneError
+from relume.look.lights import MAX_EMISSION, MAX_METRES
+from relume.scene.checks import MAX_LIGHTS
+from relume.scene.gltf.document import Document, Factor, Index, Name, Node, Number
+from relume.scene.gltf.names import unique_name
+from relume.scene.model import Light
+
+F64 = NDArray[np.float64]
+
+EXTENSION = "KHR_lights_punctual"
+LUMENS_A_WATT = 683.0
+_MAX_DEFINED = 10_000
+_UNITS = f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts"
+
+
+class _Spot(BaseModel, frozen=True):
+    """Half-angles, radians."""
+
+    innerConeAngle: Annotated[float, Field(ge=0, le=np.pi / 2, allow_inf_nan=False)] = 0.0  # noqa: N815
+    outerConeAngle: Annotated[float, Field(gt=0, le=np.pi / 2 + 1e-6, allow_inf_nan=False)] = np.pi / 4  # noqa: N815
+
+
+class _Punctual(BaseModel, frozen=True):
+    """One light, shared by the nodes that name it."""
+
+    name: Name = ""
+    type: Literal["point", "spot", "directional"]
+    color: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]
+    intensity: Annotated[Number, Field(ge=0)] = 1.0
+    range: Number | None = None
+    spot: _Spot = _Spot()
+
+
+class _Defined(BaseModel, frozen=True):
+    """The extension at the document."""
+
+    lights: Annotated[list[_Punctual], Field(max_length=_MAX_DEFINED, fail_fast=True)] = []
+
+
+class _Placed(BaseModel, frozen=True):
+    """The extension at a node."""
+
+    light: Index
+
+
+class LightReader:
+    """Collects the lights of one file, each under a name of its own."""
+
+    def __init__(self, document: Document, warnings: list[str]) -> None:
+        self._warnings = warnings
+        self._names: dict[str, int] = {}
+        self.lights: list[Light] = []
+        try:
+            self._defined = _Defined.model_validate(document.extensions.get(EXTENSION, {})).lights
+        except (ValidationError, RecursionError):
+            raise SceneError(
+                f"{EXTENSION} of the file is not valid or lists over {_MAX_DEFINED:,} lights; export it again"
+            ) from None
+
+    def place(self, node: Node, to_world: F64) -> None:
+        """The light of a node, if it has one; it shines along the node's −Z.
+
+        Raises:
+            SceneError: there is no such light, or there are more than a look may have.
+        """
+        if EXTENSION not in node.extensions:
+            return
+        try:
+            light = self._defined[_Placed.model_validate(node.extensions[EXTENSION]).light]
+        except (ValidationError, IndexError, RecursionError):
+            raise SceneError(f"node {node.name[:80]!r} names a light that does not exist; export it again") from None
+        name = unique_name(light.name or node.name or light.type, self._names)
+        direction, position = -to_world[:3, 2], to_world[:3, 3]
+        length = float(np.linalg.norm(direction))
+        if np.abs(position).max() > MAX_METRES or (light.type != "point" and length < 1e-12):
+            self._warnings.append(f"light {name!r} is scaled to nothing or out of range; it is left out")
+            return
+        fields: dict[str, Any] = {"kind": light.type}
+        if light.type != "directional":
+            fields["position"] = position.tolist()
+        if light.type != "point":
+            fields["direction"] = (direction / length).tolist()
+        if light.type == "spot":
+            outer = min(np.degrees(light.spot.outerConeAngle), 90.0)
+            fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
+        if light.range is not None:
+            self._warnings.append(f"the range of light {name!r} is not used; its light ends nowhere")
+        self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
+        self._add(name, fields, np.array(light.color) * light.intensity / LUMENS_A_WATT)
+
+    def shine(self, material: str, emission: Sequence[float]) -> None:
+        """A material that shines with some radiance, if any. Raises SceneError where there are too many lights."""
+        if max(emission) > 0:
+            self._add(unique_name(material, self._names), {"kind": "mesh", "material": material}, np.array(emission))
+
+    def _add(self, name: str, fields: dict[str, Any], emission: F64) -> None:
+        if len(self.lights) == MAX_LIGHTS:
+            raise SceneError(
+                f"the scene has more than {MAX_LIGHTS} lights, materials that shine included; remove those that "
+                "matter least, or light it by an environment"
+            )
+        if emission.max() > MAX_EMISSION:
+            self._warnings.append(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that")
+        self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))

@@ -1,0 +1,119 @@
+"""Lights of glTF files: lamps at nodes and materials that shine, in relume's units, or refused with a sentence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from glb_builder import Glb
+
+from relume.errors import SceneError
+from relume.look import default_look
+from relume.scene.gltf import import_gltf
+from relume.scene.model import Environment, Scene
+
+LIGHT = Environment("gray", np.ones((4, 8, 3), np.float32))
+
+
+def imported(glb: Glb) -> Scene:
+    return import_gltf(glb.bytes(), "lights", LIGHT)
+
+
+def with_lights(lights: list[Any], nodes: list[dict[str, Any]] | None = None) -> Glb:
+    """A quad and a node for each light, or nodes of your own."""
+    glb = Glb().quad()
+    glb.document["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    nodes = (
+        [{"extensions": {"KHR_lights_punctual": {"light": k}}} for k in range(len(lights))] if nodes is None else nodes
+    )
+    glb.document["nodes"] += nodes
+    glb.document["scenes"][0]["nodes"] += range(1, len(nodes) + 1)
+    return glb
+
+
+def test_lamps_are_where_their_nodes_are_and_shine_as_brightly() -> None:
+    lights = [
+        {"type": "point", "name": "Bulb", "color": [1, 0.5, 0], "intensity": 1366},
+        {"type": "spot", "intensity": 683, "spot": {"innerConeAngle": np.pi / 6, "outerConeAngle": np.pi / 3}},
+        {"type": "directional", "name": "Sun", "intensity": 683},
+    ]
+    down = {"rotation": [-np.sqrt(0.5), 0, 0, np.sqrt(0.5)], "translation": [1, 2, 3], "scale": [2, 2, 2]}
+    nodes = [{**down, "name": f"N{k}", "extensions": {"KHR_lights_punctual": {"light": k}}} for k in range(3)]
+    scene = imported(with_lights(lights, nodes))
+    look = default_look(scene.materials, scene.lights)["lights"]
+    assert list(look) == ["Bulb", "N1", "Sun"]
+    assert look["Bulb"]["kind"] == "point"
+    np.testing.assert_allclose(look["Bulb"]["emission"], [2, 1, 0])
+    np.testing.assert_allclose(look["Bulb"]["position"], [1, 2, 3])
+    np.testing.assert_allclose(look["N1"]["cone"], [30, 60])
+    np.testing.assert_allclose(look["N1"]["direction"], [0, -1, 0], atol=1e-12)
+    np.testing.assert_allclose(look["Sun"]["direction"], [0, -1, 0], atol=1e-12)
+    assert "position" not in look["Sun"]
+    assert len([warning for warning in scene.warnings if "683" in warning]) == 1
+
+
+def test_materials_shine_with_their_factor_their_strength_and_their_texture_s_mean() -> None:
+    glb = Glb()
+    half = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
+    glb.quad(
+        {
+            "name": "Panel",
+            "emissiveFactor": [1, 0.5, 0],
+            "emissiveTexture": half,
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}},
+        }
+    )
+    scene = imported(glb)
+    assert [light.name for light in scene.lights] == ["Panel"]
+    panel = default_look(scene.materials, scene.lights)["lights"]["Panel"]
+    assert (panel["kind"], panel["material"]) == ("mesh", "Panel")
+    np.testing.assert_allclose(panel["emission"], [4, 2, 0])
+    assert any("emission texture" in warning and "mean" in warning for warning in scene.warnings)
+
+
+def test_material_without_emission_is_no_light() -> None:
+    glb = Glb()
+    assert not imported(glb.quad({"emissiveTexture": {"index": glb.texture([[[255, 255, 255]]])}})).lights
+
+
+def test_equal_names_are_told_apart_and_ranges_are_warned_of() -> None:
+    lamp = {"type": "point", "name": "Lamp/1", "range": 3.0}
+    scene = imported(with_lights([lamp, lamp]))
+    assert [light.name for light in scene.lights] == ["Lamp-1", "Lamp-1 2"]
+    assert len([warning for warning in scene.warnings if "range" in warning]) == 2
+
+
+def test_sixty_four_lights_are_read_and_thousands_are_refused() -> None:
+    assert len(imported(with_lights([{"type": "point"}] * 64)).lights) == 64
+    for num in (65, 3000):
+        with pytest.raises(SceneError, match="more than 64 lights"):
+            imported(with_lights([{"type": "point"}] * num))
+
+
+def test_light_too_bright_is_held_and_one_scaled_to_nothing_left_out() -> None:
+    named = {"extensions": {"KHR_lights_punctual": {"light": 0}}}
+    scene = imported(with_lights([{"type": "spot", "intensity": 1e20}], [named, {**named, "scale": [0, 0, 0]}]))
+    assert [light.fields["emission"] for light in scene.lights] == [[1e6, 1e6, 1e6]]
+    assert any("brighter" in warning for warning in scene.warnings)
+    assert any("scaled to nothing" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize(
+    ("lights", "node"),
+    [
+        ([{"type": "laser"}], {"light": 0}),
+        ([{"type": "point", "intensity": -1}], {"light": 0}),
+        ([{"type": "point", "color": [1, 1]}], {"light": 0}),
+        ([{"type": "spot", "spot": {"outerConeAngle": 0}}], {"light": 0}),
+        ([{"type": "point"}], {"light": 1}),
+        ([{"type": "point"}], {"light": -1}),
+        ([{"type": "point"}], "lamp"),
+        ({"a": 1}, {"light": 0}),
+        ([{"type": "point"}] * 10_001, {"light": 0}),
+    ],
+)
+def test_lights_that_are_not_valid_are_refused(lights: Any, node: Any) -> None:
+    glb = with_lights(lights, [{"extensions": {"KHR_lights_punctual": node}}])
+    with pytest.raises(SceneError, match="export it again"):
+        imported(glb)
