@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -17,9 +17,12 @@ def reference(
     look: LookFile = None,
     view: View = None,
     size: Size = None,
+    method: Annotated[
+        Literal["direct", "gather"], typer.Option(help="Light as bakes of this method have it.")
+    ] = "direct",
     data: Data = None,
 ) -> None:
-    """Render by brute force: every texel of the light, visibility traced, nothing baked."""
+    """Render by brute force: every texel of the light, visibility traced, paths between surfaces; nothing baked."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -52,5 +55,6 @@ def reference(
             pixels,
             spp,
             lambda fraction: progress.update(bar, completed=fraction),
+            reflects=method == "gather",
         )
     save(output, image, document)

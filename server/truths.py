@@ -90,6 +90,7 @@ class TruthQueue:
                     lambda share: self._shares.__setitem__(work.id, share),
                     lambda: not self._backlog.is_wanted(work.id),
                     estimate.passes,
+                    reflects=transfer.method == "gather",
                 )  # fmt: skip
                 estimate = estimate.with_pass(picture)
                 self._shares[work.id] = 0.0

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume import environments
+from relume.errors import CancelledError
 from relume.light.environment import lookup, turned
 from relume.light.tiles import MIN_LIGHTS
-from relume.look import Look
+from relume.look import Look, Paths
+from relume.reference.indirect import reference_indirect
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import texels_of
 from relume.scene.model import Scene
@@ -23,6 +26,10 @@ from relume.transfer.direct import DirectMethod
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
+_SPP_A_PATH = 16  # texels drawn for every place on a path
+_POINTS_A_BLOCK = 4096
+_STRAIGHT_SHARE = 0.2  # of the time, where there are other paths
+
 
 def reference_image(
     scene: Scene,
@@ -33,8 +40,10 @@ def reference_image(
     progress: Callable[[float], object] = lambda share: None,
     cancelled: Callable[[], bool] = lambda: False,
     pass_index: int = 0,
+    *,
+    reflects: bool = False,
 ) -> F32:
-    """Render a look under the environment's light: direct, with shadows.
+    """Render a look under the environment's light, with shadows, by the light paths that its `transport` names.
 
     Args:
         size: width and height in pixels.
@@ -42,6 +51,8 @@ def reference_image(
             map has, for every texel.
         progress: called with the share done. cancelled: asked now and then.
         pass_index: pictures with other indices draw independently.
+        reflects: whether there is light between surfaces, as method `gather` has it; one path for every
+            `_SPP_A_PATH` of `spp`.
     Returns:
         Linear radiance, the background seen where there is no surface. (height, width, 3) float32
     Raises:
@@ -54,24 +65,59 @@ def reference_image(
     samples = sample_view(scene, geometry, view, size)
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
     texels = texels_of(light, look.environment.rotation)
+    paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
     camera = next(camera for camera in scene.cameras if camera.name == view)
     points = points_of(samples, camera.to_world[:3, 3])
-    radiance = np.empty((len(samples.pixel), 3))
+    radiance = np.zeros((len(samples.pixel), 3))
+    straight = _STRAIGHT_SHARE if paths.reflect else 1.0
     bounds = np.searchsorted(samples.material, np.arange(len(scene.materials) + 1))
-    for k, material in enumerate(scene.materials):
+    for k, material in enumerate(scene.materials if paths.direct else ()):
         rows, before = slice(int(bounds[k]), int(bounds[k + 1])), int(bounds[k])
         terms: list[Any] = list(look.materials[material.name].terms)
 
         def share_of_all(share: float, rows: slice = rows, before: int = before) -> None:
-            progress((before + share * (rows.stop - rows.start)) / max(1, int(bounds[-1])))
+            progress(straight * (before + share * (rows.stop - rows.start)) / max(1, int(bounds[-1])))
 
         radiance[rows] = reference_radiance(
             geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled, pass_index
         )[0]  # fmt: skip
-    outside = samples.material == BACKGROUND
-    towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
-    radiance[outside] = lookup(light.radiance, towards.astype(np.float32))
+    if paths.reflect:
+        on_surface = slice(0, int(bounds[-1]))
+        truth = partial(reference_indirect, scene, geometry, texels, look)
+        radiance[on_surface] += _reflected(
+            truth, points.rows(on_surface), samples.material[on_surface], paths, spp, pass_index, cancelled,
+            lambda share: progress(straight + (1 - straight) * share),
+        )  # fmt: skip
+    if paths.direct:
+        outside = samples.material == BACKGROUND
+        towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
+        radiance[outside] = lookup(light.radiance, towards.astype(np.float32))
     return _resolve(samples, np.array(look.environment.gain) * radiance, size)
+
+
+def _reflected(
+    truth: Callable[..., F64],
+    points: Points,
+    material: NDArray[np.integer],
+    paths: Paths,
+    spp: int,
+    pass_index: int,
+    cancelled: Callable[[], bool],
+    progress: Callable[[float], object],
+) -> F64:
+    """Radiance of points by way of other surfaces, block by block. truth: `reference_indirect` of a look. (n, 3)"""
+    num_blocks, num_paths = -(-points.num_points // _POINTS_A_BLOCK), max(1, spp // _SPP_A_PATH)
+    found = np.empty((points.num_points, 3))
+    for block in range(num_blocks):
+        if cancelled():
+            raise CancelledError("the reference was cancelled")
+        rows = slice(block * _POINTS_A_BLOCK, (block + 1) * _POINTS_A_BLOCK)
+        found[rows], _ = truth(
+            points.rows(rows), material[rows], paths.last, num_paths, _SPP_A_PATH,
+            seed=pass_index * num_blocks + block, first_bounce=paths.first,
+        )  # fmt: skip
+        progress((block + 1) / num_blocks)
+    return found
 
 
 def points_of(samples: ViewSamples, eye: F64) -> Points:

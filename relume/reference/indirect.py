@@ -30,6 +30,8 @@ F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
 
 _TEXTURE_ANGLE = 1e-3
+_LEAST_CHANCE = 0.05
+_MOST_BOUNCES = 64
 
 
 def reference_indirect(
@@ -43,8 +45,9 @@ def reference_indirect(
     num_paths: int,
     spp: int,
     seed: int = 0,
+    first_bounce: int = 1,
 ) -> F64:
-    """Radiance of points by light that surfaces have reflected onto them, 1 to `num_bounces` times.
+    """Radiance of points by light that surfaces have reflected onto them, `first_bounce` to `num_bounces` times.
 
     Args:
         points: seen from one direction each. material: index into the scene's materials. (n,)
@@ -53,11 +56,11 @@ def reference_indirect(
         The mean over paths and its variance. (2, n, 3) float64
     Cost: O(n · num_paths · num_bounces · spp) shadow rays.
     """
-    rng = np.random.default_rng((seed, points.num_points))
     terms: list[Terms] = [look.materials[m.name].terms for m in scene.materials]
     diffuse: list[Terms] = [list(filter(is_diffuse, of_material)) for of_material in terms]
     total, squares = np.zeros((2, points.num_points, 3))
     for path in range(num_paths):
+        rng = np.random.default_rng((seed, path, points.num_points))
         here, of, f_terms = points, np.asarray(material), terms
         rows, weight = np.arange(points.num_points), np.ones((points.num_points, 3))
         found = np.zeros((points.num_points, 3))
@@ -68,10 +71,13 @@ def reference_indirect(
             hit = np.nonzero(hits.face >= 0)[0]
             here, of = _places(scene, geometry, hits, directions, hit)
             rows, weight, f_terms = rows[hit], weight[hit], diffuse
-            arriving = np.zeros((len(hit), 3))
+            here, of, rows, weight = _survivors(here, of, rows, weight, rng)
+            if bounce + 1 < first_bounce:
+                continue
+            arriving = np.zeros((len(rows), 3))
             for index, of_material in enumerate(diffuse):
                 at = np.nonzero(of == index)[0]
-                drawn = (seed * num_paths + path) * num_bounces + bounce
+                drawn = (seed * num_paths + path) * _MOST_BOUNCES + bounce
                 arriving[at] = reference_radiance(
                     geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn
                 )[0]  # fmt: skip
@@ -80,6 +86,15 @@ def reference_indirect(
         squares += found**2
     mean = total / num_paths
     return np.stack([mean, np.maximum(squares / num_paths - mean**2, 0) / max(1, num_paths - 1)])
+
+
+def _survivors(
+    here: Points, of: NDArray[np.integer], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
+) -> tuple[Points, NDArray[np.integer], NDArray[np.intp], F64]:
+    """Russian roulette: dim paths end early, and those that go on stand for them."""
+    chance = np.clip(weight.max(axis=1, initial=0.0), _LEAST_CHANCE, 1.0)
+    alive = np.nonzero(rng.random(len(rows)) < chance)[0]
+    return here.rows(alive), of[alive], rows[alive], weight[alive] / chance[alive, None]
 
 
 def _places(

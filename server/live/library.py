@@ -18,8 +18,8 @@ def open_library(cache_bytes: int) -> Library:
     from relume.transfer.picture import Picture
     from relume.transfer.render import render_image, render_small
 
-    def reference(scene: Path, *args: Any) -> Any:
-        return reference_image(load_scene(scene), *args)
+    def reference(scene: Path, *args: Any, reflects: bool) -> Any:
+        return reference_image(load_scene(scene), *args, reflects=reflects)
 
     cache = FrozenCache(cache_bytes)
     return Library(

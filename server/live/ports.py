@@ -103,8 +103,8 @@ class Library:
         render: (transfer, view name, complete look) -> (H, W, 3) linear radiance in the baked size; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
-        reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index) -> the same
-            by brute force; heavy.
+        reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,
+            reflects=whether surfaces light each other) -> the same by brute force; heavy.
         cache_used_bytes: what the frozen caches hold now.
     """
 

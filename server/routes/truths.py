@@ -9,7 +9,6 @@ from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from relume.errors import PlanError
 from server.bodies import Id, TruthBody, TruthFigures, TruthRequest
 from server.errors import NotReadyError
 from server.live.ports import Transfer
@@ -33,10 +32,6 @@ async def submit_truth(request: TruthRequest, services: Shared, response: Respon
 
 
 def _check(request: TruthRequest, transfer: Transfer) -> None:
-    if transfer.method != "direct":
-        raise PlanError(
-            f"brute force knows no light between surfaces, which method {transfer.method!r} has; compare a direct bake"
-        )
     baked_view(request.view, transfer)
     check_look(request.look, transfer, "/look")
 

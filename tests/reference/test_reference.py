@@ -12,7 +12,7 @@ from relume.errors import CancelledError, PlanError
 from relume.light.environment import texel_directions, texel_solid_angles, uv_to_direction
 from relume.look import default_look, validate
 from relume.reference import Points, reference_image, reference_radiance, texels_of
-from relume.scene.model import Environment
+from relume.scene.model import Environment, Material
 from relume.store import bake_here
 from relume.trace.geometry import merge
 from relume.transfer.base import Recipe
@@ -27,9 +27,9 @@ def relative_rmse(a, b):
     return np.sqrt(np.mean(np.square(np.subtract(a, b, dtype=float)))) / np.sqrt(np.mean(np.square(b, dtype=float)))
 
 
-def image_of(scene, size, spp, **changes):
+def image_of(scene, size, spp, *, reflects=False, **changes):
     default = default_look(scene.materials)
-    return reference_image(scene, scene.cameras[0].name, validate(changes, default), size, spp)
+    return reference_image(scene, scene.cameras[0].name, validate(changes, default), size, spp, reflects=reflects)
 
 
 def test_white_ball_in_a_white_furnace_vanishes() -> None:
@@ -89,6 +89,35 @@ def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) 
     light = scene.environment.radiance * texel_solid_angles(24, 48)[:, None, None]
     value = eval_brdf(document, wi, frame @ wo) * np.maximum(wi[..., 2:], 0)
     np.testing.assert_allclose(found, (value * light).sum(axis=(0, 1)) * [1.0, 0.5, 0.25], rtol=1e-4)
+
+
+def corner_of(albedo):
+    """A floor and a wall under a sky of one."""
+    parts = [
+        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
+        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 2, -1], [-1, 2, -1]], 0),
+    ]
+    material = Material("Plaster", ({"model": "lambert", "color": [albedo] * 3},))
+    camera = looking("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5)
+    return scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=(material,))
+
+
+def test_white_corner_in_a_white_furnace_vanishes() -> None:
+    """What a wall hides of the sky it makes good by what it reflects."""
+    image = image_of(corner_of(1.0), (16, 16), 512, reflects=True)
+    assert image.mean() == pytest.approx(1.0, rel=0.01)
+    assert image_of(corner_of(1.0), (16, 16), 512).mean() < 0.9
+
+
+def test_light_paths_of_a_grey_corner_add_up() -> None:
+    """Russian roulette included: the same paths, told apart by their length."""
+    shown = {
+        show: image_of(corner_of(0.5), (16, 16), 64, reflects=True, transport={"show": show})
+        for show in ("all", "direct", "first_bounce", "further_bounces")
+    }
+    parts = shown["direct"] + shown["first_bounce"] + shown["further_bounces"]
+    np.testing.assert_allclose(parts, shown["all"], rtol=1e-5)
+    assert 0.02 < shown["further_bounces"].mean() / shown["first_bounce"].mean() < 0.4
 
 
 def test_drawn_texels_estimate_all_of_them() -> None:

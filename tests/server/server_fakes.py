@@ -209,6 +209,7 @@ class Control:
     may_freeze: threading.Event = field(default_factory=threading.Event)
     may_trace: threading.Event = field(default_factory=threading.Event)
     passes_asked: list[int] = field(default_factory=list)
+    reflections_asked: list[bool] = field(default_factory=list)
 
     def open_library(self, cache_bytes: int) -> Library:
         return Library(self._open, self._picture, self._render, self._render_small, self._reference, lambda: 123)
@@ -240,11 +241,14 @@ class Control:
         progress: Callable[[float], object],
         cancelled: Callable[[], bool],
         pass_index: int,
+        *,
+        reflects: bool,
     ) -> np.ndarray:
         """Noise of a fiftieth around a truth that the frame misses by a tenth."""
         if not scene.is_dir():
             raise FileNotFoundError(scene)
         self.passes_asked.append(pass_index)
+        self.reflections_asked.append(reflects)
         while not self.may_trace.wait(0.01):
             if cancelled():
                 raise CancelledError("stopped")

@@ -101,14 +101,15 @@ def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[s
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-def test_light_between_surfaces_is_not_compared_with_brute_force_that_has_none(
-    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("method", ["direct", "gather"])
+def test_brute_force_has_the_light_paths_of_the_bake(
+    client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
-    monkeypatch.setattr(FakeTransfer, "__init__", _gathered(FakeTransfer.__init__))
-    answer = client.post("/api/truths", json={"bake": baked.bake, "view": "front"})
-    assert answer.status_code == 422, answer.text
-    assert "direct bake" in answer.json()["detail"]
+    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by(method, FakeTransfer.__init__))
+    control.may_trace.set()
+    wait_until(client, submit(client, baked, 2), is_done)
+    assert control.reflections_asked == [method == "gather"] * 2
 
 
-def _gathered(init: Callable[..., None]) -> Callable[..., None]:
-    return lambda self, *args, **more: init(self, *args, **{**more, "method": "gather"})
+def _baked_by(method: str, init: Callable[..., None]) -> Callable[..., None]:
+    return lambda self, *args, **more: init(self, *args, **{**more, "method": method})
