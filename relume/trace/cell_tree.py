@@ -18,7 +18,7 @@ I32 = NDArray[np.int32]
 
 NO_CELL = 65_535  # of 16-bit links
 MAX_CELLS = 65_535
-_NONE = np.int32(-(1 << 31))
+NO_CELL_NODE = np.int32(-1 - NO_CELL)  # a leaf, like those of cells
 _BENT = np.float32(0.5)  # extent of a normal's component over a cell, from which on the cell is divided by it
 
 
@@ -38,28 +38,25 @@ class CellTree(NamedTuple):
     roots: I32
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def locate(tree, side, px, py, pz, nx, ny, nz):  # type: ignore[no-untyped-def]
-    """The cell of a point with normal n on a side, numbered as `CellTree.roots`; NO_CELL where there is none."""
-    node = tree.roots[side]
-    if node == _NONE:
-        return np.int32(NO_CELL)
-    while node >= 0:
-        axis = tree.axis[node]
-        if axis == 0:
-            at = px
-        elif axis == 1:
-            at = py
-        elif axis == 2:
-            at = pz
-        elif axis == 3:
-            at = nx
-        elif axis == 4:
-            at = ny
-        else:
-            at = nz
-        node = tree.children[node, 0 if at < tree.value[node] else 1]
-    return np.int32(-1 - node)
+@nb.njit(nogil=True, cache=True)
+def locate16(tree, keys, nodes):  # type: ignore[no-untyped-def]
+    """The cells of 16 points on surfaces; all go down the tree together, so that none waits for memory alone.
+
+    Args:
+        keys: position and normal of each. (6, 16) float32
+        nodes: the tree's root on each one's side; becomes its cell, `NO_CELL` where there is none. (16,) int32
+    """
+    axes, values, children = tree.axis, tree.value, tree.children
+    num_inner = 16
+    while num_inner > 0:
+        num_inner = 0
+        for k in range(16):
+            node = nodes[k]
+            if node >= 0:
+                nodes[k] = children[node, int(keys[axes[node], k] >= values[node])]
+                num_inner += 1
+    for k in range(16):
+        nodes[k] = -1 - nodes[k]
 
 
 @nb.njit(nogil=True, cache=True)
@@ -137,7 +134,7 @@ def grow_tree(keys: F32, side: I32, num_sides: int, num_cells: int) -> tuple[Cel
     Returns:
         The tree, and the points of each cell.
     """
-    roots = np.full(num_sides, _NONE, np.int32)
+    roots = np.full(num_sides, NO_CELL_NODE, np.int32)
     sides, counts = np.unique(side, return_counts=True)
     shares = np.maximum(1, np.minimum(counts, num_cells * counts // max(1, len(side)))).astype(np.int64)
     total = int(shares.sum())

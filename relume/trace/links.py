@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
-from relume.trace.cell_tree import NO_CELL, CellTree, locate
+from relume.trace.cell_tree import NO_CELL_NODE, CellTree, locate16
 from relume.trace.cells import face_normals
 from relume.trace.embree import aligned, intersect16, packet_arguments
-from relume.trace.gather_rays import Pattern, local_ray, shift_of
+from relume.trace.gather_rays import Pattern, cosine_ray, glossy_ray, small_shifts_of
 from relume.trace.geometry import Geometry
 
 F32 = NDArray[np.float32]
 
 _FLOATS_A_PACKET = 12 * 16 + 9 * 16  # RTCRay16, then RTCHit16 with its instance ids
-_NEAR, _FAR, _MASK = 3, 8, 9
+_NEAR, _DIRECTION, _FAR, _MASK = 3, 4, 8, 9
 _PRIMITIVE, _GEOMETRY = 17, 18
 _NOTHING = 0xFFFFFFFF
 _POINTS_A_RANGE = 256
@@ -53,76 +53,98 @@ class Links:
     trace_s: float
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def _turned(frame, x, y, z):  # type: ignore[no-untyped-def]
-    """A local direction in world space. frame: tangent, bitangent, normal, three components each"""
-    t, b, n = frame
-    return t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
-
-
 @nb.njit(nogil=True, cache=True)
-def _cell_of(packet, words, lane, surfaces, tree):  # type: ignore[no-untyped-def]
-    """The cell that the ray of a lane has hit."""
-    if words[_GEOMETRY * 16 + lane] == _NOTHING:
-        return np.int32(NO_CELL)
-    normals, meshes = surfaces
-    face = words[_PRIMITIVE * 16 + lane]
-    nx, ny, nz = normals[face, 0], normals[face, 1], normals[face, 2]
-    side = 2 * meshes[face]
-    far = packet[_FAR * 16 + lane]
-    dx, dy, dz = packet[4 * 16 + lane], packet[5 * 16 + lane], packet[6 * 16 + lane]
-    if nx * dx + ny * dy + nz * dz > 0:
-        nx, ny, nz, side = -nx, -ny, -nz, side + 1
-    x, y, z = packet[lane] + far * dx, packet[16 + lane] + far * dy, packet[32 + lane] + far * dz
-    return locate(tree, side, x, y, z, nx, ny, nz)
+def _enter(points, pattern, numbers, first, width, packet, frame, towards, shifts):  # type: ignore[no-untyped-def]
+    """Begin with points [first, first + width): origins of their rays, local frames, shifts; one lane each.
+
+    points: position, normal, tangent, wo. frame: tangent, bitangent, normal. (3, 3, 16) shifts: (2 sets, 4, 16)
+    """
+    position, normal, tangent, wo = points
+    for k in range(16):
+        p = first + min(k, width - 1)
+        n, t, o = normal[p], tangent[p], wo[p]
+        b = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
+        for axis in range(3):
+            packet[16 * axis + k] = position[p, axis]
+            frame[0, axis, k], frame[1, axis, k], frame[2, axis, k] = t[axis], b[axis], n[axis]
+        for row in range(3):
+            towards[row, k] = frame[row, 0, k] * o[0] + frame[row, 1, k] * o[1] + frame[row, 2, k] * o[2]
+        of_cosine, of_glossy = small_shifts_of(pattern, numbers[p])
+        for m in range(4):
+            shifts[0, m, k], shifts[1, m, k] = of_cosine[m], of_glossy[m]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _aim(pattern, ray, frame, towards, shifts, packet, valid, width):  # type: ignore[no-untyped-def]
+    """Aim the same ray of all lanes; returns how many of them are above their horizon."""
+    of_ray, is_cosine = pattern.rays[ray], ray < pattern.num_cosine
+    cosine, glossy = shifts[0], shifts[1]
+    num_valid = 0
+    for k in range(16):
+        if is_cosine:
+            x, y, z = cosine_ray(of_ray, (cosine[0, k], cosine[1, k], cosine[2, k], cosine[3, k]))
+        else:
+            shift = (glossy[0, k], glossy[1, k], glossy[2, k], glossy[3, k])
+            x, y, z = glossy_ray(of_ray, shift, towards[0, k], towards[1, k], towards[2, k])
+        for axis in range(3):
+            along = frame[0, axis, k] * x + frame[1, axis, k] * y + frame[2, axis, k] * z
+            packet[(_DIRECTION + axis) * 16 + k] = along
+        packet[_NEAR * 16 + k], packet[_FAR * 16 + k] = 0, np.inf
+        is_above = z > 0 and k < width
+        valid[k] = -1 if is_above else 0
+        num_valid += is_above
+    return num_valid
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _find(packet, words, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
+    """The cells that the rays of all lanes have hit, into nodes. keys: (6, 16) float32"""
+    normals, sides, roots = surfaces[0], surfaces[1], tree.roots
+    for k in range(16):
+        nodes[k] = NO_CELL_NODE
+        if words[_GEOMETRY * 16 + k] == _NOTHING:
+            continue
+        face = words[_PRIMITIVE * 16 + k]
+        far = packet[_FAR * 16 + k]
+        along = np.float32(0)
+        for axis in range(3):
+            keys[axis, k] = packet[axis * 16 + k] + far * packet[(_DIRECTION + axis) * 16 + k]
+            keys[3 + axis, k] = normals[face, axis]
+            along += normals[face, axis] * packet[(_DIRECTION + axis) * 16 + k]
+        is_behind = along > 0
+        nodes[k] = roots[sides[face] + is_behind]
+        if is_behind:
+            for axis in range(3, 6):
+                keys[axis, k] = -keys[axis, k]
+    locate16(tree, keys, nodes)
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
     intersect, scene, arguments, points, surfaces, tree, pattern, numbers, start, stop, links
 ):
-    """Trace all rays of points [start, stop); returns how many.
+    """Trace all rays of points [start, stop), the same ray of 16 points at once; returns how many.
 
-    points: position, normal, tangent, wo. surfaces: normal and mesh of each face.
+    surfaces: normal, and number of the front side, of each face.
     """
-    position, normal, tangent, towards = points
     packet = aligned(_FLOATS_A_PACKET)
     words = packet.view(np.uint32)
     words[_MASK * 16 : (_MASK + 1) * 16] = _NOTHING
     valid = aligned(16).view(np.int32)
-    ray_of = np.empty(16, np.int64)
+    frame, towards = np.empty((3, 3, 16), np.float32), np.empty((3, 16), np.float32)
+    shifts, keys = np.empty((2, 4, 16), np.float32), np.zeros((6, 16), np.float32)
+    cells = np.empty(16, np.int32)
     num_rays = 0
-    for p in range(start, stop):
-        n, t, wo = normal[p], tangent[p], towards[p]
-        b = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
-        frame = ((t[0], t[1], t[2]), b, (n[0], n[1], n[2]))
-        ox = t[0] * wo[0] + t[1] * wo[1] + t[2] * wo[2]
-        oy = b[0] * wo[0] + b[1] * wo[1] + b[2] * wo[2]
-        oz = n[0] * wo[0] + n[1] * wo[1] + n[2] * wo[2]
-        shift_u, shift_v = shift_of(pattern, numbers[p])
-        for axis in range(3):
-            packet[axis * 16 : (axis + 1) * 16] = position[p, axis]
-        links[p] = NO_CELL
-        ray = 0
-        while ray < links.shape[1]:
-            lanes = 0
-            while ray < links.shape[1] and lanes < 16:
-                x, y, z = local_ray(pattern, ray, shift_u, shift_v, ox, oy, oz)
-                if z > 0:
-                    dx, dy, dz = _turned(frame, x, y, z)
-                    packet[4 * 16 + lanes], packet[5 * 16 + lanes], packet[6 * 16 + lanes] = dx, dy, dz
-                    ray_of[lanes] = ray
-                    lanes += 1
-                ray += 1
-            for k in range(16):
-                valid[k] = -1 if k < lanes else 0
-            packet[_NEAR * 16 : (_NEAR + 1) * 16] = 0
-            packet[_FAR * 16 : (_FAR + 1) * 16] = np.inf
+    for first in range(start, stop, 16):
+        width = min(16, stop - first)
+        _enter(points, pattern, numbers, first, width, packet, frame, towards, shifts)
+        for ray in range(links.shape[1]):
+            num_rays += _aim(pattern, ray, frame, towards, shifts, packet, valid, width)
             words[_GEOMETRY * 16 : (_GEOMETRY + 2) * 16] = _NOTHING
             intersect(np.int64(valid.ctypes.data), scene, np.int64(packet.ctypes.data), arguments)
-            num_rays += lanes
-            for k in range(lanes):
-                links[p, ray_of[k]] = _cell_of(packet, words, k, surfaces, tree)
+            _find(packet, words, surfaces, tree, keys, cells)
+            for k in range(width):
+                links[first + k, ray] = cells[k]
     return num_rays
 
 
@@ -135,9 +157,9 @@ def trace_links(
         numbers: of the points among all that share the pattern; they decide their shifts. (n,) uint32
     Cost: O(n · rays · (log triangles + log cells)) time.
     """
-    links = np.empty((len(points.position), len(pattern.uv)), np.uint16)
-    arguments = packet_arguments(coherent=False)
-    surfaces = face_normals(geometry), geometry.face_mesh
+    links = np.empty((len(points.position), pattern.num_rays), np.uint16)
+    arguments = packet_arguments(coherent=True)
+    surfaces = face_normals(geometry), (2 * geometry.face_mesh).astype(np.int32)
     arrays = tuple(np.ascontiguousarray(a) for a in (points.position, points.normal, points.tangent, points.wo))
     counts: list[int] = []
 

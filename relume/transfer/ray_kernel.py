@@ -13,7 +13,7 @@ import numpy as np
 from relume.brdf.angles import angles_into
 from relume.light.local import light_sample
 from relume.trace.cell_tree import NO_CELL
-from relume.trace.gather_rays import local_ray, shift_of, weight_of
+from relume.trace.gather_rays import local_ray, shift_of, small_shifts_of, weight_of
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -35,12 +35,12 @@ def list_gathered(  # type: ignore[no-untyped-def]
         ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
         oy = bx * o[0] + by * o[1] + bz * o[2]
         oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
-        shift_u, shift_v = shift_of(pattern, numbers[p])
+        shifts = small_shifts_of(pattern, numbers[p])
         for ray in range(links.shape[1]):
             cell = links[p, ray]
             if cell == NO_CELL:
                 continue
-            x, y, z = local_ray(pattern, ray, shift_u, shift_v, ox, oy, oz)
+            x, y, z = local_ray(pattern, ray, shifts, ox, oy, oz)
             weight = weight_of(pattern, x, y, z, ox, oy, oz)
             wi[0, end], wi[1, end], wi[2, end] = x, y, z
             out[0, end], out[1, end], out[2, end] = ox, oy, oz

@@ -7,9 +7,9 @@ import pytest
 from tiny_scenes import looking, scene_of, sphere
 
 from relume.scene.cornell import cornell_box
-from relume.trace.cell_tree import NO_CELL, grow_tree, locate
+from relume.trace.cell_tree import NO_CELL, grow_tree, locate16
 from relume.trace.cells import POINTS_A_CELL, choose_cells, face_normals
-from relume.trace.gather_rays import local_ray, make_pattern, shift_of
+from relume.trace.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.trace.geometry import merge
 from relume.trace.links import Gatherers, trace_links
 from relume.trace.primary import trace_from
@@ -39,6 +39,14 @@ def random_keys(num, num_sides, seed):
     return keys, rng.integers(0, num_sides, num).astype(np.int32)
 
 
+def locate(tree, side, key):
+    """The cell of one point, in all 16 lanes alike."""
+    keys, nodes = np.repeat(np.asarray(key, np.float32)[:, None], 16, axis=1), np.full(16, tree.roots[side], np.int32)
+    locate16(tree, keys, nodes)
+    assert len(set(nodes)) == 1
+    return int(nodes[0])
+
+
 @pytest.mark.parametrize(("num_cells", "num_points"), [(1, 50), (7, 50), (300, 5000), (50, 50)])
 def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_points):
     keys, side = random_keys(num_points, 4, seed=num_cells)
@@ -47,26 +55,26 @@ def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_po
     assert len(members) == pytest.approx(num_cells, abs=4)
     for cell, rows in enumerate(members):
         assert len(set(side[rows])) == 1
-        assert {int(locate(tree, side[row], *keys[row])) for row in rows} == {cell}
+        assert {locate(tree, side[row], keys[row]) for row in rows} == {cell}
 
 
 def test_a_side_without_points_has_no_cell():
     keys, side = random_keys(100, 2, seed=1)
     tree, _ = grow_tree(keys, side, 4, 10)
-    assert locate(tree, 3, *keys[0]) == NO_CELL
+    assert locate(tree, 3, keys[0]) == NO_CELL
 
 
 def test_coinciding_points_end_in_one_cell():
     keys, _ = random_keys(1, 1, seed=1)
     tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.zeros(100, np.int32), 1, 10)
     assert len(members) == 1
-    assert locate(tree, 0, *keys[0]) == 0
+    assert locate(tree, 0, keys[0]) == 0
 
 
 def test_no_points_make_no_cells():
     tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.int32), 2, 10)
     assert members == []
-    assert locate(tree, 0, 0, 0, 0, 0, 0, 1) == NO_CELL
+    assert locate(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_CELL
 
 
 def test_points_lie_where_light_can_arrive(box):
@@ -109,9 +117,9 @@ def test_links_are_those_of_first_hits(box):
         n, t = points.normal[p].astype(float), points.tangent[p].astype(float)
         frame = np.stack([t, np.cross(n, t), n])
         wo = frame @ points.wo[p]
-        shift = shift_of(pattern, 100 + p)
+        shift = small_shifts_of(pattern, 100 + p)
         for ray in range(33):
-            wi = np.array(local_ray(pattern, ray, *shift, *wo.astype(np.float32)))
+            wi = np.array(local_ray(pattern, ray, shift, *wo.astype(np.float32)))
             if wi[2] > 0:
                 origins.append(points.position[p])
                 directions.append(wi @ frame)
@@ -128,7 +136,7 @@ def test_links_are_those_of_first_hits(box):
             behind = normals[face] @ direction > 0
             normal = -normals[face] if behind else normals[face]
             side = 2 * geometry.face_mesh[face] + int(behind)
-            expected = locate(cells.tree, side, *(origin + distance * direction), *normal)
+            expected = locate(cells.tree, side, (*(origin + distance * direction), *normal))
         wrong += int(expected != links.cell[p, ray])
     assert wrong <= 0.005 * len(origins)  # rounding at the edge of a cell
 

@@ -8,10 +8,11 @@ import pytest
 from relume.errors import PlanError
 from relume.trace.gather_rays import (
     MAX_RAYS,
+    _step,
     density_about_mirror,
     local_ray,
     make_pattern,
-    shift_of,
+    small_shifts_of,
     weight_of,
 )
 
@@ -20,8 +21,8 @@ WO = np.array([np.sin(0.7), 0.0, np.cos(0.7)], np.float32)
 
 def rays_of(pattern, point):
     """Directions above the horizon and their weights. (n, 3), (n,)"""
-    shift = shift_of(pattern, point)
-    wi = np.array([local_ray(pattern, ray, *shift, *WO) for ray in range(len(pattern.uv))])
+    shift = small_shifts_of(pattern, point)
+    wi = np.array([local_ray(pattern, ray, shift, *WO) for ray in range(pattern.num_rays)])
     wi = wi[wi[:, 2] > 0]
     return wi, np.array([weight_of(pattern, *direction, *WO) for direction in wi])
 
@@ -83,14 +84,38 @@ def test_density_about_the_mirror_direction_is_one_over_the_half_vectors():
     assert 2 * np.pi * np.trapezoid(density, cosine) == pytest.approx(1, rel=1e-3)
 
 
-def test_shifts_depend_on_seed_and_point_and_fill_the_square():
+def test_shifted_lattices_cover_the_square_evenly():
+    """All rays of many points together, as points of the unit square: u from the polar angle, v from the azimuth."""
+    pattern, counts = make_pattern(21, 0, 3), np.zeros((8, 8))
+    for point in range(3000):
+        x, y, _ = rays_of(pattern, point)[0].T
+        counts += np.histogram2d(x**2 + y**2, np.arctan2(y, x) / (2 * np.pi) % 1, bins=8, range=[[0, 1], [0, 1]])[0]
+    np.testing.assert_allclose(counts, 3000 * 21 / 64, rtol=0.05)
+
+
+def test_the_same_ray_of_all_points_goes_nearly_the_same_way():
+    """But for the few at the rim and in the middle of the disc, where shifts lead over its edge."""
+    pattern, angles = make_pattern(377, 233, 3), []
+    for ray in range(0, pattern.num_rays, 7):
+        directions = np.array([local_ray(pattern, ray, small_shifts_of(pattern, point), *WO) for point in range(60)])
+        mean = directions.mean(axis=0)
+        angles.append(np.degrees(np.arccos(np.clip(directions @ mean / np.linalg.norm(mean), -1, 1)).max()))
+    assert np.quantile(angles, 0.8) < 15
+
+
+@pytest.mark.parametrize("count", [1, 2, 55, 64, 377])
+def test_sides_of_a_lattice_are_vectors_between_its_points(count):
+    sides = make_pattern(count, 0, 1).sides[0].astype(float)
+    assert abs(np.linalg.det(sides)) == pytest.approx(1 / count, rel=1e-5)
+    step = _step(count)
+    for u, v in sides:
+        assert (v - u * step) % 1 == pytest.approx(0, abs=1e-5) or (v - u * step) % 1 == pytest.approx(1, abs=1e-5)
+
+
+def test_shifts_depend_on_seed_and_point():
     pattern = make_pattern(8, 0, 3)
-    shifts = np.array([shift_of(pattern, point) for point in range(4096)])
-    counts = np.histogram2d(*shifts.T, bins=8, range=[[0, 1], [0, 1]])[0]
-    assert counts.min() > 40
-    assert counts.max() < 90
-    assert shift_of(make_pattern(8, 0, 4), 5) != shift_of(pattern, 5)
-    far = shift_of(pattern, 16_777_216 + 1), shift_of(pattern, 16_777_216)
+    assert small_shifts_of(make_pattern(8, 0, 4), 5) != small_shifts_of(pattern, 5)
+    far = small_shifts_of(pattern, 16_777_216 + 1), small_shifts_of(pattern, 16_777_216)
     assert far[0] != far[1]  # points beyond the whole numbers of float32 are still told apart
 
 

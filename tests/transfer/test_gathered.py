@@ -21,7 +21,7 @@ from relume.reference.indirect import reference_indirect
 from relume.scene.model import Material
 from relume.store import bake_here
 from relume.trace.cell_tree import NO_CELL
-from relume.trace.gather_rays import local_ray, make_pattern, shift_of, weight_of
+from relume.trace.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
 from relume.trace.geometry import merge
 from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
@@ -67,7 +67,7 @@ def receivers(cells, lights):
     for p in range(30):
         wo = twins.frames(dark)[p] @ dark.wo[p]
         for ray in range(33):
-            below = local_ray(pattern, ray, *shift_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
+            below = local_ray(pattern, ray, small_shifts_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
                 links[p, ray] = NO_CELL
     reflected = cells.radiance(cells.irradiance(lights), REFLECTANCES, 1, 24)
@@ -97,11 +97,11 @@ def image_numpy(model, bands, receivers):
     out = np.zeros((len(receivers.normal), 3))
     for p, frame in enumerate(twins.frames(receivers)):
         wo = frame @ receivers.wo[p].astype(float)
-        shift = shift_of(rays.pattern, rays.numbers[p])
+        shift = small_shifts_of(rays.pattern, rays.numbers[p])
         for ray, cell in enumerate(rays.links[p]):
             if cell == NO_CELL:
                 continue
-            wi = np.array(local_ray(rays.pattern, ray, *shift, *wo.astype(np.float32)))
+            wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
             value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * radiance[cell]
             value = value * term.quotients(*wi.astype(float), *wo)
             for curve in term.curves:
