@@ -1,0 +1,157 @@
+"""Lights in a browser: placed by a click and by keys, pulled and aimed in the picture, switched, alone, undone."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from editor_page import Editor, changed
+from playwright.sync_api import Locator, expect
+
+ON_THE_FLOOR = (0.5, 0.85)
+
+
+def start_adding(editor: Editor, kind: str) -> None:
+    editor.page.get_by_role("button", name="Add a light").click()
+    editor.page.get_by_role("group", name="Kind of light").get_by_role("button", name=kind).click()
+
+
+def add_by_click(editor: Editor, kind: str) -> None:
+    start_adding(editor, kind)
+    box = editor.canvas.bounding_box()
+    assert box is not None
+    u, v = ON_THE_FLOOR
+    editor.page.mouse.click(box["x"] + u * box["width"], box["y"] + v * box["height"])
+    expect(editor.page.locator(".light .name", has_text=kind)).to_have_attribute("aria-pressed", "true")
+
+
+def handle(editor: Editor, kind: str) -> Locator:
+    return editor.page.locator(f".light-handle.{kind}")
+
+
+def numbers(editor: Editor, label: str) -> list[float]:
+    fields = editor.page.get_by_role("group", name=label, exact=True).get_by_role("textbox")
+    return [float(fields.nth(k).input_value()) for k in range(fields.count())]
+
+
+def pull(editor: Editor, knob: Locator, dx: float, dy: float) -> None:
+    box = knob.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    editor.page.mouse.move(x, y)
+    editor.page.mouse.down()
+    editor.page.mouse.move(x + dx, y + dy, steps=6)
+    editor.page.mouse.up()
+
+
+def test_a_light_is_placed_by_a_click_and_shines_and_undo_takes_it_away(editor: Editor) -> None:
+    before = editor.pixels()
+    add_by_click(editor, "Point")
+    lit = editor.pixels()
+    assert changed(before, lit) > 0.1
+    assert lit.mean() > before.mean()
+    editor.page.keyboard.press("Control+z")
+    expect(editor.page.locator(".light")).to_have_count(0)
+    assert changed(before, editor.pixels()) == 0
+
+
+def test_a_light_is_placed_by_keys_alone(editor: Editor) -> None:
+    page = editor.page
+    page.get_by_role("button", name="Add a light").press("Enter")
+    page.get_by_role("group", name="Kind of light").get_by_role("button", name="Spot").press("Enter")
+    middle = page.get_by_role("button", name="In the middle")
+    expect(middle).to_be_focused()
+    middle.press("Enter")
+    expect(page.get_by_role("combobox", name="Kind of light")).to_have_value("spot")
+    expect(middle).to_have_count(0)
+
+
+def test_escape_places_nothing(editor: Editor) -> None:
+    start_adding(editor, "Sun")
+    editor.page.keyboard.press("Escape")
+    expect(editor.page.get_by_role("button", name="In the middle")).to_have_count(0)
+    expect(editor.page.locator(".light")).to_have_count(0)
+
+
+def test_a_handle_is_pulled_in_one_step_across_the_picture_and_away(editor: Editor) -> None:
+    add_by_click(editor, "Spot")
+    before, start = editor.pixels(), numbers(editor, "Position")
+    steps = editor.page.locator(".tile.step")
+    count = steps.count()
+    pull(editor, handle(editor, "move"), 60, -20)
+    moved = numbers(editor, "Position")
+    assert moved != start
+    expect(steps).to_have_count(count + 1)
+    assert changed(before, editor.pixels()) > 0.02
+
+    place = handle(editor, "move").bounding_box()
+    editor.page.keyboard.down("Shift")
+    pull(editor, handle(editor, "move"), 0, -20)
+    editor.page.keyboard.up("Shift")
+    assert numbers(editor, "Position") != moved
+    after = handle(editor, "move").bounding_box()
+    assert place is not None
+    assert after is not None
+    assert abs(after["x"] - place["x"]) < 1
+    assert abs(after["y"] - place["y"]) < 1
+
+    editor.page.keyboard.press("Control+z")
+    assert numbers(editor, "Position") == moved
+    editor.page.keyboard.press("Control+z")
+    assert numbers(editor, "Position") == start
+    assert changed(before, editor.pixels()) < 0.005  # the handle has the focus now
+
+
+def test_keys_move_and_aim_a_light(editor: Editor) -> None:
+    add_by_click(editor, "Panel")
+    position, direction = numbers(editor, "Position"), numbers(editor, "Direction")
+    before = handle(editor, "move").bounding_box()
+    handle(editor, "move").press("ArrowRight")
+    after = handle(editor, "move").bounding_box()
+    assert before is not None
+    assert after is not None
+    assert 5 < after["x"] - before["x"] < 7
+    assert numbers(editor, "Position") != position
+    assert numbers(editor, "Direction") == direction
+    handle(editor, "aim").press("ArrowUp")
+    assert numbers(editor, "Direction") != direction
+    expect(handle(editor, "aim")).to_have_attribute("aria-label", re.compile("Panel, aims at"))
+    handle(editor, "aim").press("Delete")
+    expect(editor.page.locator(".light")).to_have_count(0)
+
+
+def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
+    page = editor.page
+    dark = editor.pixels()
+    add_by_click(editor, "Point")
+    lit = editor.pixels()
+    page.get_by_role("button", name="Point: switch off").click()
+    assert changed(dark, editor.pixels()) < 0.01
+    page.get_by_role("button", name="Point: switch on").click()
+    assert changed(lit, editor.pixels()) < 0.01
+
+    steps = page.locator(".tile.step").count()
+    page.get_by_role("button", name="Point alone").click()
+    page.get_by_role("button", name="Only the light of Point").wait_for()
+    alone = editor.pixels()
+    assert changed(lit, alone) > 0.2
+    page.get_by_role("button", name="Environment alone").click()
+    assert changed(dark, editor.pixels()) < 0.01
+    page.get_by_role("button", name="Only the light of the environment").click()
+    assert changed(lit, editor.pixels()) < 0.01
+    assert page.locator(".tile.step").count() == steps
+
+
+def test_numbers_place_a_light_and_escape_leaves_them(editor: Editor) -> None:
+    add_by_click(editor, "Spot")
+    x = editor.page.get_by_role("textbox", name="Position, x")
+    start = numbers(editor, "Position")
+    x.fill("7")
+    x.press("Escape")
+    expect(x).not_to_be_focused()
+    assert numbers(editor, "Position") == start
+    x.fill("0.25")
+    x.press("Enter")
+    assert numbers(editor, "Position") == [0.25, *start[1:]]
+    x.press("ArrowUp")
+    np.testing.assert_allclose(numbers(editor, "Position")[0], 0.26, atol=1e-6)

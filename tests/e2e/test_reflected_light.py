@@ -1,0 +1,65 @@
+"""Reflected light in a browser: baked by way of the dialogue, and seen by paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from editor_page import WAIT_MS, Editor, changed
+from editor_server import Server
+from playwright.sync_api import Browser, Page, expect
+from tiny_scenes import still_life
+
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import register_scene
+
+
+@pytest.fixture
+def start_page(tmp_path: Path, browser: Browser) -> Iterator[Page]:
+    """The start page of a server with a scene that nobody has baked."""
+    ledger = Ledger(open_database(f"sqlite:///{tmp_path / 'relume.db'}"))
+    register_scene(tmp_path, ledger, still_life())
+    ledger.close()
+    server = Server(tmp_path)
+    server.start()
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(server.url)
+    yield page
+    page.close()
+    server.kill()
+
+
+def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: Page) -> None:
+    page, editor = start_page, Editor(start_page)
+    page.get_by_role("button", name="Bake…").click()
+    plan = page.locator(".presets .plan").first
+    expect(plan).to_contain_text("rays", timeout=WAIT_MS)
+    direct = plan.inner_text()
+    page.get_by_role("radio", name="With reflected light").check()
+    expect(plan).not_to_have_text(direct)
+    expect(plan).to_contain_text("rays")
+    page.get_by_role("checkbox", name="left").uncheck()
+    page.get_by_role("button", name="Open and bake").first.click()
+    editor.wait_until_exact()
+    expect(page.get_by_role("button", name="reflected ▾")).to_be_visible()
+
+    everything = editor.pixels()
+    paths = page.get_by_role("radiogroup", name="Light paths")
+    paths.get_by_role("radio", name="First bounce").click()
+    assert changed(everything, editor.pixels()) > 0.5
+    paths.get_by_role("radio", name="First bounce").press("ArrowLeft")
+    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    direct_alone = editor.pixels()
+    assert direct_alone.mean() < everything.mean()
+    page.get_by_role("button", name="Only direct light").click()
+    assert changed(everything, editor.pixels()) == 0
+
+    bounces = page.get_by_role("slider", name="Bounces")
+    bounces.press("Home")
+    expect(bounces).to_have_attribute("aria-valuenow", "0")
+    assert changed(direct_alone, editor.pixels()) < 0.01
+    bounces.press("ArrowRight")
+    expect(bounces).to_have_attribute("aria-valuenow", "1")
+    expect(page.get_by_role("button", name="At most 1 bounce")).to_be_visible()
