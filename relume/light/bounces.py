@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.light.triangles import TriangleLights
-from relume.parallel import for_ranges
+from relume.parallel import for_ranges, for_shares
 from relume.trace.cell_tree import NO_CELL
 
 F32 = NDArray[np.float32]
 
-_POINTS_A_RANGE, _CELLS_A_RANGE = 2048, 512
+_POINTS_A_RANGE = 2048
+_ROUGH_BOUNCES = 6  # a thousandth of the light in a Cornell box is wrong then
+_LARGEST_SHARE = 0.999
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
@@ -51,18 +53,17 @@ def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _bounce(links, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
-    share = 1.0 / links.shape[1]
+    """radiance: four channels, so that a cell's are added at once; black in row `NO_CELL`."""
+    share = np.float32(1 / links.shape[1])
+    total = np.empty(4, np.float32)
     for cell in range(start, stop):
-        red = green = blue = 0.0
+        total[:] = 0
         for ray in range(links.shape[1]):
-            seen = links[cell, ray]
-            if seen != NO_CELL:
-                red += radiance[seen, 0]
-                green += radiance[seen, 1]
-                blue += radiance[seen, 2]
-        out[cell, 0] = reflectance[cell, 0] * red * share
-        out[cell, 1] = reflectance[cell, 1] * green * share
-        out[cell, 2] = reflectance[cell, 2] * blue * share
+            seen = radiance[links[cell, ray]]
+            for channel in range(4):
+                total[channel] += seen[channel]
+        for channel in range(3):
+            out[cell, channel] = reflectance[cell, channel] * total[channel] * share
 
 
 def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
@@ -75,7 +76,9 @@ def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
     Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.
     """
     out = np.empty_like(radiance)
-    for_ranges(lambda start, stop: _bounce(links, reflectance, radiance, start, stop, out), len(links), _CELLS_A_RANGE)
+    padded = np.zeros((NO_CELL + 1, 4), np.float32)
+    padded[: len(radiance), :3] = radiance
+    for_shares(lambda start, stop: _bounce(links, reflectance, padded, start, stop, out), len(links))
     return out
 
 
@@ -90,4 +93,20 @@ def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounce
     for _ in range(num_bounces):
         radiance = bounce(links, reflectance, radiance)
         total += radiance
+    return total.astype(np.float32)
+
+
+def bounced_roughly(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
+    """`bounced` for a moving hand: after a few bounces, as if each left the same share of the one before.
+
+    The bounces are a power iteration: their shape settles soon, and then only their size changes.
+    """
+    first = min(num_bounces, _ROUGH_BOUNCES)
+    total, radiance, before = direct.astype(np.float64), direct, direct
+    for _ in range(first):
+        radiance, before = bounce(links, reflectance, radiance), radiance
+        total += radiance
+    size, size_before = (np.sqrt(np.square(a, dtype=np.float64).sum(axis=0)) for a in (radiance, before))
+    share = np.minimum(size / np.maximum(size_before, 1e-30), _LARGEST_SHARE)
+    total += radiance * (share * (1 - share ** (num_bounces - first)) / (1 - share))
     return total.astype(np.float32)

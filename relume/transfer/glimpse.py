@@ -155,7 +155,7 @@ class Glimpse:
             _Part(material, image, image.term, image.target)
             for material in images.by_name.values()
             for image in material.terms
-            if material.num_samples
+            if material.num_samples and not image.is_followed()
         ]
         return cls((images.transfer.key, images.view.name, images.light), images, images.light, parts)
 
@@ -181,7 +181,8 @@ class Glimpse:
     def adopt(self, made: Sequence[F32]) -> None:
         """Show them where there is nothing better, also where the hand has turned the light further meanwhile."""
         for part, image in zip(self.parts, made, strict=True):
-            if part.image.effective is None and any(part.image is known for known in part.material.terms):
+            is_lacking = part.image.effective is None and not part.image.is_followed()
+            if is_lacking and any(part.image is known for known in part.material.terms):
                 part.image.glimpse(image)
 
 

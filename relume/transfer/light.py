@@ -56,6 +56,12 @@ def emission_of(light: Light, material: str) -> Rgb:
     return red, green, blue
 
 
+def is_same_but_for_reflections(before: Light, after: Light) -> bool:
+    """Whether only light between surfaces differs, if any does."""
+    alike = before._replace(reflectances=after.reflectances, paths=after.paths) == after
+    return alike and before.paths.direct == after.paths.direct
+
+
 def light_of(look: Look, material_names: Sequence[str], *, has_cells: bool) -> Light:
     """The light of a look.
 

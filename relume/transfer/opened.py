@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from relume.transfer.derived import DerivedImages
 from relume.transfer.gathered import CellLight
 from relume.transfer.light import Light
 from relume.transfer.local import LocalLights
+from relume.transfer.reflected import Reflected
 from relume.transfer.stored import read_cells, read_lights, read_tiles
 from relume.transfer.view import View, open_view
 
@@ -50,7 +50,6 @@ class Transfer:
     material_names: Sequence[str]
     cells: CellLight | None
     views: dict[str, View]
-    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @cached_property
     def derived(self) -> DerivedImages:
@@ -104,28 +103,27 @@ class Transfer:
     def _weighed(self) -> Callable[[EnvironmentKey], TriangleLights]:
         return lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: weigh(self._tiles, self.radiance_of(key.map), key.rotation))
 
-    def reflected_in(self, light: Light) -> NDArray[np.float32] | None:
-        """Radiance of the gather cells; None where they send nothing to the picture."""
-        if not light.paths.reflect:
-            return None
-        with self._lock:
-            return self._reflected(light)
-
     @cached_property
-    def _reflected(self) -> Callable[[Light], NDArray[np.float32]]:
+    def reflected(self) -> Reflected | None:
+        """Light that gather cells send out; None where it was not baked."""
         cells = self.cells
-        assert cells is not None
+        if cells is None:
+            return None
         of_environment = lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: cells.irradiance(self.lights_in(key)))
 
-        def radiance(light: Light) -> NDArray[np.float32]:
+        def irradiance(light: Light) -> NDArray[np.float32]:
             arriving = np.zeros((cells.num_cells, 3), np.float32)
             if light.is_environment_lit:
                 arriving += np.array(light.environment_gain, np.float32) * of_environment(light.environment)
             for geometry, gain in light.local:
                 arriving += np.array(gain, np.float32) * self.local.irradiance(geometry)[:, None]
-            return cells.radiance(arriving, light.reflectances, light.paths.first, light.paths.last)
+            return arriving
 
-        return lru_cache(maxsize=_LIGHTS_KEPT)(radiance)
+        return Reflected(cells, irradiance)
+
+    def reflected_in(self, light: Light) -> NDArray[np.float32] | None:
+        """Radiance of the gather cells; None where they send nothing to the picture."""
+        return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
 
     def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
         """Radiance of a view's samples of an environment. (n, 3) float32"""

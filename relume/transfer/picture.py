@@ -14,15 +14,14 @@ from relume.errors import ParameterError
 from relume.look import EnvironmentKey, Look
 from relume.look.model import Rgb
 from relume.transfer.cache import FrozenCache
-from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
+from relume.transfer.following import RowsNeed
+from relume.transfer.glimpse import Glimpse
 from relume.transfer.light import gain_of
+from relume.transfer.light_mode import LightMode
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import (
-    ROTATION,
     CurvePointer,
-    EnvironmentPointer,
-    LightPointer,
     ParameterPointer,
     moved_parameter,
     parse_curve,
@@ -67,15 +66,14 @@ class Picture:
         self._background: tuple[EnvironmentKey, Rgb] | None = None
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
-        self._is_turning = self._lacks_glimpse = False
+        self._light_mode = LightMode(self._images)
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
         before, images = self._images.light, self._images
         is_shown = any(t.effective is not None or t.is_glimpse for m in images.by_name.values() for t in m.terms)
         images.set_look(look)
-        if images.light != before:
-            self._lacks_glimpse = (is_shown or self._lacks_glimpse) and can_glimpse(images)
+        self._light_mode.follow_look(before, was_shown=is_shown)
         if (images.light.environment, images.light.local) != (before.environment, before.local):
             self._touched = None  # the hand has moved on to a light
         self._moved = moved_parameter(self._look, look)
@@ -91,13 +89,12 @@ class Picture:
             MemoryBudgetError: its operator is larger than the cache may be.
         """
         touched = parse_pointer(pointer)
-        self._is_turning = touched == ROTATION
-        if isinstance(touched, LightPointer | EnvironmentPointer):
-            return
-        check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
-        self._touched = touched
+        self._light_mode.hold(touched)
+        if isinstance(touched, CurvePointer | ParameterPointer):
+            check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
+            self._touched = touched
 
-    def waiting(self) -> Need | Glimpse | None:
+    def waiting(self) -> Need | RowsNeed | Glimpse | None:
         """What must be made next, for the look or for what was touched; None where nothing is lacking.
 
         The picture may be advanced meanwhile: all that does not depend on it follows the look.
@@ -105,16 +102,13 @@ class Picture:
         Raises:
             MemoryBudgetError: something that the look lacks is larger than the cache may be.
         """
-        images = self._images
-        if self._lacks_glimpse or (self._is_turning and can_glimpse(images) and not is_prepared(images)):
-            return Glimpse.of(images)
-        return next_need(images, Hand(self._find(self._touched), self._find(self._moved)))
+        of_light = self._light_mode.next_need()
+        return of_light or next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
 
-    def adopt(self, need: Need | Glimpse, made: Any) -> None:
+    def adopt(self, need: Need | RowsNeed | Glimpse, made: Any) -> None:
         """Go on with what a need has made, unless the look has moved on to where it is of no use."""
-        if isinstance(need, Glimpse):
-            need.adopt(made)
-            self._lacks_glimpse = self._lacks_glimpse and need.light != self._images.light
+        if not isinstance(need, Need):
+            self._light_mode.adopt(need, made)
             return
         image = need.image
         if not any(image is known for known in need.material.terms) or image.kind != need.kind:
@@ -143,6 +137,7 @@ class Picture:
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
         images = self._images
+        self._light_mode.step()
         for material in images.by_name.values():
             for term in material.changed_terms():
                 frozen = images.operator(material, term)

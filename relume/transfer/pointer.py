@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from relume.errors import ParameterError
 from relume.look import Look
-from relume.look.model import EnvironmentLook
+from relume.look.model import EnvironmentLook, TransportLook
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,28 @@ class ParameterPointer(_TermPointer):
 
 
 @dataclass(frozen=True)
+class ColorPointer:
+    """The colour or texture of a term of a look: what share of light it reflects."""
+
+    material: str
+    term: int
+    field: str
+
+    def __str__(self) -> str:
+        return f"/materials/{_escaped(self.material)}/terms/{self.term}/{self.field}"
+
+
+@dataclass(frozen=True)
+class TransportPointer:
+    """A field of a look's transport."""
+
+    field: str
+
+    def __str__(self) -> str:
+        return f"/transport/{self.field}"
+
+
+@dataclass(frozen=True)
 class LightPointer:
     """A light of a look."""
 
@@ -56,13 +78,15 @@ class EnvironmentPointer:
         return f"/environment/{self.field}"
 
 
-Pointer = CurvePointer | ParameterPointer | LightPointer | EnvironmentPointer
+Pointer = CurvePointer | ParameterPointer | ColorPointer | TransportPointer | LightPointer | EnvironmentPointer
 
 ROTATION = EnvironmentPointer("rotation")
 _KINDS: dict[str, type[CurvePointer] | type[ParameterPointer]] = {"curves": CurvePointer, "params": ParameterPointer}
 _TERM = re.compile(
     r"/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9][0-9]{0,2})/(?P<group>curves|params)/(?P<name>[a-z_0-9]+)"
 )
+_COLOR = re.compile(r"/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9][0-9]{0,2})/(?P<field>color|texture)")
+_TRANSPORT = re.compile(rf"/transport/(?P<field>{'|'.join(TransportLook.model_fields)})")
 _LIGHT = re.compile(r"/lights/(?P<name>[^/]+)")
 _ENVIRONMENT = re.compile(rf"/environment/(?P<field>{'|'.join(EnvironmentLook.model_fields)})")
 
@@ -75,6 +99,10 @@ def parse_pointer(pointer: str) -> Pointer:
     """
     if term := _TERM.fullmatch(pointer):
         return _KINDS[term["group"]](_unescaped(term["material"]), int(term["term"]), term["name"])
+    if color := _COLOR.fullmatch(pointer):
+        return ColorPointer(_unescaped(color["material"]), int(color["term"]), color["field"])
+    if transport := _TRANSPORT.fullmatch(pointer):
+        return TransportPointer(transport["field"])
     if light := _LIGHT.fullmatch(pointer):
         return LightPointer(_unescaped(light["name"]))
     if environment := _ENVIRONMENT.fullmatch(pointer):
@@ -82,7 +110,7 @@ def parse_pointer(pointer: str) -> Pointer:
     raise ParameterError(
         "pointer",
         pointer,
-        "like /materials/NAME/terms/0/curves/theta_h, …/params/ior, /lights/NAME or /environment/rotation",
+        "like /materials/NAME/terms/0/curves/theta_h, …/params/ior, …/color, /lights/NAME or /environment/rotation",
     )
 
 

@@ -113,6 +113,42 @@ def _spread(settings, setting_of, band, weight, num, out):  # type: ignore[no-un
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _contract(  # type: ignore[no-untyped-def]
+    begin, end, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active, gamma, band, weight
+):
+    """Weigh rays [begin, end) of a point by all its curves but the free one and those with several settings.
+
+    Writes band (curves, ≥ rays) and weight (3, ≥ rays).
+    """
+    num, blue_row = end - begin, shading.shape[0] - 1
+    for channel in range(3):
+        weight[channel, :num] = power[channel, begin:end] * shading[blue_row * channel // 2, begin:end]
+    for k in range(kinds.shape[0]):
+        scale = np.float32(num_bands[k] / (math.pi / 2))
+        angles_into(
+            kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
+            axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
+        )  # fmt: skip
+        for n in range(num):
+            band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
+        if k != active and setting_of[k] < 0:
+            _multiply(bands[k], num_rows[k], band[k], weight, num)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def weigh_rays(first, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, setting_of, out):  # type: ignore[no-untyped-def]
+    """What each listed ray brings to its point, all curves contracted; arguments as of `project_rays`. out: (3, K)"""
+    most = np.diff(first).max()
+    gamma, band = np.empty(most, np.float32), np.empty((kinds.shape[0], most), np.int64)
+    for p in range(first.shape[0] - 1):
+        if first[p + 1] > first[p]:
+            _contract(
+                first[p], first[p + 1], wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, setting_of,
+                -1, gamma, band, out[:, first[p] : first[p + 1]],
+            )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_rays(  # type: ignore[no-untyped-def]
     first, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
 ):
@@ -123,27 +159,18 @@ def project_rays(  # type: ignore[no-untyped-def]
         shading: quotients, one row for all channels, or three. (1 or 3, K)
         out: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
     """
-    num_curves, blue_row = kinds.shape[0], shading.shape[0] - 1
     most = np.diff(first[: out.shape[0] + 1]).max()
     gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
-    band = np.zeros((num_curves, most), np.int64)
+    band = np.zeros((kinds.shape[0], most), np.int64)
     for p in range(out.shape[0]):
         begin, end = first[p], first[p + 1]
         num = end - begin
         if num == 0:
             continue
-        for channel in range(3):
-            weight[channel, :num] = power[channel, begin:end] * shading[blue_row * channel // 2, begin:end]
-        for k in range(num_curves):
-            scale = np.float32(num_bands[k] / (math.pi / 2))
-            angles_into(
-                kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
-                axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
-            )  # fmt: skip
-            for n in range(num):
-                band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
-            if k != active and setting_of[k] < 0:
-                _multiply(bands[k], num_rows[k], band[k], weight, num)
+        _contract(
+            begin, end, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
+            gamma, band, weight,
+        )  # fmt: skip
         if active >= 0:
             for n in range(num):
                 for channel in range(3):

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.transfer.contraction import Contraction
-from relume.transfer.ray_kernel import project_rays
-from relume.transfer.receivers import Listed, Receivers
+from relume.transfer.ray_kernel import project_rays, weigh_rays
+from relume.transfer.receivers import Listed, Rays, Receivers
 
 F32 = NDArray[np.float32]
 
@@ -31,11 +31,29 @@ class RayProjector:
 
     def add(self, start: int, stop: int, out: F32) -> None:
         """Add points [start, stop) to `out`, laid out as `project_rays` has it."""
-        c, listed = self._contraction, self._listed
+        c = self._contraction
         for rays in self._rays:
-            num = rays.list_into(listed, self._points, start, stop)
-            shading = self._term.quotients(*listed.wi[:, :num], *listed.wo[:, :num])
+            shading = self._list(rays, start, stop)
             project_rays(
-                *listed, shading,
+                *self._listed, shading,
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.active, out,
             )  # fmt: skip
+
+    def weigh(self, start: int, stop: int) -> F32:
+        """What each ray of points [start, stop) brings, all curves contracted; of all kinds of rays. (3, rays)"""
+        c, found = self._contraction, []
+        for rays in self._rays:
+            shading = self._list(rays, start, stop)
+            found.append(np.empty((3, shading.shape[1]), np.float32))
+            listed = self._listed
+            weigh_rays(
+                listed.first[: stop - start + 1], listed.wi, listed.wo, listed.power, shading,
+                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.setting_of, found[-1],
+            )  # fmt: skip
+        return np.concatenate(found, axis=1)
+
+    def _list(self, rays: Rays, start: int, stop: int) -> F32:
+        """List rays of points; returns the term's quotients. (1 or 3, rays)"""
+        listed = self._listed
+        num = rays.list_into(listed, self._points, start, stop)
+        return np.asarray(self._term.quotients(*listed.wi[:, :num], *listed.wo[:, :num]))

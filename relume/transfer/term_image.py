@@ -8,6 +8,7 @@ parameter, whose few coefficients say curves only nearly, a step sums all of the
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,26 @@ from relume.brdf.registry import TERMS
 from relume.errors import EditError
 from relume.transfer.along import Along
 from relume.transfer.frozen import Frozen, tiles_of
+from relume.transfer.rows import Rows
 from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Base:
+    """What a term showed in the light before, from where changes of light are followed.
+
+    Attributes:
+        light: of the image. bands: of each curve, (3, J). image, is_near: as of `TermImage`.
+    """
+
+    light: Any
+    bands: dict[str, F64]
+    image: F32
+    is_near: bool
 
 
 class TermImage:
@@ -33,9 +49,10 @@ class TermImage:
         effective: those that `image` shows; None where it shows nothing.
         is_near: it shows them only as closely as the nodes of a parameter can say them.
         is_glimpse: `image` is a rough one, of this light or of the one before.
+        base: the last image that was shaded, where that was in another light. followed: light to which it was brought.
         active: what the operator in use leaves free. shown: its coefficients in `image`, (3, columns).
-        term: the declaration of the term's model, fixed parameters put in. kind: what tells it from
-            others, the light included.
+        term: the declaration of the term's model, fixed parameters put in. model: what tells it from others.
+        kind: the same and the light.
         image: Σ_j c_j T_j, before colour, texture and outgoing curves. (tiles, 3, samples) float32
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1.
     """
@@ -48,40 +65,70 @@ class TermImage:
         self.active: Along | None = None
         self.is_near = self.is_glimpse = False
         self.shown: F64 | None = None
+        self.base: Base | None = None
+        self.followed: Hashable = None
         self.is_composed = False
+        self.model: Hashable = None
         self.kind: Hashable = None
         self.set_document(document)
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
-        model: str = document["model"]
-        kind = (model, TERMS[model].fixed_values(document), self._light)
-        if kind != self.kind:
+        declared = TERMS[document["model"]]
+        model = document["model"], declared.fixed_values(document)
+        if model != self.model:
+            self.base = None
+        if (model, self._light) != self.kind:
             self.effective = self.active = self.shown = None
             self.is_near = False
         elif self.active is not None and not self.active.holds_for(document):
             self.active = self.shown = None
-        self.kind = kind
+        self.model, self.kind = model, (model, self._light)
         self.document = document
-        self.term = TERMS[model].settled(document)
+        self.term = declared.settled(document)
         self.target = {curve.name: curve_bands(document, curve) for curve in self.term.curves if not curve.outgoing}
         self.outgoing = self._outgoing()
         self.is_composed = False
 
     def set_light(self, light: Hashable) -> None:
         """Other light: what the image shows counts for nothing, but stands until there is a new one."""
+        if self.effective is not None:
+            self.base = Base(self._light, self.effective, self.image.copy(), self.is_near)
         self._light = light
         self.set_document(self.document)
+        base = self.base
+        if base is not None and base.light == light:  # as before, after all
+            self.show(Shaded(base.image), base.bands)
+            self.is_near = base.is_near
 
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
         """Go on from an image of these curves, which may have been the target some time ago."""
         self.image[:] = shaded.image
-        self.effective = dict(bands)
+        self.effective, self.base, self.followed = dict(bands), None, None
         self.is_near = self.is_glimpse = self.is_composed = False
 
     def glimpse(self, image: F32) -> None:
         """Show a rough image, of no curves in particular, until there is a better one."""
+        self.followed = None
         self.image[:] = image
+        self.is_glimpse, self.is_composed = True, False
+
+    def can_follow(self) -> bool:
+        """Whether all that the image lacks is a change of light."""
+        base = self.base
+        return base is not None and self.effective is None and not self._differing(base.bands)
+
+    def is_followed(self) -> bool:
+        """Whether it shows its look but for what rows leave out."""
+        return self.can_follow() and self.followed == self._light
+
+    def follow(self, rows: Rows, change: F32) -> None:
+        """Show the base and what rows make of the change of light since; see `Rows.add`."""
+        if self.base is None:
+            raise EditError("the term has no image to go on from; shade it first")
+        self.image[:] = self.base.image
+        rows.add(change, self.image)
+        self.followed = self._light
         self.is_glimpse, self.is_composed = True, False
 
     def _outgoing(self) -> F32 | None:
@@ -93,9 +140,10 @@ class TermImage:
 
     def differing(self) -> list[str]:
         """Curves whose target the image does not show."""
-        if self.effective is None:
-            return list(self.target)
-        return [name for name, bands in self.target.items() if not np.array_equal(bands, self.effective[name])]
+        return list(self.target) if self.effective is None else self._differing(self.effective)
+
+    def _differing(self, shown: Mapping[str, F64]) -> list[str]:
+        return [name for name, bands in self.target.items() if not np.array_equal(bands, shown[name])]
 
     def is_exact(self) -> bool:
         """Whether the image shows the target."""
@@ -159,4 +207,5 @@ class TermImage:
         stream(frozen.transport, columns_of(self.shown), self.image)
         self.is_near = not active.is_complete
         self.is_glimpse = self.is_composed = False
+        self.base = self.followed = None
         return self.shown.size

@@ -9,10 +9,12 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve
 from relume.errors import ParameterError
 from relume.transfer.pointer import (
+    ColorPointer,
     CurvePointer,
     EnvironmentPointer,
     LightPointer,
     ParameterPointer,
+    TransportPointer,
     parse_curve,
     parse_pointer,
 )
@@ -38,9 +40,11 @@ def check_held(pointer: str, document: Mapping[str, Any]) -> None:
         case ParameterPointer() as parameter:
             term = _term(parameter, document)
             is_there = term is not None and parameter.name in {p.name for p in TERMS[term["model"]].parameters}
+        case ColorPointer(material, term_index):
+            is_there = term_index < len(document["materials"].get(material, {"terms": ()})["terms"])
         case LightPointer(name):
             is_there = name in document["lights"]
-        case EnvironmentPointer():
+        case EnvironmentPointer() | TransportPointer():
             is_there = True
         case CurvePointer():
             is_there = False

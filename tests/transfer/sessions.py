@@ -9,8 +9,18 @@ from analytic_terms import ANALYTIC
 
 from relume.brdf.registry import TERMS
 from relume.look import validate
+from relume.store import bake_here
+from relume.transfer.base import Recipe
+from relume.transfer.opened import open_transfer
+from relume.transfer.registry import METHODS
 
 BUDGET = 1 << 28
+
+
+def bake_corner(scene, method, folder):
+    """Its view "front" in 40×30 under 400 lights, opened."""
+    recipe = Recipe(method, ("front",), (40, 30), 400)
+    return open_transfer(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"))
 
 
 def look_of(transfer, change=lambda document: None):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import twins
 from analytic_terms import ANALYTIC
-from sessions import BUDGET, look_of, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of
+from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
+from tiny_scenes import scene_of
 
 from relume.brdf.albedo import diffuse_reflectance, reflectances_of
 from relume.brdf.curves import curve_bands
@@ -19,21 +19,17 @@ from relume.look import validate
 from relume.reference import Points, texels_of
 from relume.reference.indirect import reference_indirect
 from relume.scene.model import Material
-from relume.store import bake_here
 from relume.trace.cell_tree import NO_CELL
 from relume.trace.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
 from relume.trace.geometry import merge
-from relume.transfer.base import Recipe
 from relume.transfer.cache import FrozenCache
 from relume.transfer.contraction import contract
 from relume.transfer.gathered import CellLight
 from relume.transfer.glimpse import Glimpse
 from relume.transfer.light import light_of
-from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
 from relume.transfer.projector import Projector
 from relume.transfer.receivers import GatherRays, Receivers
-from relume.transfer.registry import METHODS
 from relume.transfer.render import render_image
 from relume.transfer.thinned import thinned
 
@@ -179,34 +175,6 @@ def test_reflectance_of_diffuse_terms():
     assert reflectances_of([lambert, glossy]) == reflectances_of([lambert])
 
 
-@pytest.fixture(scope="module")
-def corner():
-    """A white floor between a red wall and a glossy one, which throw light onto it."""
-    glossy = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 30.0}}
-    materials = [
-        Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]}, glossy)),
-        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
-        Material("Blue", ({"model": "oren_nayar", "color": [0.1, 0.2, 0.8], "params": {}},)),
-    ]
-    floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    red = quad("red", [[-1, 0, 1], [-1, 0, -1], [-1, 1.5, -1], [-1, 1.5, 1]], 1, tangent=(0, 1, 0))
-    blue = quad("blue", [[-1, 0, -1], [1, 0, -1], [1, 1.5, -1], [-1, 1.5, -1]], 2)
-    sky = np.full((16, 32, 3), 0.3, np.float32)
-    sky[2:5, 16:20] = 30
-    camera = looking("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
-    return scene_of(floor, red, blue, camera=camera, environment=sky, materials=materials)
-
-
-def baked(scene, method, folder, size=(40, 30)):
-    path = bake_here(METHODS[method], scene, Recipe(method, ("front",), size, 400), folder / f"{method}.zarr")
-    return open_transfer(path)
-
-
-@pytest.fixture(scope="module")
-def gathered(corner, tmp_path_factory):
-    return baked(corner, "gather", tmp_path_factory.mktemp("corner"))
-
-
 def default_look(transfer):
     return validate(transfer.default_look, transfer.default_look)
 
@@ -254,7 +222,7 @@ def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp
     other = scene_of(
         *corner.meshes, camera=corner.cameras[0], environment=corner.environment.radiance, materials=materials
     )
-    green_bake = baked(other, "gather", tmp_path)
+    green_bake = bake_corner(other, "gather", tmp_path)
     expected = render_image(green_bake, "front", default_look(green_bake))
     before = render_image(gathered, "front", default_look(gathered))
     assert np.abs(edited - before).mean() > 0.05 * before.mean()
@@ -269,7 +237,7 @@ def test_without_reflection_a_picture_is_the_direct_one(corner, gathered, tmp_pa
         for material in document["materials"].values():
             material["terms"][0]["color"] = [0.0, 0.0, 0.0]
 
-    direct = baked(corner, "direct", tmp_path)
+    direct = bake_corner(corner, "direct", tmp_path)
     expected = render_image(direct, "front", look_of(direct, black))
     np.testing.assert_allclose(render_image(gathered, "front", look_of(gathered, black)), expected, rtol=1e-5)
     brighter = render_image(gathered, "front", default_look(gathered)) - render_image(
@@ -298,7 +266,7 @@ def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
 def test_bounces_are_counted_from_direct_light(corner, gathered, tmp_path):
     direct = showing(gathered, "direct")
     np.testing.assert_array_equal(showing(gathered, "all", 0), direct)
-    other = baked(corner, "direct", tmp_path)
+    other = bake_corner(corner, "direct", tmp_path)
     np.testing.assert_array_equal(direct, render_image(other, "front", default_look(other)))
     one = showing(gathered, "all", 1)
     np.testing.assert_allclose(one - direct, showing(gathered, "first_bounce"), atol=2e-5)
@@ -310,10 +278,10 @@ def test_bounces_are_counted_from_direct_light(corner, gathered, tmp_path):
 
 
 def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
-    """From direct light alone, glimpsed before there are rays in it, to all light."""
+    """From reflected light alone, glimpsed before there is any other, to all light."""
     monkeypatch.setattr("relume.transfer.glimpse._MOST_SHADED", 300)
     picture = Picture(gathered, "front", FrozenCache(BUDGET))
-    for show in ("direct", "all", "further_bounces"):
+    for show in ("first_bounce", "all", "direct"):
 
         def change(document, show=show):
             document["transport"]["show"] = show
@@ -327,7 +295,7 @@ def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
             picture.advance(None)
             glimpse = picture.image()
             exact = settle(picture).image()
-            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "direct"), exact)
+            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
         np.testing.assert_array_equal(settle(picture).image(), showing(gathered, show))
 
 
@@ -339,13 +307,14 @@ def test_a_thinned_bake_has_the_same_light(gathered):
     np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
 
 
-def test_other_reflected_light_is_glimpsed_before_it_is_shaded(gathered, monkeypatch):
+def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
     monkeypatch.setattr("relume.transfer.glimpse._MOST_SHADED", 300)
-    picture, document = settle(Picture(gathered, "front", FrozenCache(BUDGET))), copy.deepcopy(gathered.default_look)
-    for material in document["materials"].values():
-        for term in material["terms"]:
-            term["color"] = [0.1, 0.7, 0.2]
-    picture.set_look(validate(document, gathered.default_look))
+    picture = settle(Picture(gathered, "front", FrozenCache(BUDGET)))
+
+    def turn(document):
+        document["environment"]["rotation"] = 90.0
+
+    picture.set_look(look_of(gathered, turn))
     picture.advance(None)
     still, need = picture.image(), picture.waiting()
     assert isinstance(need, Glimpse)

@@ -1,0 +1,145 @@
+"""Changed light between surfaces, followed at once: image + rows · ΔL, for every term of a picture.
+
+Where a hand drags a diffuse colour or the number of bounces, all that changes of light is what gather cells send out.
+The rows of all terms are made when such a thing is touched or first edited; from then on each frame shows the image
+that was shaded last and what the change brings. It is never called exact: at rest all is shaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.haar import haar
+from relume.brdf.term import Term
+from relume.transfer.light import Light, is_same_but_for_reflections
+from relume.transfer.material_image import MaterialImage
+from relume.transfer.rows import Rows, expected_light, freeze_rows, num_channels, rows_bytes
+from relume.transfer.term_image import TermImage
+from relume.transfer.view_images import ViewImages
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class RowsNeed:
+    """A need of the rows of one term; made like a `Need`, and found in the cache from then on.
+
+    Attributes:
+        what: in words. key: its name in the cache. light: like which they are to serve.
+    """
+
+    what: str
+    key: tuple[Hashable, ...]
+    images: ViewImages
+    material: int
+    term: Term
+    bands: Mapping[str, NDArray[np.float64]]
+    light: Light
+    num_bytes: int
+
+    state: Literal["freezing"] = "freezing"
+    refines = False
+
+    def make(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rows:
+        """Freeze, unless the cache has them.
+
+        Args:
+            progress: called with the share done. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        return self.images.cache.get(self.key, Rows, self.num_bytes, lambda: self._frozen(progress, cancelled))
+
+    def _frozen(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rows:
+        reflected = self.images.transfer.reflected
+        assert reflected is not None
+        radiance, view = reflected.roughly_under(self.light), self.images.view
+        points, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material, radiance)
+        expected = expected_light(radiance[: reflected.num_cells])
+        return freeze_rows(self.term, self.bands, points, rays, expected, progress, cancelled)
+
+
+class Follower:
+    """Keeps the terms of one view near their look while the light between surfaces changes."""
+
+    def __init__(self, images: ViewImages) -> None:
+        self._images = images
+        self._is_wanted = False
+
+    def prepare(self) -> None:
+        """A hand is on something that changes what surfaces reflect onto each other."""
+        self._is_wanted = self._images.transfer.reflected is not None and self._has_room()
+
+    def follow_look(self, before: Light) -> None:
+        """The look has changed, and with it perhaps the light, which was this before."""
+        self._is_wanted = False
+        if before != self._images.light and is_same_but_for_reflections(before, self._images.light):
+            self.prepare()
+
+    def follows_all(self) -> bool:
+        """Whether every term shows its look already, or will, roughly, as soon as there are rows."""
+        shows = (image.effective is not None or image.can_follow() for _, image in self._terms())
+        return self._is_wanted and all(shows)
+
+    def next_need(self) -> RowsNeed | None:
+        """The next rows to be made, those of few samples first; None where there are all, or none are wanted."""
+        if not self._is_wanted:
+            return None
+        lacking = [(m, t) for m, t in self._terms() if self._rows(m, t) is None]
+        return self._need(*min(lacking, key=lambda item: item[0].num_samples)) if lacking else None
+
+    def step(self) -> None:
+        """Bring all terms that can be to the light as it is now."""
+        light = self._images.light
+        changes: dict[Light, F32] = {}
+        for material, image in self._terms():
+            base = image.base
+            if base is None or not image.can_follow() or not is_same_but_for_reflections(base.light, light):
+                continue
+            rows = self._rows(material, image)
+            if rows is not None and not image.is_followed():
+                if base.light not in changes:
+                    changes[base.light] = self._change(base.light, light)
+                image.follow(rows, changes[base.light])
+
+    def _change(self, before: Light, after: Light) -> F32:
+        """Haar coefficients of what cells send out more. (padded cells, 3) float32"""
+        reflected = self._images.transfer.reflected
+        assert reflected is not None
+        change = reflected.roughly_under(after) - reflected.roughly_under(before)
+        return haar(change[: reflected.num_cells]).astype(np.float32)
+
+    def _terms(self) -> Iterator[tuple[MaterialImage, TermImage]]:
+        materials = self._images.by_name.values()
+        return ((material, image) for material in materials if material.num_samples for image in material.terms)
+
+    def _has_room(self) -> bool:
+        """Whether the cache has room for all rows beside other things."""
+        needed = sum(rows_bytes(m.num_samples, num_channels(t.term, t.target)) for m, t in self._terms())
+        return 2 * needed <= self._images.cache.budget_bytes
+
+    def _key(self, material: MaterialImage, image: TermImage) -> tuple[Hashable, ...]:
+        bands = (image.target[name].astype(np.float32).tobytes() for name in sorted(image.target))
+        images = self._images
+        return images.transfer.key, images.view.name, material.index, "rows", image.model, *bands
+
+    def _rows(self, material: MaterialImage, image: TermImage) -> Rows | None:
+        return self._images.cache.find(self._key(material, image), Rows)
+
+    def _need(self, material: MaterialImage, image: TermImage) -> RowsNeed:
+        images = self._images
+        return RowsNeed(
+            what=f"{images.transfer.material_names[material.index]}, reflected light",
+            key=self._key(material, image),
+            images=images,
+            material=material.index,
+            term=image.term,
+            bands=image.target,
+            light=images.light,
+            num_bytes=rows_bytes(material.num_samples, num_channels(image.term, image.target)),
+        )

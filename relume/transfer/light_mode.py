@@ -1,0 +1,60 @@
+"""How a picture keeps up with light that changes while a hand moves: followed where rows can, else glimpsed.
+
+Both are rough and never called exact; at rest every term is shaded in the light as it is then.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from relume.transfer.following import Follower, RowsNeed
+from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
+from relume.transfer.light import Light
+from relume.transfer.pointer import ROTATION, ColorPointer, Pointer, TransportPointer
+from relume.transfer.view_images import ViewImages
+
+
+class LightMode:
+    """Of one view."""
+
+    def __init__(self, images: ViewImages) -> None:
+        self._images, self._follower = images, Follower(images)
+        self._is_turning = self._lacks_glimpse = False
+
+    def hold(self, pointer: Pointer) -> None:
+        """A hand takes hold of something that may change the light."""
+        self._is_turning = pointer == ROTATION
+        if isinstance(pointer, ColorPointer | TransportPointer):
+            self._follower.prepare()
+
+    def follow_look(self, before: Light, *, was_shown: bool) -> None:
+        """The images have a new look.
+
+        Args:
+            before: the light until now. was_shown: whether the picture showed anything then.
+        """
+        images = self._images
+        self._follower.follow_look(before)
+        if images.light != before:
+            is_wanted = (was_shown or self._lacks_glimpse) and can_glimpse(images)
+            self._lacks_glimpse = is_wanted and not self._follower.follows_all()
+
+    def next_need(self) -> RowsNeed | Glimpse | None:
+        """What must be made next for light to be followed or glimpsed."""
+        rows = self._follower.next_need()
+        if rows is not None:
+            return rows
+        images = self._images
+        if self._lacks_glimpse or (self._is_turning and can_glimpse(images) and not is_prepared(images)):
+            return Glimpse.of(images)
+        return None
+
+    def adopt(self, need: RowsNeed | Glimpse, made: Any) -> None:
+        """Show what a need has made."""
+        if isinstance(need, Glimpse):
+            need.adopt(made)
+            self._lacks_glimpse = self._lacks_glimpse and need.light != self._images.light
+
+    def step(self) -> None:
+        """Bring all terms that can be followed to the light as it is now."""
+        self._follower.step()

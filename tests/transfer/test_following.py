@@ -1,0 +1,160 @@
+"""Colours and bounces dragged in a picture with light between surfaces: near at once, exact at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
+
+from relume.transfer.cache import FrozenCache
+from relume.transfer.following import RowsNeed
+from relume.transfer.glimpse import Glimpse
+from relume.transfer.need import Need
+from relume.transfer.picture import Picture
+from relume.transfer.render import render_image
+
+RED = "/materials/Red/terms/0/color"
+
+
+def colored(transfer, color, **transport):
+    """The look with another colour of the red wall."""
+
+    def change(document):
+        document["materials"]["Red"]["terms"][0]["color"] = list(color)
+        document["transport"].update(transport)
+
+    return look_of(transfer, change)
+
+
+def make(picture):
+    """Make what waits, whatever it is; returns it."""
+    need = picture.waiting()
+    picture.adopt(need, need.make(lambda share: None, lambda: False))
+    return need
+
+
+@pytest.fixture
+def prepared(gathered):
+    """An exact picture whose red wall somebody is about to colour."""
+    picture = settle(Picture(gathered, "front", FrozenCache(BUDGET)))
+    picture.touch(RED)
+    needs = []
+    while picture.waiting() is not None:
+        needs.append(make(picture))
+    assert len(needs) == 4  # one of each term
+    assert all(isinstance(need, RowsNeed) for need in needs)
+    assert picture.advance(None).exact
+    return picture
+
+
+def test_colour_bleeding_follows_a_dragged_colour(gathered, prepared):
+    before = prepared.image()
+    for blue in (0.2, 0.5, 0.8):
+        look = colored(gathered, [0.1, 0.1, blue])
+        prepared.set_look(look)
+        assert not prepared.advance(32).exact
+        exact = render_image(gathered, "front", look)
+        assert relative_rmse(prepared.image(), exact) < 0.01
+        assert relative_rmse(before, exact) > 0.1
+        need = prepared.waiting()
+        assert isinstance(need, Need)
+        assert need.refines  # it waits until the hand rests
+
+
+def test_at_rest_a_followed_picture_is_a_fresh_one(gathered, prepared):
+    prepared.set_look(colored(gathered, [0.3, 0.2, 0.5]))
+    prepared.advance(32)
+    last = colored(gathered, [0.1, 0.7, 0.2])
+    prepared.set_look(last)
+    prepared.advance(32)
+    np.testing.assert_array_equal(settle(prepared).image(), render_image(gathered, "front", last))
+
+
+def test_undo_is_exact_at_once(gathered, prepared):
+    before = prepared.image()
+    prepared.set_look(colored(gathered, [0.1, 0.7, 0.2]))
+    prepared.advance(32)
+    assert not np.array_equal(prepared.image(), before)
+    prepared.set_look(look_of(gathered))
+    assert prepared.advance(32).exact
+    assert prepared.waiting() is None
+    np.testing.assert_array_equal(prepared.image(), before)
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 3])
+def test_bounces_follow(gathered, prepared, bounces):
+    look = colored(gathered, [0.8, 0.1, 0.1], bounces=bounces)
+    prepared.set_look(look)
+    assert not prepared.advance(32).exact
+    exact = render_image(gathered, "front", look)
+    assert relative_rmse(prepared.image(), exact) < 0.01
+    np.testing.assert_array_equal(settle(prepared).image(), exact)
+
+
+def test_from_no_bounces_reflected_light_comes_in(gathered):
+    """Rows are frozen while there is no reflected light to judge coefficients by."""
+    picture = Picture(gathered, "front", FrozenCache(BUDGET))
+    picture.set_look(colored(gathered, [0.8, 0.1, 0.1], bounces=0))
+    still = settle(picture).image()
+    look = look_of(gathered)
+    picture.set_look(look)
+    while isinstance(picture.waiting(), RowsNeed):
+        make(picture)
+    picture.advance(32)
+    exact = render_image(gathered, "front", look)
+    assert relative_rmse(picture.image(), exact) < 0.2 * relative_rmse(still, exact)
+
+
+def test_the_first_edit_freezes_rows_and_each_term_follows_with_its_own(gathered):
+    picture = settle(Picture(gathered, "front", FrozenCache(BUDGET)))
+    look = colored(gathered, [0.1, 0.1, 0.8])
+    picture.set_look(look)
+    picture.advance(32)
+    exact, errors = render_image(gathered, "front", look), []
+    while isinstance(picture.waiting(), RowsNeed):
+        errors.append(relative_rmse(picture.image(), exact))
+        make(picture)
+        picture.advance(32)
+    errors.append(relative_rmse(picture.image(), exact))
+    assert len(errors) == 5
+    assert errors[-1] < 0.01 < errors[0]
+
+
+def test_all_black_surfaces_are_followed_to_direct_light(gathered, prepared):
+    def black(document):
+        for material in document["materials"].values():
+            material["terms"][0]["color"] = [0.0, 0.0, 0.0]
+
+    look = look_of(gathered, black)
+    prepared.set_look(look)
+    prepared.advance(32)
+    assert relative_rmse(prepared.image(), render_image(gathered, "front", look)) < 0.02
+
+
+def test_a_diffuse_curve_is_not_followed_by_rows_of_another(gathered, prepared):
+    """The wall's own term is shaded anew; what it throws onto the others follows."""
+
+    def draw(document):
+        document["materials"]["Blue"]["terms"][0]["params"]["sigma"] = 0.9
+
+    look = look_of(gathered, draw)
+    prepared.set_look(look)
+    prepared.advance(32)
+    np.testing.assert_array_equal(settle(prepared).image(), render_image(gathered, "front", look))
+
+
+def test_where_the_cache_has_no_room_light_is_glimpsed(gathered):
+    picture = settle(Picture(gathered, "front", FrozenCache(300_000)))
+    picture.set_look(colored(gathered, [0.1, 0.1, 0.8]))
+    picture.advance(32)
+    assert isinstance(picture.waiting(), Glimpse)
+
+
+def test_a_direct_bake_has_nothing_to_follow(corner, tmp_path):
+    direct = bake_corner(corner, "direct", tmp_path)
+    picture = settle(Picture(direct, "front", FrozenCache(BUDGET)))
+    picture.touch(RED)
+    assert picture.waiting() is None
+    picture.set_look(colored(direct, [0.1, 0.1, 0.8], bounces=2))
+    assert picture.advance(32).exact
+    assert picture.waiting() is None
