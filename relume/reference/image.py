@@ -15,6 +15,7 @@ from relume.light.environment import lookup, turned
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.reference.indirect import reference_indirect
+from relume.reference.local import emission_of, lamps_of
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import texels_of
 from relume.scene.model import Scene
@@ -43,12 +44,12 @@ def reference_image(
     *,
     reflects: bool = False,
 ) -> F32:
-    """Render a look under the environment's light, with shadows, by the light paths that its `transport` names.
+    """Render a look under all its lights, with shadows, by the light paths that its `transport` names.
 
     Args:
         size: width and height in pixels.
-        spp: texels of the environment for each view sample, drawn by power with a fixed seed; 0, or as many as the
-            map has, for every texel.
+        spp: texels of the environment for each view sample, drawn by power with a fixed seed, and places of each local
+            light that has an extent; 0, or as many as the map has, for every texel.
         progress: called with the share done. cancelled: asked now and then.
         pass_index: pictures with other indices draw independently.
         reflects: whether there is light between surfaces, as method `gather` has it; one path for every
@@ -64,10 +65,11 @@ def reference_image(
     geometry = merge(scene)
     samples = sample_view(scene, geometry, view, size)
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
-    texels = texels_of(light, look.environment.rotation)
+    texels, lamps = texels_of(light, look.environment.rotation).times(look.environment.gain), lamps_of(scene, look)
     paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
     camera = next(camera for camera in scene.cameras if camera.name == view)
-    points = points_of(samples, camera.to_world[:3, 3])
+    eye = camera.to_world[:3, 3]
+    points = points_of(samples, eye)
     radiance = np.zeros((len(samples.pixel), 3))
     straight = _STRAIGHT_SHARE if paths.reflect else 1.0
     bounds = np.searchsorted(samples.material, np.arange(len(scene.materials) + 1))
@@ -79,8 +81,11 @@ def reference_image(
             progress(straight * (before + share * (rows.stop - rows.start)) / max(1, int(bounds[-1])))
 
         radiance[rows] = reference_radiance(
-            geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled, pass_index
+            geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled, pass_index, lamps
         )[0]  # fmt: skip
+        if (emission := emission_of(lamps, material.name)).any():
+            front = geometry.is_front(eye.astype(np.float32), points.position[rows])
+            radiance[rows] += emission * (front | material.double_sided)[:, None]
     if paths.reflect:
         on_surface = slice(0, int(bounds[-1]))
         truth = partial(reference_indirect, scene, geometry, texels, look)
@@ -91,8 +96,8 @@ def reference_image(
     if paths.direct:
         outside = samples.material == BACKGROUND
         towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
-        radiance[outside] = lookup(light.radiance, towards.astype(np.float32))
-    return _resolve(samples, np.array(look.environment.gain) * radiance, size)
+        radiance[outside] = np.array(look.environment.gain) * lookup(light.radiance, towards.astype(np.float32))
+    return _resolve(samples, radiance, size)
 
 
 def _reflected(

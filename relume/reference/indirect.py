@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relume.brdf.albedo import is_diffuse
 from relume.brdf.evaluate import eval_brdf
 from relume.look import Look
+from relume.reference.local import lamps_of
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels
 from relume.scene.model import Scene
@@ -50,6 +51,7 @@ def reference_indirect(
     """Radiance of points by light that surfaces have reflected onto them, `first_bounce` to `num_bounces` times.
 
     Args:
+        texels: of the environment, its gain in the look included.
         points: seen from one direction each. material: index into the scene's materials. (n,)
         num_paths: for each point. spp: texels drawn for each place that a path visits.
     Returns:
@@ -58,6 +60,7 @@ def reference_indirect(
     """
     terms: list[Terms] = [look.materials[m.name].terms for m in scene.materials]
     diffuse: list[Terms] = [list(filter(is_diffuse, of_material)) for of_material in terms]
+    lamps = lamps_of(scene, look)
     total, squares = np.zeros((2, points.num_points, 3))
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
@@ -79,7 +82,7 @@ def reference_indirect(
                 at = np.nonzero(of == index)[0]
                 drawn = (seed * num_paths + path) * _MOST_BOUNCES + bounce
                 arriving[at] = reference_radiance(
-                    geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn
+                    geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn, lamps=lamps
                 )[0]  # fmt: skip
             np.add.at(found, rows, weight * arriving)
         total += found

@@ -1,4 +1,5 @@
-"""Outgoing radiance of points by brute force: R = Σ_texels V · L ΔΩ · f(ωi, ωo) cos θi, f the sum of a look's terms."""
+"""Outgoing radiance of points by brute force: R = Σ V · L ΔΩ · f(ωi, ωo) cos θi over texels and places of local lights,
+f the sum of a look's terms."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.parallel import for_steps
 from relume.reference.kernel import add_lights, list_visible
+from relume.reference.local import Arriving, LocalLamp
 from relume.reference.texels import Texels
 from relume.trace.geometry import Geometry
 from relume.trace.visibility import trace_visibility
@@ -26,6 +28,7 @@ Document = Mapping[str, Any]
 _STEPS = 1 << 16  # linear between them, the narrowest highlight (σ = 0.005) is off by less than 1e-5 of its peak
 _POINTS_A_PACKET = 16  # neighbours that Embree traces together; where texels are drawn, they share the draw
 _TEXELS_AT_ONCE = 8192
+_MOST_OF_LAMP = 4096  # places of a local light, where every texel is asked for
 _SEED = 2006
 
 
@@ -98,12 +101,14 @@ def reference_radiance(
     progress: Callable[[float], object] = lambda share: None,
     cancelled: Callable[[], bool] = lambda: False,
     pass_index: int = 0,
+    lamps: Sequence[LocalLamp] = (),
 ) -> F64:
     """Radiance of all points under several materials, which share their shadow rays.
 
     Args:
         materials: of each its terms, as they stand in a complete look.
-        spp: texels drawn by power for each point; 0, or as many as there are, for all of them.
+        spp: texels drawn by power for each point, and places drawn of each lamp that has an extent; 0, or as many as
+            there are, for all texels.
         pass_index: passes with other indices draw independently.
     Returns:
         (materials, n, 3) float64
@@ -122,6 +127,10 @@ def reference_radiance(
         for first in range(0, lights.num_texels, _TEXELS_AT_ONCE):
             rows = slice(first, first + _TEXELS_AT_ONCE)
             _add_texels(geometry, lights.direction[rows], lights.power[rows], some, tables, radiance[:, start:stop])
+        rng = np.random.default_rng((_SEED, pass_index, start, 1))
+        for lamp in lamps:
+            arriving = lamp.arriving(geometry, some.position.astype(np.float64), spp or _MOST_OF_LAMP, rng)
+            _add_lamp(arriving, some, tables, radiance[:, start:stop])
 
     for_steps(packet, points.num_points, _POINTS_A_PACKET, progress, cancelled, "the reference")
     return radiance
@@ -133,23 +142,43 @@ def _add_texels(
     """Add the light of some texels to a packet of points. out: (materials, points, 3)"""
     towards = np.ascontiguousarray(direction, np.float32)
     visible = trace_visibility(geometry.embree, points.position, points.normal, towards).visible
+    for p in range(points.num_points):
+        _add_lights(points, p, direction, power, visible[p], tables, out[:, p])
+
+
+def _add_lamp(arriving: Arriving, points: Points, tables: Sequence[Sequence[_Tables]], out: F64) -> None:
+    """Add the light of a lamp to a packet of points. out: (materials, points, 3)"""
+    visible = np.packbits(arriving.power.any(axis=2), axis=1, bitorder="little")
+    for p in range(points.num_points):
+        _add_lights(points, p, arriving.direction[p], arriving.power[p], visible[p], tables, out[:, p])
+
+
+def _add_lights(
+    points: Points,
+    p: int,
+    direction: F64,
+    power: F64,
+    visible: NDArray[np.uint8],
+    tables: Sequence[Sequence[_Tables]],
+    out: F64,
+) -> None:
+    """Add light from directions (m, 3) to one point. power: (m, 3). visible: bits. out: (materials, 3)"""
     wi, light = np.empty((3, len(direction))), np.empty(len(direction), np.int64)
-    frames = np.stack([points.normal, points.tangent, points.wo], axis=1).astype(np.float64)
-    frames /= np.linalg.norm(frames, axis=2, keepdims=True)
-    for p, (normal, tangent, wo) in enumerate(frames):
-        num, ox, oy, oz = list_visible(normal, tangent, wo, visible[p], direction, wi, light)
-        if num == 0:
-            continue
-        x, y, z = wi[:, :num]
-        for m, terms in enumerate(tables):
-            for table in terms:
-                shading = table.term.quotients(x, y, z, ox, oy, oz) * z
-                total = np.zeros(3)
-                add_lights(
-                    table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,
-                    light, num, wi, ox, oy, oz, shading, power, total,
-                )  # fmt: skip
-                out[m, p] += total * _factor(table, points, p, oz)
+    frame = np.stack([points.normal[p], points.tangent[p], points.wo[p]]).astype(np.float64)
+    normal, tangent, wo = frame / np.linalg.norm(frame, axis=1, keepdims=True)
+    num, ox, oy, oz = list_visible(normal, tangent, wo, visible, direction, wi, light)
+    if num == 0:
+        return
+    x, y, z = wi[:, :num]
+    for m, terms in enumerate(tables):
+        for table in terms:
+            shading = table.term.quotients(x, y, z, ox, oy, oz) * z
+            total = np.zeros(3)
+            add_lights(
+                table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,
+                light, num, wi, ox, oy, oz, shading, power, total,
+            )  # fmt: skip
+            out[m] += total * _factor(table, points, p, oz)
 
 
 def _factor(table: _Tables, points: Points, p: int, cos_theta_o: float) -> F64:

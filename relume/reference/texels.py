@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,12 @@ class Texels:
     def num_texels(self) -> int:
         """m."""
         return len(self.direction)
+
+    def times(self, gain: tuple[float, float, float]) -> Texels:
+        """Every channel multiplied; none of them where nothing is left."""
+        if not any(gain):
+            return Texels(self.direction[:0], self.power[:0], self.share[:0])
+        return replace(self, power=self.power * np.array(gain))
 
     def chosen(self, num_samples: int, rng: np.random.Generator) -> Texels:
         """About `num_samples` texels drawn by luminance, one a stratum; their power is divided by how often each is

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from relume.errors import SceneError
 from relume.scene.model import Scene
 from relume.trace.embree import EmbreeScene
+from relume.trace.primary import trace_from
 
 F32 = NDArray[np.float32]
 
@@ -36,11 +37,25 @@ class Geometry:
     embree: EmbreeScene
     epsilon: float
 
+    def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
+        """Which points on surfaces (n, 3) are seen from a place (3,) on their outer side."""
+        return is_front(self.embree, self.positions, self.faces, eye, points)
+
 
 def off_surface(positions: F32) -> float:
     """How far ray origins are moved off surfaces with these corners (n, 3), metres."""
     # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
+
+
+def is_front(
+    embree: EmbreeScene, positions: F32, faces: NDArray[np.uint32], eye: F32, points: F32
+) -> NDArray[np.bool_]:
+    """Which points (n, 3) on these triangles are seen from a place (3,) on their outer side."""
+    directions = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
+    face = trace_from(embree, eye, directions.astype(np.float32)).face
+    a, b, c = positions[faces[np.maximum(face, 0)]].transpose(1, 0, 2)
+    return np.asarray(np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) < 0)
 
 
 def merge(scene: Scene) -> Geometry:

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import off_surface
+from relume.trace.geometry import is_front, off_surface
 from relume.trace.local_shadows import arriving, trace_local
-from relume.trace.primary import trace_from
 from relume.transfer.base import StoreReader
 from relume.transfer.light import Light
 from relume.transfer.receivers import LocalRays
@@ -117,11 +116,7 @@ class LocalLights:
         """Whether points (n, 3) of a material that shines are seen from a side that does."""
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)
-        directions = position - eye
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        face = trace_from(self._embree, eye, directions).face
-        a, b, c = self._positions[self._faces[np.maximum(face, 0)]].transpose(1, 0, 2)
-        return np.asarray(np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) < 0)
+        return is_front(self._embree, self._positions, self._faces, eye, position)
 
     def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
         light, pattern = self._light(geometry), pattern_of(geometry, num_samples)

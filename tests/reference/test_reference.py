@@ -12,12 +12,13 @@ from relume.errors import CancelledError, PlanError
 from relume.light.environment import texel_directions, texel_solid_angles, uv_to_direction
 from relume.look import default_look, validate
 from relume.reference import Points, reference_image, reference_radiance, texels_of
-from relume.scene.model import Environment, Material
+from relume.scene.archive import make_scene
+from relume.scene.model import Environment, Light, Material, Scene
 from relume.store import bake_here
 from relume.trace.geometry import merge
 from relume.transfer.base import Recipe
 from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import open_transfer
+from relume.transfer.opened import Transfer, open_transfer
 from relume.transfer.render import render_image
 
 WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
@@ -194,3 +195,39 @@ def test_black_texels_are_left_out() -> None:
     radiance = np.zeros((8, 16, 3), np.float32)
     radiance[2, 3] = [0, 0, 1]
     assert texels_of(Environment("one", radiance)).num_texels == 1
+
+
+LIGHTS: dict[str, dict[str, object]] = {
+    "point": {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [3.0, 2.0, 1.0]},
+    "spot": {"kind": "spot", "position": [0.2, 1.9, 1.3], "direction": [0, -1, -0.7], "emission": [9.0, 5.0, 5.0]},
+    "directional": {"kind": "directional", "direction": [-1, -2, -1], "emission": [2.0, 2.0, 2.0]},
+    "rectangle": {
+        "kind": "rectangle", "position": [-1.0, 1.5, 1.0], "direction": [1, -1, -1], "rotation": 25.0,
+        "size": [0.9, 0.4], "emission": [5.0, 5.0, 5.0],
+    },
+    "mesh": {"kind": "mesh", "material": "Wall", "emission": [1.0, 0.7, 0.4]},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Transfer]:
+    """The still life, its wall a lamp."""
+    parts = still_life()
+    wall = Light("mesh", LIGHTS["mesh"])
+    scene = make_scene("lit", parts.meshes, parts.materials, parts.cameras, parts.environment, lights=[wall])
+    folder = tmp_path_factory.mktemp("lit")
+    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 500), folder / "store.zarr")
+    return scene, open_transfer(store)
+
+
+@pytest.mark.parametrize("kind", LIGHTS)
+def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, Transfer], kind: str) -> None:
+    scene, transfer = lit_bake
+    lights = {"mesh": {"on": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
+    look = validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
+    frame = render_image(transfer, "front", look)
+    truth = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
+    assert truth.mean() > 0.01
+    assert frame.mean() == pytest.approx(truth.mean(), rel=0.01)
+    # curves in bands and 64 samples; the wall touches the floor, and few samples of it are near
+    assert relative_rmse(frame, truth) < {"rectangle": 0.03, "mesh": 0.1}.get(kind, 0.02)
