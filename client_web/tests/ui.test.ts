@@ -65,6 +65,12 @@ describe("numbers", () => {
 });
 
 describe("colours", () => {
+  test("the picker shows the hue of a quantity, however small, and keeps its size", () => {
+    expect(toHex([0.02, 0.01, 0], 0)).toBe(toHex([1, 0.5, 0]));
+    expect(fromHex("#ffffff", [0.02, 0.01, 0], 0)).toEqual([0.02, 0.02, 0.02]);
+    expect(toHex([0, 0, 0], 0)).toBe("#000000");
+  });
+
   test("the picker keeps a colour's strength", () => {
     const strong: Rgb = [4, 2, 1];
     expect(strength(strong)).toBe(4);

@@ -65,3 +65,16 @@ def test_a_dropped_file_lights_the_scene_and_others_are_refused_in_words(editor:
     page.evaluate(DROP, ["dusk.exr", base64.b64encode(dusk_file.read_bytes()).decode()])
     expect(page.get_by_role("radio", name="dusk")).to_be_checked()
     assert changed(before, editor.pixels()) > 0.5
+
+
+def test_an_imported_environment_is_deleted_after_a_question(editor: Editor, dusk_file: Path) -> None:
+    page = editor.page
+    before = editor.pixels()
+    page.get_by_label("Environment file").set_input_files(dusk_file)
+    chosen = page.get_by_role("radio", name="dusk")
+    expect(chosen).to_be_checked()
+    page.get_by_role("button", name="Delete the environment dusk").click()
+    expect(chosen).to_be_checked()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    expect(chosen).to_have_count(0)
+    assert changed(before, editor.pixels()) < 0.01

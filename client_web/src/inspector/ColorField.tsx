@@ -8,13 +8,16 @@ interface Props {
   label: string;
   value: Rgb;
   initial: Rgb | null;
+  /** The picker chooses the hue of a quantity, whose size it keeps; else a share of what there is. */
+  quantity?: boolean;
   onChange(value: Rgb): void;
 }
 
 const MAXIMUM = 1e4;
 const CHANNELS = ["red", "green", "blue"] as const;
 
-export function ColorField({ label, value, initial, onChange }: Props) {
+export function ColorField({ label, value, initial, quantity = false, onChange }: Props) {
+  const least = quantity ? 0 : 1;
   const changed = initial !== null && value.some((v, i) => v !== initial[i]);
   return (
     <div class="color">
@@ -22,8 +25,8 @@ export function ColorField({ label, value, initial, onChange }: Props) {
         type="color"
         aria-label={`${label}: pick`}
         title="Pick a colour"
-        value={toHex(value)}
-        onInput={(event) => onChange(fromHex(event.currentTarget.value, value))}
+        value={toHex(value, least)}
+        onInput={(event) => onChange(fromHex(event.currentTarget.value, value, least))}
       />
       {CHANNELS.map((name, channel) => (
         <label key={name} class={`channel ${name}`}>

@@ -2,13 +2,13 @@
 import { srgbDecode, srgbEncode } from "../picture/tonemap";
 import type { Rgb } from "../protocol";
 
-/** What a colour above 1 is divided by before it fits the picker. */
-export function strength(color: Rgb): number {
-  return Math.max(1, ...color);
+/** What a colour is divided by before it fits the picker: one above 1; a quantity, whose `least` is 0, always fills it. */
+export function strength(color: Rgb, least = 1): number {
+  return Math.max(least, ...color) || 1;
 }
 
-export function toHex(color: Rgb): string {
-  const scale = strength(color);
+export function toHex(color: Rgb, least = 1): string {
+  const scale = strength(color, least);
   return `#${color
     .map((v) =>
       Math.round(255 * srgbEncode(v / scale))
@@ -19,8 +19,8 @@ export function toHex(color: Rgb): string {
 }
 
 /** The picked colour at the old one's strength; six digits keep the document readable. */
-export function fromHex(hex: string, before: Rgb): Rgb {
-  const scale = strength(before);
+export function fromHex(hex: string, before: Rgb, least = 1): Rgb {
+  const scale = strength(before, least);
   const channel = (i: number) => srgbDecode(parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16) / 255) * scale;
   return [0, 1, 2].map((i) => Number(channel(i).toPrecision(6))) as Rgb;
 }

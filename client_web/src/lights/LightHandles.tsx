@@ -112,7 +112,7 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
       onFocus={take}
       onKeyDown={key}
     >
-      <i style={light.on ? { background: toHex(lit) } : undefined} />
+      <i style={light.on ? { background: toHex(lit, 0) } : undefined} />
     </button>
   );
 }

@@ -203,6 +203,7 @@ export function LightInspector({ name, light }: { name: string; light: Light }) 
         </span>
         <ColorField
           label="Emission"
+          quantity
           value={light.emission}
           initial={initial?.emission ?? null}
           onChange={(value) => editLight("Emission", name, "emission", value)}

@@ -73,6 +73,9 @@ export const materialAt = (f0: number, sigma: number) => get<Term[]>(`/api/mater
 export const materialThumbnail = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
 export const listEnvironments = () => get<EnvironmentBody[]>("/api/environments");
+export async function deleteEnvironment(id: string): Promise<void> {
+  await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
 /** The light that a bake's scene came with. */
 export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
 export const getBake = (id: string) => get<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);

@@ -7,6 +7,7 @@ import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
 import { defaultLook, look, soloLight } from "../state/store";
 import { IconButton } from "../ui/Button";
 import { Slider } from "../ui/Slider";
+import { imported, offerToDelete } from "./environments";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 
 export function EnvironmentPanel() {
@@ -35,6 +36,13 @@ export function EnvironmentPanel() {
           pressed={soloLight.value === ENVIRONMENT}
           onClick={() => toggleLightSolo(ENVIRONMENT)}
         />
+        {imported.value !== null && (
+          <IconButton
+            icon="trash"
+            label={`Delete the environment ${imported.value.name}`}
+            onClick={() => imported.value && offerToDelete(imported.value)}
+          />
+        )}
         <ImportEnvironment />
       </header>
       <EnvironmentGallery />

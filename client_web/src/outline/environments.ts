@@ -1,10 +1,11 @@
 /** The environments that a look may name: the list, choosing one, and importing a file. */
-import { signal } from "@preact/signals";
-import { listEnvironments } from "../net/api";
+import { computed, signal } from "@preact/signals";
+import { deleteEnvironment, listEnvironments } from "../net/api";
 import { uploadEnvironment } from "../net/upload";
 import type { EnvironmentBody } from "../protocol";
 import { isEnvironment } from "../start/files";
 import { edit } from "../state/edit";
+import { look } from "../state/store";
 import { attempt, note, showError } from "../ui/toasts";
 
 export const environments = signal<EnvironmentBody[]>([]);
@@ -21,6 +22,24 @@ export async function loadEnvironments(): Promise<void> {
 export function choose(map: string | null): void {
   const name = environments.value.find((entry) => entry.map === map)?.name ?? "the scene's own";
   edit(`Environment · ${name}`, "/environment/map", map);
+}
+
+/** The environment that lights the scene, where it is one that was imported. */
+export const imported = computed(
+  () => environments.value.find(({ map, created }) => created !== null && map === look.value?.environment.map) ?? null,
+);
+
+/** Delete an imported environment once that was confirmed; the scene has its own light again. */
+export function offerToDelete({ id, name }: EnvironmentBody): void {
+  note(`Delete the environment “${name}”? Looks that name it cannot be shown any more, and this cannot be undone.`, {
+    label: "Delete",
+    run: () =>
+      void attempt(async () => {
+        choose(null);
+        await deleteEnvironment(id);
+        await loadEnvironments();
+      }),
+  });
 }
 
 /** Of dropped or chosen files, the first that is an environment. */
