@@ -50,6 +50,11 @@ def bsdf(diffuse: Sequence[float], glossy: Sequence[float] = (0.0, 0.0, 0.0), ex
     }  # fmt: skip
 
 
+def mitsuba_job(seen: Sequence[Any], beyond: Sequence[Any]) -> dict[str, Any]:
+    """What `bench.mitsuba.render` is to be told besides counts; arguments as of `reflected_by_mitsuba`."""
+    return {"seen": seen, "bsdfs": beyond, "bounces": MAX_BOUNCES, "finer": _FINER}
+
+
 def reflected_by_mitsuba(
     scene: Scene, size: tuple[int, int], seen: Sequence[Any], beyond: Sequence[Any], spp: int, folder: Path
 ) -> F32:
@@ -59,8 +64,7 @@ def reflected_by_mitsuba(
         seen, beyond: BSDFs of the meshes where the camera sees them, and further along paths.
         spp: of each half.
     """
-    job = {"spp": [spp], "passes": 2, "seen": seen, "bsdfs": beyond, "bounces": MAX_BOUNCES, "finer": _FINER}
-    render(scene, size, job, folder)
+    render(scene, size, {"spp": [spp], "passes": 2, **mitsuba_job(seen, beyond)}, folder)
     return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
 
 

@@ -1,7 +1,7 @@
 """Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
 
-python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json and picture.npy, or
-                                            passes.npy where the job asks for independent passes instead
+python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, passes.npy (the last
+                                            two pictures, or as many independent ones as the job asks for), picture.npy
 """
 
 from __future__ import annotations
@@ -102,6 +102,7 @@ def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) 
         error = np.sqrt(np.mean((one - other) ** 2) / 2) / scale
         found.append({"spp": spp, "seconds": taken_s, "error": float(error)})
     np.save(folder / "picture.npy", np.ascontiguousarray(picture[..., :3], np.float32))
+    np.save(folder / "passes.npy", np.array([one, other], np.float32)[..., :3])
     (folder / "result.json").write_text(json.dumps({"steps": found, "version": mi.__version__}))
 
 

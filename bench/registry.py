@@ -82,6 +82,7 @@ GROUPS = (
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
+    Group("bench.peer_gather", ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")),
 )
 
 

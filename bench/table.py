@@ -28,6 +28,8 @@ TARGETS = {
     "pca.blinn_phong_6": "≤ 1e-3",
     "pca.vectors": "≤ 12",
     "peer.mitsuba_time_ratio": "≥ 1000",
+    "peer.mitsuba_gather_time_ratio": "≥ 1000",
+    "peer.cycles_time_ratio": "≥ 1000",
     "bake.rays_vs_embreex": "≥ 3",
     "bake.wall_vs_rays": "≤ 1.3",
     "bake.teatray_s": "≤ 15 s",

@@ -1,0 +1,119 @@
+"""Renders a scene with Blender's Cycles at rising sample counts; run by the peer's own interpreter, knows no relume.
+
+python -I peer_cycles_render.py FOLDER     reads cycles.npz and cycles.json there, writes cycles_result.json and
+                                           picture.npy
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+bpy: Any = __import__("bpy")
+Matrix: Any = __import__("mathutils").Matrix
+
+Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from our Y up
+
+
+def material(index: int, colours: dict[str, Any]) -> Any:
+    """Diffuse and glossy together where the camera sees it, diffuse further along paths, as gather cells reflect."""
+    made = bpy.data.materials.new(f"material {index}")
+    tree = made.node_tree
+    tree.nodes.clear()
+    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (*colours["diffuse"], 1)
+    surface = diffuse.outputs[0]
+    if any(colours["glossy"]):
+        glossy, total, path, chosen = (
+            tree.nodes.new(f"ShaderNode{name}") for name in ("BsdfAnisotropic", "AddShader", "LightPath", "MixShader")
+        )
+        glossy.distribution = "BECKMANN"
+        glossy.inputs["Color"].default_value = (*colours["glossy"], 1)
+        glossy.inputs["Roughness"].default_value = colours["roughness"]
+        tree.links.new(surface, total.inputs[0])
+        tree.links.new(glossy.outputs[0], total.inputs[1])
+        tree.links.new(path.outputs["Is Camera Ray"], chosen.inputs[0])
+        tree.links.new(surface, chosen.inputs[1])
+        tree.links.new(total.outputs[0], chosen.inputs[2])
+        surface = chosen.outputs[0]
+    tree.links.new(surface, output.inputs["Surface"])
+    return made
+
+
+def environment(radiance: Any) -> None:
+    """Both maps have +X in their middle, and to its right our +Z, which is Blender's −Y; its rows go upward."""
+    height, width = radiance.shape[:2]
+    image = bpy.data.images.new("sky", width, height, float_buffer=True, is_data=True)
+    opaque = np.concatenate([radiance[::-1], np.ones((height, width, 1))], axis=2)
+    image.pixels.foreach_set(opaque.astype(np.float32).ravel())
+    world = bpy.data.worlds.new("world")
+    tree = world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    bpy.context.scene.world = world
+
+
+def load(folder: Path, job: dict[str, Any]) -> None:
+    """The scene."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    arrays, scene = np.load(folder / "cycles.npz", allow_pickle=False), bpy.context.scene
+    for k, colours in enumerate(job["materials"]):
+        mesh = bpy.data.meshes.new(f"mesh {k}")
+        mesh.from_pydata((arrays[f"positions_{k}"] @ Z_UP[:3, :3].T).tolist(), [], arrays[f"faces_{k}"].tolist())
+        mesh.materials.append(material(k, colours))
+        scene.collection.objects.link(bpy.data.objects.new(f"object {k}", mesh))
+    environment(arrays["environment"])
+    lens = bpy.data.cameras.new("camera")
+    lens.sensor_fit, lens.angle = "VERTICAL", job["yfov"]
+    camera = bpy.data.objects.new("camera", lens)
+    camera.matrix_world = Matrix((Z_UP @ arrays["camera"]).tolist())
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    render, cycles = scene.render, scene.cycles
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y = job["size"]
+    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+    cycles.device, cycles.use_adaptive_sampling, cycles.use_denoising = "CPU", False, False
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = job["bounces"]
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0
+    cycles.pixel_filter_type = "BOX"
+
+
+def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
+    """A picture (height, width, 3), and its seconds."""
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.seed = spp, seed
+    scene.render.filepath = str(folder / "cycles.exr")
+    began = time.perf_counter()
+    bpy.ops.render.render(write_still=True)
+    taken_s = time.perf_counter() - began
+    image = bpy.data.images.load(scene.render.filepath)
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    picture = pixels.reshape(image.size[1], image.size[0], 4)[::-1, :, :3].astype(np.float64)
+    bpy.data.images.remove(image)
+    return picture, taken_s
+
+
+def main(folder: Path) -> None:
+    """One job."""
+    job = json.loads((folder / "cycles.json").read_text())
+    load(folder, job)
+    found = []
+    render(folder, 1, 99)  # loads kernels
+    for spp in job["spp"]:
+        (one, first_s), (other, second_s) = (render(folder, spp, seed) for seed in (1, 2))
+        noise = float(np.sqrt(np.mean((one - other) ** 2) / 2))
+        found.append({"spp": spp, "seconds": (first_s + second_s) / 2, "noise": noise})
+    np.save(folder / "picture.npy", ((one + other) / 2).astype(np.float32))
+    (folder / "cycles_result.json").write_text(json.dumps({"steps": found, "version": bpy.app.version_string}))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
