@@ -40,6 +40,25 @@ class Light(NamedTuple):
         return any(self.environment_gain)
 
 
+def gains_of(light: Light) -> dict[Light, Rgb]:
+    """The gain of each source of a light by the light of that source alone, its gain 1."""
+    alone: dict[Light, Rgb] = {}
+    if light.is_environment_lit:
+        alone[light._replace(local=(), environment_gain=(1.0, 1.0, 1.0))] = light.environment_gain
+    for geometry, (red, green, blue) in light.local:
+        source = light._replace(local=(Source(geometry, (1.0, 1.0, 1.0)),), environment_gain=(0.0, 0.0, 0.0))
+        r, g, b = alone.get(source, (0.0, 0.0, 0.0))  # two lights in one place are one source
+        alone[source] = (r + red, g + green, b + blue)
+    return alone
+
+
+def is_same_but_for_gains(before: Light, after: Light) -> bool:
+    """Whether no light has moved; some may have been added or taken away."""
+    alike = before._replace(local=after.local, environment_gain=after.environment_gain) == after
+    here, there = ({geometry for geometry, _ in light.local} for light in (before, after))
+    return alike and (here <= there or there <= here)
+
+
 def gain_of(look: Look) -> Rgb:
     """What multiplies the finished picture: the environment's gain, where no light is beside it."""
     return (1.0, 1.0, 1.0) if _local(look) else look.environment.gain

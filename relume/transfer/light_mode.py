@@ -1,6 +1,7 @@
-"""How a picture keeps up with light that changes while a hand moves: followed where rows can, else glimpsed.
+"""How a picture keeps up with light that changes while a hand moves: mixed where only gains change, which is exact;
+followed where rows can, else glimpsed.
 
-Both are rough and never called exact; at rest every term is shaded in the light as it is then.
+The latter two are rough and never called exact; at rest every term is shaded in the light as it is then.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from typing import Any
 from relume.transfer.following import Follower, RowsNeed
 from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
 from relume.transfer.light import Light
+from relume.transfer.mixing import Mixer
+from relume.transfer.need import Need
 from relume.transfer.pointer import ROTATION, ColorPointer, Pointer, TransportPointer
 from relume.transfer.view_images import ViewImages
 
@@ -18,7 +21,7 @@ class LightMode:
     """Of one view."""
 
     def __init__(self, images: ViewImages) -> None:
-        self._images, self._follower = images, Follower(images)
+        self._images, self._follower, self._mixer = images, Follower(images), Mixer(images)
         self._is_turning = self._lacks_glimpse = False
 
     def hold(self, pointer: Pointer) -> None:
@@ -37,9 +40,9 @@ class LightMode:
         self._follower.follow_look(before)
         if images.light != before:
             is_wanted = (was_shown or self._lacks_glimpse) and can_glimpse(images)
-            self._lacks_glimpse = is_wanted and not self._follower.follows_all()
+            self._lacks_glimpse = is_wanted and not (self._follower.follows_all() or self._mixer.mixes_all())
 
-    def next_need(self) -> RowsNeed | Glimpse | None:
+    def next_need(self) -> RowsNeed | Glimpse | Need | None:
         """What must be made next for light to be followed or glimpsed."""
         rows = self._follower.next_need()
         if rows is not None:
@@ -47,7 +50,7 @@ class LightMode:
         images = self._images
         if self._lacks_glimpse or (self._is_turning and can_glimpse(images) and not is_prepared(images)):
             return Glimpse.of(images)
-        return None
+        return self._mixer.next_need()
 
     def adopt(self, need: RowsNeed | Glimpse, made: Any) -> None:
         """Show what a need has made."""
@@ -56,5 +59,6 @@ class LightMode:
             self._lacks_glimpse = self._lacks_glimpse and need.light != self._images.light
 
     def step(self) -> None:
-        """Bring all terms that can be followed to the light as it is now."""
+        """Bring all terms that can be mixed or followed to the light as it is now."""
+        self._mixer.step()
         self._follower.step()

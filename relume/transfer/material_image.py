@@ -29,7 +29,7 @@ class MaterialImage:
         self._light = light
         self.terms = [TermImage(document, self._cos_theta_o, light) for document in documents]
         self._emission = (0.0, 0.0, 0.0)
-        self._emitted: F32 | None = None
+        self._shines: F32 | None = None
         self._is_current = False
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
@@ -57,8 +57,8 @@ class MaterialImage:
         if emission == self._emission:
             return
         self._emission, self._is_current = emission, False
-        lit = shines(self.index) if any(emission) else np.zeros(self.num_samples, np.bool_)
-        self._emitted = np.outer(emission, lit).astype(np.float32)
+        if self._shines is None:
+            self._shines = shines(self.index).astype(np.float32)
 
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""
@@ -75,8 +75,8 @@ class MaterialImage:
         own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:
             own[:] = 0
-        if self._emitted is not None:
-            own += self._emitted
+        if self._shines is not None and any(self._emission):
+            own += np.outer(np.array(self._emission, np.float32), self._shines)
         self._is_current = True
         return True
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -211,6 +211,22 @@ def _need(images: ViewImages, candidate: Candidate, *, refines: bool) -> Need:
         active=along,
         num_bytes=candidate.num_bytes,
         light=images.light,
-        is_default=images.light == images.default_light and image.document in images.default.materials[name].terms,
+        is_default=_is_default(images, material, image, images.light),
         refines=refines,
     )
+
+
+def need_of_image(images: ViewImages, material: MaterialImage, image: TermImage, light: Light) -> Need:
+    """The image of a term's target in another light than the picture's."""
+    return replace(
+        _need(images, Candidate(material, image, None), refines=image.is_glimpse),
+        key=images.key_of_image(material, image, light),
+        kind=(image.model, light),
+        light=light,
+        is_default=_is_default(images, material, image, light),
+    )
+
+
+def _is_default(images: ViewImages, material: MaterialImage, image: TermImage, light: Light) -> bool:
+    name = images.transfer.material_names[material.index]
+    return light == images.default_light and image.document in images.default.materials[name].terms

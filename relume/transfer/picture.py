@@ -16,7 +16,7 @@ from relume.look.model import Rgb
 from relume.transfer.cache import FrozenCache
 from relume.transfer.following import RowsNeed
 from relume.transfer.glimpse import Glimpse
-from relume.transfer.light import gain_of
+from relume.transfer.light import Light, gain_of
 from relume.transfer.light_mode import LightMode
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
@@ -64,6 +64,7 @@ class Picture:
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
         self._background: tuple[EnvironmentKey, Rgb] | None = None
+        self._unit_background: tuple[EnvironmentKey | None, F32] = None, np.empty((0, 3), np.float32)
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
         self._light_mode = LightMode(self._images)
@@ -155,13 +156,17 @@ class Picture:
         background = (light.environment, light.environment_gain) if light.paths.direct else None
         if background != self._background or not np.array_equal(self._gain, gain):
             self._gain, self._background = np.array(gain), background
-            outside = self._radiance[:, self._view.num_surface_samples :]
-            outside[:] = 0
-            if light.paths.direct:
-                seen = self._transfer.background_in(light.environment, self._view)
-                outside[:] = (seen * np.array(light.environment_gain, np.float32)).T
+            self._radiance[:, self._view.num_surface_samples :] = self._outside(light).T
             tiles.update(self._view.all_tiles)
         return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
+
+    def _outside(self, light: Light) -> F32:
+        """Radiance of the samples of the background. (n, 3)"""
+        if not light.paths.direct:
+            return np.zeros((self._view.num_view_samples - self._view.num_surface_samples, 3), np.float32)
+        if self._unit_background[0] != light.environment:
+            self._unit_background = light.environment, self._transfer.background_in(light.environment, self._view)
+        return self._unit_background[1] * np.array(light.environment_gain, np.float32)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture."""

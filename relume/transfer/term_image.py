@@ -7,7 +7,7 @@ parameter, whose few coefficients say curves only nearly, a step sums all of the
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.errors import EditError
+from relume.look.model import Rgb
 from relume.transfer.along import Along
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.rows import Rows
@@ -113,6 +114,17 @@ class TermImage:
         self.image[:] = image
         self.is_glimpse, self.is_composed = True, False
 
+    def mix(self, parts: Sequence[tuple[F32, Rgb]], *, from_base: bool) -> None:
+        """Show the target in this light: the base or nothing, and images times gains of each channel."""
+        base = self.base
+        if base is None:
+            raise EditError("the term has no image to go on from; shade it first")
+        mixed = base.image if from_base else np.zeros_like(self.image)
+        for image, gain in parts:
+            mixed += np.array(gain, np.float32)[:, None] * image
+        self.show(Shaded(mixed), self.target)
+        self.is_near = from_base and base.is_near
+
     def can_follow(self) -> bool:
         """Whether all that the image lacks is a change of light."""
         base = self.base
@@ -152,12 +164,16 @@ class TermImage:
     def dormant_key(self, active: Along | None, *, of_target: bool) -> Hashable:
         """What a frozen operator, or an image where nothing is active, depends on besides view and material."""
         bands = self.target if of_target or self.effective is None else self.effective
+        return self._key(self.kind, active, bands)
+
+    def key_in(self, light: Hashable) -> Hashable:
+        """The same of its image of the target in some light."""
+        return self._key((self.model, light), None, self.target)
+
+    def _key(self, kind: Hashable, active: Along | None, bands: Mapping[str, F64]) -> Hashable:
         moved = () if active is None else active.moves
-        return (
-            self.kind,
-            active,
-            *(bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in moved),
-        )
+        rows = (bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in moved)
+        return kind, active, *rows
 
     def adopt(self, frozen: Frozen, active: Along) -> None:
         """Go on with an operator whose dormant curves are those of the target.

@@ -109,6 +109,10 @@ class ViewImages:
         """Name of an operator, or of an image where nothing is active, in the cache; the store comes first."""
         return self.transfer.key, self.view.name, material.index, term.dormant_key(active, of_target=of_target)
 
+    def key_of_image(self, material: MaterialImage, term: TermImage, light: Light) -> tuple[Hashable, ...]:
+        """Name of the image of a term's target in some light."""
+        return self.transfer.key, self.view.name, material.index, term.key_in(light)
+
     def operator(self, material: MaterialImage, term: TermImage) -> Frozen | None:
         """The operator that the term's image follows now, unless the cache has dropped it."""
         if term.active is None or term.effective is None:

@@ -1,0 +1,110 @@
+"""Lights brightened, tinted, switched and soloed: mixed from images of single sources, exactly, of few of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sessions import BUDGET, look_of, settle
+
+from relume.transfer.cache import FrozenCache
+from relume.transfer.glimpse import Glimpse
+from relume.transfer.picture import Picture
+from relume.transfer.render import render_image
+
+LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
+PANEL = {
+    "kind": "rectangle", "position": [-1.0, 1.5, 1.0], "direction": [1, -1, -1], "size": [0.6, 0.4],
+    "emission": [5.0, 4.0, 3.0],
+}  # fmt: skip
+SUN = {"kind": "directional", "direction": [-1, -2, -1], "emission": [0.5, 0.5, 0.6]}
+ALL = {"Lamp": LAMP, "Panel": PANEL, "Sun": SUN}
+
+
+def look_with(transfer, lights, environment=None):
+    return look_of(transfer, lambda d: (d["lights"].update(lights), d["environment"].update(environment or {})))
+
+
+def changed(name, **fields):
+    return {**ALL, name: ALL[name] | fields}
+
+
+@pytest.fixture
+def lit(transfer):
+    """A picture under three lights and the environment, at rest."""
+    picture = Picture(transfer, "front", FrozenCache(BUDGET))
+    picture.set_look(look_with(transfer, ALL))
+    return settle(picture)
+
+
+def num_made(picture):
+    """What is made until the picture rests, glimpses aside."""
+    made = 0
+    while (need := picture.waiting()) is not None:
+        made += not isinstance(need, Glimpse)
+        picture.freeze(lambda share: None, lambda: False)
+        picture.advance(None)
+    return made
+
+
+def num_terms(picture):
+    return sum(len(m.terms) for m in picture._images.by_name.values() if m.num_samples)
+
+
+@pytest.mark.parametrize("fields", [{"scale": 3.0}, {"color": [1.0, 0.2, 0.0]}, {"emission": [1, 7, 1]}, {"on": False}])
+def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fields):
+    lit.set_look(look_with(transfer, changed("Panel", **fields)))
+    assert num_made(lit) == num_terms(lit)
+    expected = render_image(transfer, "front", look_with(transfer, changed("Panel", **fields)))
+    np.testing.assert_allclose(lit.image(), expected, rtol=1e-4, atol=1e-5)
+    for scale in (0.3, 0.0, 5.0):
+        look = look_with(transfer, changed("Panel", scale=scale))
+        lit.set_look(look)
+        assert lit.advance(None).exact, "no glimpse, no wait"
+        assert lit.waiting() is None
+        np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=1e-4, atol=1e-5)
+
+
+def test_environment_s_brightness_is_mixed_beside_lights(transfer, lit):
+    for environment in ({"scale": 0.0}, {"scale": 2.0, "color": [0.5, 1.0, 1.0]}):
+        look = look_with(transfer, ALL, environment)
+        lit.set_look(look)
+        num_made(lit)
+        np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=1e-4, atol=1e-5)
+    lit.set_look(look_with(transfer, ALL, {"scale": 0.7}))
+    assert lit.advance(None).exact
+
+
+def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer, lit):
+    solo = {name: light | {"on": name == "Sun"} for name, light in ALL.items()}
+    look = look_with(transfer, solo, {"scale": 0.0})
+    lit.set_look(look)
+    assert num_made(lit) == num_terms(lit)
+    np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=1e-4, atol=1e-5)
+    louder = look_with(transfer, solo | {"Sun": SUN | {"scale": 2.0}}, {"scale": 0.0})
+    lit.set_look(louder)
+    assert lit.advance(None).exact
+    lit.set_look(look_with(transfer, ALL))
+    num_made(lit)
+    np.testing.assert_allclose(
+        lit.image(), render_image(transfer, "front", look_with(transfer, ALL)), rtol=1e-4, atol=1e-5
+    )
+
+
+def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
+    """A curve's operator belongs to one light; after another gain it is made anew, never used on."""
+
+    def edited(scale, exponent):
+        lights = changed("Lamp", scale=scale)
+        return look_of(
+            transfer,
+            lambda d: (
+                d["lights"].update(lights),
+                d["materials"]["Wall"]["terms"][1]["params"].update(exponent=exponent),
+            ),
+        )
+
+    for scale, exponent in ((1.0, 60.0), (2.0, 60.0), (2.0, 20.0), (0.5, 20.0), (0.5, 45.0)):
+        lit.set_look(edited(scale, exponent))
+        settle(lit)
+        expected = render_image(transfer, "front", edited(scale, exponent))
+        np.testing.assert_allclose(lit.image(), expected, rtol=3e-3, atol=1e-4)
