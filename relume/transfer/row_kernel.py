@@ -103,7 +103,8 @@ def keep(index, details, expected, kept, scale, rows):  # type: ignore[no-untype
     spare = index.shape[0] - kept.shape[0]
     least = np.partition(importance, spare)[spare] if spare > 0 else np.float32(0)
     at = 0
-    for m in range(index.shape[0]):
+    # from coarse to fine: of those that matter alike the finest are left out
+    for m in range(index.shape[0] - 1, -1, -1):
         if importance[m] < least or at == kept.shape[0]:
             continue
         largest = np.float32(0)

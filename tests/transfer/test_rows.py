@@ -21,7 +21,7 @@ from relume.transfer.contraction import contract
 from relume.transfer.frozen import tiles_of
 from relume.transfer.projector import Projector
 from relume.transfer.receivers import GatherRays, Receivers
-from relume.transfer.row_kernel import transform
+from relume.transfer.row_kernel import keep, transform
 from relume.transfer.rows import expected_light, freeze_rows, num_channels, rows_bytes
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
@@ -120,6 +120,17 @@ def test_freezing_may_be_cancelled(receivers):
     term = TERMS["lambert"]
     with pytest.raises(CancelledError):
         freeze(term, bands_of(term), receivers, lambda: True)
+
+
+def test_of_coefficients_that_matter_alike_none_displaces_a_better_one():
+    """The mean comes last of all; it was lost where the least that were kept were several."""
+    details = np.ones((9, 4), np.float32)
+    details[-1] = 100
+    index = np.arange(8, -1, -1, dtype=np.int32)
+    kept, scale, weights = np.empty(3, np.int32), np.empty(3, np.float32), np.empty((3, 4), np.int16)
+    keep(index, details, np.ones(16, np.float32), kept, scale, weights)
+    assert kept.tolist() == [0, 1, 2]
+    np.testing.assert_allclose(scale[:, None] * weights, [[100] * 4, [1] * 4, [1] * 4], rtol=1e-4)
 
 
 @pytest.mark.parametrize("num_seen", [1, 2, 13, 64])
