@@ -7,6 +7,7 @@ import re
 import numpy as np
 from editor_page import Editor, changed
 from playwright.sync_api import Locator, expect
+from test_accessibility import NAMELESS
 
 ON_THE_FLOOR = (0.5, 0.85)
 
@@ -155,3 +156,8 @@ def test_numbers_place_a_light_and_escape_leaves_them(editor: Editor) -> None:
     assert numbers(editor, "Position") == [0.25, *start[1:]]
     x.press("ArrowUp")
     np.testing.assert_allclose(numbers(editor, "Position")[0], 0.26, atol=1e-6)
+
+
+def test_every_control_of_a_light_has_a_name(editor: Editor) -> None:
+    add_by_click(editor, "Panel")
+    assert editor.page.evaluate(NAMELESS) == []

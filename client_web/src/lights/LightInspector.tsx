@@ -116,7 +116,7 @@ function Angle({ label, ...slider }: AngleProps) {
   );
 }
 
-function Angles({ name, light }: { name: string; light: Light }) {
+function Angles({ name, light, initial }: { name: string; light: Light; initial: Light | undefined }) {
   const onHold = () => hold(lightPath(name));
   const put = (deed: string, field: string, value: unknown) => editLight(deed, name, field, value);
   if (light.kind === "rectangle") {
@@ -124,7 +124,7 @@ function Angles({ name, light }: { name: string; light: Light }) {
       <Angle
         label="Rotation"
         value={light.rotation}
-        initial={0}
+        initial={initial?.kind === "rectangle" ? initial.rotation : 0}
         minimum={-180}
         maximum={180}
         onChange={(value) => put("Turn", "rotation", value)}
@@ -134,12 +134,13 @@ function Angles({ name, light }: { name: string; light: Light }) {
   }
   if (light.kind !== "spot") return null;
   const [inner, outer] = light.cone;
+  const own = initial?.kind === "spot" ? initial.cone : undefined;
   return (
     <>
       <Angle
         label="Cone, full light"
         value={inner}
-        initial={20}
+        initial={own?.[0] ?? 20}
         minimum={0}
         maximum={90}
         onChange={(value) => put("Cone", "cone", [value, Math.max(value, outer)])}
@@ -148,7 +149,7 @@ function Angles({ name, light }: { name: string; light: Light }) {
       <Angle
         label="Cone, edge"
         value={outer}
-        initial={30}
+        initial={own?.[1] ?? 30}
         minimum={1}
         maximum={90}
         onChange={(value) => put("Cone", "cone", [Math.min(inner, value), value])}
@@ -159,7 +160,7 @@ function Angles({ name, light }: { name: string; light: Light }) {
 }
 
 function Kind({ name, light }: { name: string; light: Light }) {
-  if (light.kind === "mesh") return <p class="hint">All surfaces of {light.material} shine; only a scene has that.</p>;
+  if (light.kind === "mesh") return <p class="hint">The surfaces of “{light.material}” shine. Where they are is the scene’s own.</p>;
   return (
     <div class="kind">
       <select
@@ -209,7 +210,7 @@ export function LightInspector({ name, light }: { name: string; light: Light }) 
           onChange={(value) => editLight("Emission", name, "emission", value)}
         />
         <Place name={name} light={light} />
-        <Angles name={name} light={light} />
+        <Angles name={name} light={light} initial={initial} />
       </section>
     </aside>
   );
