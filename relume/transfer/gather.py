@@ -33,8 +33,8 @@ from relume.transfer.direct import CHUNK_ROWS, DirectMethod
 from relume.transfer.stored import SHARD_ROWS, pattern_of_material, read_receivers, read_tree
 
 CELLS_A_SHARD = 4096
-RAYS_A_SAMPLE, RAYS_A_POINT = 377, 55
-_GLOSSY_RAYS = 144  # of those of a sample, where its material has a highlight
+RAYS_A_SAMPLE, RAYS_A_POINT = 610, 55
+_GLOSSY_RAYS = 233  # of those of a sample, where its material has a highlight
 _PIXELS_A_CELL, _FEWEST_CELLS = 10, 1024
 _CELLS, _RAYS = 2, 3  # stages
 _BYTES_A_CELL = POINTS_A_CELL * (24 + 2 * RAYS_A_POINT) + 64

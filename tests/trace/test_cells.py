@@ -92,6 +92,19 @@ def test_points_lie_where_light_can_arrive(box):
         assert not np.any(low & (at < 0.999).all(axis=1))
 
 
+def test_cells_are_small_along_contacts(box):
+    """On the floor, beside the tall block and far from all: the distance to the nearest other cell."""
+    scene, _, cells = box
+    centre = cells.position.mean(axis=1).astype(float)
+    floor = centre[centre[:, 1] < 1e-3][:, [0, 2]]
+    tall = next(mesh for mesh in scene.meshes if mesh.name == "Tall block").positions
+    foot = tall[tall[:, 1] == 0][:, [0, 2]].astype(float)
+    spacing = np.sort(np.linalg.norm(floor[:, None] - floor[None], axis=2), axis=1)[:, 1]
+    along = foot[0] + np.linspace(0.1, 0.9, 50)[:, None] * (foot[1] - foot[0])
+    from_contact = np.linalg.norm(floor[:, None] - along[None], axis=2).min(axis=1)
+    assert np.median(spacing[from_contact < 0.03]) < 0.5 * np.median(spacing[from_contact > 0.3])
+
+
 def test_cells_are_the_same_every_time(box):
     scene, geometry, cells = box
     again = choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
