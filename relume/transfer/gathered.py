@@ -49,7 +49,7 @@ class CellLight:
 
     def irradiance(self, lights: TriangleLights) -> F32:
         """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32"""
-        points, of_points = self.normal.reshape(-1, 3), self.visible.reshape(self.normal[..., 0].size, -1)
+        points, of_points = self.normal.reshape(-1, 3), self.visible.reshape(-1, self.visible.shape[2])
         arriving = irradiance(points, of_points, lights).reshape(self.normal.shape)
         return np.asarray(arriving.mean(axis=1, dtype=np.float64), np.float32)
 

@@ -55,10 +55,10 @@ def read_tree(store: StoreReader) -> CellTree:
 
 def read_cells(store: StoreReader) -> CellLight:
     """The gather cells of a store."""
-    normal = store.read("cells/normal")
+    normal, visible = store.read("cells/normal"), store.read("cells/visibility")
     return CellLight(
         normal,
-        store.read("cells/visibility").reshape(*normal.shape[:2], -1),
+        visible.reshape(*normal.shape[:2], visible.shape[1] // normal.shape[1]),
         store.read("cells/links"),
         store.read("cells/material"),
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
