@@ -53,7 +53,8 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
 
     Args:
         job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
-            and "seen" where reflected light alone is (peer_mitsuba_render.py); "finer", texels for each of the map's.
+            and "seen" where reflected light alone is (peer_mitsuba_render.py); "finer", texels for each of the map's;
+            "emitters", Mitsuba's own descriptions of lights beside the map.
     Returns:
         What it wrote to result.json in `folder`.
     """

@@ -61,6 +61,9 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
         "to_world": transform().rotate([0, 1, 0], 90),
     }
     scene = {"type": "scene", "integrator": {"type": "direct"}, "sensor": sensor, "light": environment}
+    for k, emitter in enumerate(job.get("emitters", [])):
+        placed = {key: transform(np.reshape(emitter[key], (4, 4)).tolist()) for key in ("to_world",) if key in emitter}
+        scene[f"emitter_{k}"] = {**emitter, **placed}
     for k, bsdf in enumerate(bsdfs):
         scene[f"shape_{k}"] = mesh(arrays, k, bsdf)
     return mi.load_dict(scene)

@@ -81,6 +81,16 @@ GROUPS = (
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
+    Group(
+        "bench.lights",
+        (
+            "lights.rmse_point",
+            "lights.rmse_spot",
+            "lights.rmse_directional",
+            "lights.rmse_rectangle",
+            "lights.gain_fps",
+        ),
+    ),
     Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
     Group("bench.peer_gather", ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")),
 )

@@ -42,6 +42,9 @@ TARGETS = {
     "gather.brdf_fps": "≥ 60",
     "gather.rmse_diffuse": "≤ 2 %",
     "gather.rmse_glossy": "≤ 5 %",
+    "lights.rmse_point": "≤ 2 %",
+    "lights.rmse_rectangle": "≤ 2 %",
+    "lights.gain_fps": "≥ 60",
     "demo.bake_s": "≤ 30 s",
     "demo.first_picture_s": "≤ 10 s",
 }
@@ -51,7 +54,8 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse")) or name == "frame.incremental_rmse"
+        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "lights.rmse"))
+        or name == "frame.incremental_rmse"
         else "performance.md"
     )
 

@@ -23,7 +23,7 @@ IN_PROCESS = [
 ]  # fmt: skip
 WITH_PROCESSES = [
     "bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
-    "bench.gather_error", "bench.peer_gather",
+    "bench.gather_error", "bench.peer_gather", "bench.lights",
 ]  # fmt: skip
 
 
