@@ -144,7 +144,7 @@ class Glimpse:
     light: Light
     parts: Sequence[_Part]
 
-    what = "Environment"
+    what = "the light"
     state: Literal["shading"] = "shading"
     refines = False
 

@@ -28,10 +28,14 @@ export function keepThumbnail(name: string, image: string): void {
   }
 }
 
-/** Whether a look speaks only of this scene's materials. */
+/** Whether a look speaks only of what this scene has, or can be given. */
 function fits(look: Partial<Look>): boolean {
   const known = new Set(scene.value?.materials.map((material) => material.name));
-  return Object.keys(look.materials ?? {}).every((name) => known.has(name));
+  const own = new Set(scene.value?.lights);
+  return (
+    Object.keys(look.materials ?? {}).every((name) => known.has(name)) &&
+    Object.entries(look.lights ?? {}).every(([name, light]) => light.kind !== "mesh" || own.has(name))
+  );
 }
 
 async function read(entry: LookEntry): Promise<SavedLook> {

@@ -24,11 +24,16 @@ export function toggleLightSolo(source: string): void {
 /** The environment among the lights: no light has this name. */
 export const ENVIRONMENT = "";
 
+/** Whether a look has this source of light; one that was removed can come back by undo. */
+export function hasSource(look: Look, source: string): boolean {
+  return source === ENVIRONMENT || look.lights[source] !== undefined;
+}
+
 const whole = new WeakMap<Look, Look>();
 
 /** What the server shall show of a look while one source of light is alone; without one, the look itself. */
 export function withOneLight(look: Look, source: string | null): Look {
-  if (source === null || (source !== ENVIRONMENT && look.lights[source] === undefined)) return look;
+  if (source === null || !hasSource(look, source)) return look;
   const off = ([name, light]: [string, Light]) => [name, name === source ? { ...light, on: true } : { ...light, on: false }];
   const lights = Object.fromEntries(Object.entries(look.lights).map(off)) as Look["lights"];
   const environment = source === ENVIRONMENT ? look.environment : { ...look.environment, scale: 0 };
