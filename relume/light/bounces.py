@@ -96,15 +96,20 @@ def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounce
     return total.astype(np.float32)
 
 
-def bounced_roughly(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
+def bounced_roughly(
+    links: NDArray[np.uint16], few_links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int
+) -> F32:
     """`bounced` for a moving hand: after a few bounces, as if each left the same share of the one before.
 
     The bounces are a power iteration: their shape settles soon, and then only their size changes.
+
+    Args:
+        few_links: some of the rays, for all bounces but the first, whose light is even already.
     """
     first = min(num_bounces, _ROUGH_BOUNCES)
     total, radiance, before = direct.astype(np.float64), direct, direct
-    for _ in range(first):
-        radiance, before = bounce(links, reflectance, radiance), radiance
+    for k in range(first):
+        radiance, before = bounce(links if k == 0 else few_links, reflectance, radiance), radiance
         total += radiance
     size, size_before = (np.sqrt(np.square(a, dtype=np.float64).sum(axis=0)) for a in (radiance, before))
     share = np.minimum(size / np.maximum(size_before, 1e-30), _LARGEST_SHARE)

@@ -1,8 +1,9 @@
-"""Changed light between surfaces, followed at once: image + rows · ΔL, for every term of a picture.
+"""Changed light, followed at once: image + rows · ΔL, and what moved lights give straight, for every term of a picture.
 
-Where a hand drags a diffuse colour or the number of bounces, all that changes of light is what gather cells send out.
-The rows of all terms are made when such a thing is touched or first edited; from then on each frame shows the image
-that was shaded last and what the change brings. It is never called exact: at rest all is shaded.
+Where a hand drags a diffuse colour or the number of bounces, all that changes of light is what gather cells send out;
+where it moves a local light, what comes straight from that light as well. The rows of all terms are made when such a
+thing is touched or first edited; from then on each frame shows the image that was shaded last and what has changed.
+It is never called exact: at rest all is shaded.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from numpy.typing import NDArray
 
 from relume.basis.haar import haar
 from relume.brdf.term import Term
-from relume.transfer.light import Light, is_same_but_for_reflections
+from relume.transfer.light import Light, is_same_but_for_gains, is_same_environment
 from relume.transfer.material_image import MaterialImage
+from relume.transfer.moved import MovedLights
 from relume.transfer.rows import Rows, expected_light, freeze_rows, num_channels, rows_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
@@ -68,17 +70,18 @@ class Follower:
     """Keeps the terms of one view near their look while the light between surfaces changes."""
 
     def __init__(self, images: ViewImages) -> None:
-        self._images = images
+        self._images, self._moved = images, MovedLights(images)
+        self._reflected = images.transfer.reflected
         self._is_wanted = False
 
     def prepare(self) -> None:
-        """A hand is on something that changes what surfaces reflect onto each other."""
-        self._is_wanted = self._images.transfer.reflected is not None and self._has_room()
+        """A hand is on something that changes local lights, or what surfaces reflect onto each other."""
+        self._is_wanted = self._has_room()
 
     def follow_look(self, before: Light) -> None:
         """The look has changed, and with it perhaps the light, which was this before."""
-        self._is_wanted = False
-        if before != self._images.light and is_same_but_for_reflections(before, self._images.light):
+        self._is_wanted, after = False, self._images.light
+        if before != after and is_same_environment(before, after) and not is_same_but_for_gains(before, after):
             self.prepare()
 
     def follows_all(self) -> bool:
@@ -88,7 +91,7 @@ class Follower:
 
     def next_need(self) -> RowsNeed | None:
         """The next rows to be made, those of few samples first; None where there are all, or none are wanted."""
-        if not self._is_wanted:
+        if not self._is_wanted or self._reflected is None:
             return None
         lacking = [(m, t) for m, t in self._terms() if self._rows(m, t) is None]
         return self._need(*min(lacking, key=lambda item: item[0].num_samples)) if lacking else None
@@ -99,18 +102,20 @@ class Follower:
         changes: dict[Light, F32] = {}
         for material, image in self._terms():
             base = image.base
-            if base is None or not image.can_follow() or not is_same_but_for_reflections(base.light, light):
+            if base is None or not image.can_follow() or not is_same_environment(base.light, light):
                 continue
             rows = self._rows(material, image)
-            if rows is not None and not image.is_followed():
-                if base.light not in changes:
-                    changes[base.light] = self._change(base.light, light)
-                image.follow(rows, changes[base.light])
+            if image.is_followed() or (rows is None and self._reflected is not None):
+                continue
+            if base.light not in changes:
+                changes[base.light] = self._change(base.light, light)
+            image.follow(rows, changes[base.light], self._moved.change(material, image, base.light, light))
 
     def _change(self, before: Light, after: Light) -> F32:
         """Haar coefficients of what cells send out more. (padded cells, 3) float32"""
-        reflected = self._images.transfer.reflected
-        assert reflected is not None
+        reflected = self._reflected
+        if reflected is None:
+            return np.empty((0, 3), np.float32)
         change = reflected.roughly_under(after) - reflected.roughly_under(before)
         return haar(change[: reflected.num_cells]).astype(np.float32)
 
@@ -119,7 +124,9 @@ class Follower:
         return ((material, image) for material in materials if material.num_samples for image in material.terms)
 
     def _has_room(self) -> bool:
-        """Whether the cache has room for all rows beside other things."""
+        """Whether the cache has room for all rows, where any are needed, beside other things."""
+        if self._reflected is None:
+            return True
         needed = sum(rows_bytes(m.num_samples, num_channels(t.term, t.target)) for m, t in self._terms())
         return 2 * needed <= self._images.cache.budget_bytes
 

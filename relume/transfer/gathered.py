@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from relume.light.triangles import TriangleLights
 from relume.trace.cell_tree import NO_CELL
 
 F32 = NDArray[np.float32]
+
+_FEW = 4  # one ray in so many is enough for a moving hand
+
 
 Reflectances = tuple[tuple[float, ...], ...]
 """Of each material, from `relume.brdf.albedo.reflectances_of`."""
@@ -34,6 +38,10 @@ class CellLight:
     links: NDArray[np.uint16]
     material: NDArray[np.uint16]
     textures: F32
+
+    @cached_property
+    def _few_links(self) -> NDArray[np.uint16]:
+        return np.ascontiguousarray(self.links[:, ::_FEW])
 
     @property
     def num_cells(self) -> int:
@@ -69,5 +77,8 @@ class CellLight:
         for _ in range(first - 1):
             sent = bounce(self.links, reflectance, sent)
         radiance = np.zeros((NO_CELL + 1, 3), np.float32)
-        radiance[: len(sent)] = (bounced_roughly if roughly else bounced)(self.links, reflectance, sent, last - first)
+        if roughly:
+            radiance[: len(sent)] = bounced_roughly(self.links, self._few_links, reflectance, sent, last - first)
+        else:
+            radiance[: len(sent)] = bounced(self.links, reflectance, sent, last - first)
         return radiance

@@ -75,9 +75,9 @@ def emission_of(light: Light, material: str) -> Rgb:
     return red, green, blue
 
 
-def is_same_but_for_reflections(before: Light, after: Light) -> bool:
-    """Whether only light between surfaces differs, if any does."""
-    alike = before._replace(reflectances=after.reflectances, paths=after.paths) == after
+def is_same_environment(before: Light, after: Light) -> bool:
+    """Whether the environment's own light is as before: only local lights differ, and light between surfaces."""
+    alike = before._replace(reflectances=after.reflectances, paths=after.paths, local=after.local) == after
     return alike and before.paths.direct == after.paths.direct
 
 

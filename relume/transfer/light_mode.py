@@ -13,7 +13,7 @@ from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
 from relume.transfer.light import Light
 from relume.transfer.mixing import Mixer
 from relume.transfer.need import Need
-from relume.transfer.pointer import ROTATION, ColorPointer, Pointer, TransportPointer
+from relume.transfer.pointer import ROTATION, ColorPointer, LightPointer, Pointer, TransportPointer
 from relume.transfer.view_images import ViewImages
 
 
@@ -27,7 +27,7 @@ class LightMode:
     def hold(self, pointer: Pointer) -> None:
         """A hand takes hold of something that may change the light."""
         self._is_turning = pointer == ROTATION
-        if isinstance(pointer, ColorPointer | TransportPointer):
+        if isinstance(pointer, ColorPointer | LightPointer | TransportPointer):
             self._follower.prepare()
 
     def follow_look(self, before: Light, *, was_shown: bool) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
 from relume.look import LightGeometry
+from relume.trace.cells import POINTS_A_CELL
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import is_front, off_surface
 from relume.trace.local_shadows import arriving, trace_local
@@ -57,6 +58,7 @@ class LocalLights:
         self._store = store
         self._light = lru_cache(_LIGHTS_KEPT)(self._make)
         self.irradiance = lru_cache(_LIGHTS_KEPT)(self._irradiance)
+        self.rough_irradiance = lru_cache(_LIGHTS_KEPT)(self._rough_irradiance)
 
     @cached_property
     def _positions(self) -> F32:
@@ -75,20 +77,29 @@ class LocalLights:
         return off_surface(self._positions)
 
     def all_rays(
-        self, light: Light, points: Points, shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None
+        self,
+        light: Light,
+        points: Points,
+        shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None,
+        num_samples: int = SAMPLES,
     ) -> list[LocalRays]:
         """Local light that comes straight to points.
 
         Args:
             shadows_of: where they are remembered; they are traced where there is no such place.
+            num_samples: of a light that has an extent.
         """
         if not light.paths.direct:
             return []
-        find = shadows_of or self.shadows
+
+        def traced(geometry: LightGeometry, points: Points) -> Shadows:
+            return Shadows(self._trace(geometry, points, num_samples))
+
+        find = shadows_of or traced
         return [
             LocalRays(
                 self._light(geometry),
-                pattern_of(geometry, SAMPLES),
+                pattern_of(geometry, num_samples),
                 np.array(gain, np.float32),
                 points.position,
                 points.numbers,
@@ -101,16 +112,25 @@ class LocalLights:
         """What points see of a light."""
         return Shadows(self._trace(geometry, points, SAMPLES))
 
+    @cached_property
+    def _cells(self) -> Points:
+        """The points that stand for gather cells, those of a cell one after another."""
+        position, normal = (self._store.read(f"cells/{name}").reshape(-1, 3) for name in ("position", "normal"))
+        return Points(position, normal, np.arange(len(position), dtype=np.uint32))
+
     def _irradiance(self, geometry: LightGeometry) -> F32:
         """What comes to every gather cell from a light of unit emission, the mean over its points. (C,) float32"""
-        position, normal = (self._store.read(f"cells/{name}") for name in ("position", "normal"))
-        shape = position.shape[:2]
-        numbers = np.arange(shape[0] * shape[1], dtype=np.uint32)
-        points = Points(position.reshape(-1, 3), normal.reshape(-1, 3), numbers)
-        seen = self._trace(geometry, points, SAMPLES_OF_CELLS)
-        pattern = pattern_of(geometry, SAMPLES_OF_CELLS)
-        of_points = arriving(self._light(geometry), pattern, points.position, points.normal, numbers, seen)
-        return np.asarray(of_points.reshape(shape).mean(axis=1, dtype=np.float64), np.float32)
+        of_points = self._arriving(geometry, self._cells, SAMPLES_OF_CELLS).reshape(-1, POINTS_A_CELL)
+        return np.asarray(of_points.mean(axis=1, dtype=np.float64), np.float32)
+
+    def _rough_irradiance(self, geometry: LightGeometry) -> F32:
+        """The same for a moving hand, at one of a cell's points."""
+        some = Points(*(np.ascontiguousarray(a[::POINTS_A_CELL]) for a in vars(self._cells).values()))
+        return self._arriving(geometry, some, POINTS_A_CELL)
+
+    def _arriving(self, geometry: LightGeometry, points: Points, num_samples: int) -> F32:
+        pattern, seen = pattern_of(geometry, num_samples), self._trace(geometry, points, num_samples)
+        return arriving(self._light(geometry), pattern, points.position, points.normal, points.numbers, seen)
 
     def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
         """Whether points (n, 3) of a material that shines are seen from a side that does."""

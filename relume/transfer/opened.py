@@ -111,12 +111,13 @@ class Transfer:
             return None
         of_environment = lru_cache(maxsize=_LIGHTS_KEPT)(lambda key: cells.irradiance(self.lights_in(key)))
 
-        def irradiance(light: Light) -> NDArray[np.float32]:
+        def irradiance(light: Light, roughly: bool) -> NDArray[np.float32]:
+            of_local = self.local.rough_irradiance if roughly else self.local.irradiance
             arriving = np.zeros((cells.num_cells, 3), np.float32)
             if light.is_environment_lit:
                 arriving += np.array(light.environment_gain, np.float32) * of_environment(light.environment)
             for geometry, gain in light.local:
-                arriving += np.array(gain, np.float32) * self.local.irradiance(geometry)[:, None]
+                arriving += np.array(gain, np.float32) * of_local(geometry)[:, None]
             return arriving
 
         return Reflected(cells, irradiance)

@@ -149,6 +149,16 @@ def weigh_rays(first, wi, wo, power, shading, kinds, axes, num_bands, bands, num
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def sum_rays(first, power, shading, out):  # type: ignore[no-untyped-def]
+    """`project_rays` where no curve is listed: all that is left of a term is its quotient. out: (points, 3, ≥ 1)"""
+    blue_row = shading.shape[0] - 1
+    for p in range(out.shape[0]):
+        for n in range(first[p], first[p + 1]):
+            for channel in range(3):
+                out[p, channel, 0] += power[channel, n] * shading[blue_row * channel // 2, n]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_rays(  # type: ignore[no-untyped-def]
     first, wi, wo, power, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
 ):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.transfer.contraction import Contraction
-from relume.transfer.ray_kernel import project_rays, weigh_rays
+from relume.transfer.ray_kernel import project_rays, sum_rays, weigh_rays
 from relume.transfer.receivers import Listed, Rays, Receivers
 
 F32 = NDArray[np.float32]
@@ -34,6 +34,9 @@ class RayProjector:
         c = self._contraction
         for rays in self._rays:
             shading = self._list(rays, start, stop)
+            if c.kinds.size == 0:
+                sum_rays(self._listed.first, self._listed.power, shading, out)
+                continue
             project_rays(
                 *self._listed, shading,
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.active, out,

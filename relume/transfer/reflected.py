@@ -22,10 +22,10 @@ class Reflected:
     """Radiance of cells under a light, (NO_CELL + 1, 3) float32; safe to use from several threads.
 
     Args:
-        irradiance: that comes to the cells from the lights themselves. (C, 3) float32
+        irradiance: that comes to the cells from the lights themselves, or roughly does. (C, 3) float32
     """
 
-    def __init__(self, cells: CellLight, irradiance: Callable[[Light], F32]) -> None:
+    def __init__(self, cells: CellLight, irradiance: Callable[[Light, bool], F32]) -> None:
         self.num_cells = cells.num_cells
         self._lock = threading.Lock()
 
@@ -33,7 +33,8 @@ class Reflected:
             paths = light.paths
             if not paths.reflect:
                 return np.zeros((NO_CELL + 1, 3), np.float32)
-            return cells.radiance(irradiance(light), light.reflectances, paths.first, paths.last, roughly=roughly)
+            arriving = irradiance(light, roughly)
+            return cells.radiance(arriving, light.reflectances, paths.first, paths.last, roughly=roughly)
 
         self._exactly = lru_cache(maxsize=_LIGHTS_KEPT)(lambda light: radiance(light, False))
         self._roughly = lru_cache(maxsize=_LIGHTS_KEPT)(lambda light: radiance(light, True))

@@ -134,12 +134,16 @@ class TermImage:
         """Whether it shows its look but for what rows leave out."""
         return self.can_follow() and self.followed == self._light
 
-    def follow(self, rows: Rows, change: F32) -> None:
-        """Show the base and what rows make of the change of light since; see `Rows.add`."""
+    def follow(self, rows: Rows | None, change: F32, direct: F32 | None) -> None:
+        """Show the base and what has changed since: what rows make of the change of reflected light (see `Rows.add`),
+        and `direct`, shaped like the image."""
         if self.base is None:
             raise EditError("the term has no image to go on from; shade it first")
         self.image[:] = self.base.image
-        rows.add(change, self.image)
+        if direct is not None:
+            self.image += direct
+        if rows is not None:
+            rows.add(change, self.image)
         self.followed = self._light
         self.is_glimpse, self.is_composed = True, False
 

@@ -143,6 +143,64 @@ def test_a_diffuse_curve_is_not_followed_by_rows_of_another(gathered, prepared):
     np.testing.assert_array_equal(settle(prepared).image(), render_image(gathered, "front", look))
 
 
+def lamp_at(transfer, x, **others):
+    """The look with a lamp above the floor."""
+
+    def change(document):
+        lamp = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0], **others}
+        document["lights"] = {"Lamp": lamp}
+
+    return look_of(transfer, change)
+
+
+def follow_lamp(transfer, *looks):
+    """A picture that has settled in the first look, whose lamp is then dragged through the others."""
+    picture = Picture(transfer, "front", FrozenCache(BUDGET))
+    picture.set_look(looks[0])
+    settle(picture).touch("/lights/Lamp")
+    while picture.waiting() is not None:
+        make(picture)
+    for look in looks[1:]:
+        picture.set_look(look)
+        assert not picture.advance(32).exact
+        assert picture.waiting().refines
+    return picture
+
+
+def test_a_moved_lamp_is_followed_with_its_shadows_and_what_it_reflects(gathered):
+    looks = [lamp_at(gathered, x) for x in (-0.5, -0.2, 0.1, 0.4)]
+    picture = follow_lamp(gathered, *looks)
+    exact, start = (render_image(gathered, "front", look) for look in (looks[-1], looks[0]))
+    assert relative_rmse(start, exact) > 0.3
+    assert relative_rmse(picture.image(), exact) < 0.03
+    np.testing.assert_array_equal(settle(picture).image(), exact)
+
+
+def test_a_lamp_with_an_extent_is_followed_by_few_samples(gathered):
+    kind = {"kind": "rectangle", "direction": [0, -1, 0], "size": [0.3, 0.3], "emission": [30.0, 30.0, 30.0]}
+    looks = [lamp_at(gathered, x, **kind) for x in (-0.5, 0.4)]
+    picture = follow_lamp(gathered, *looks)
+    start, exact = (render_image(gathered, "front", look) for look in looks)
+    assert relative_rmse(picture.image(), exact) < 0.25 * relative_rmse(start, exact)
+    np.testing.assert_array_equal(settle(picture).image(), exact)
+
+
+def test_a_lamp_moved_where_only_direct_light_was_baked_needs_no_rows(corner, tmp_path):
+    direct = bake_corner(corner, "direct", tmp_path)
+    looks = [lamp_at(direct, x) for x in (-0.5, 0.4)]
+    picture, exact = follow_lamp(direct, *looks), render_image(direct, "front", looks[-1])
+    np.testing.assert_allclose(picture.image(), exact, rtol=1e-3, atol=1e-4)
+    np.testing.assert_array_equal(settle(picture).image(), exact)
+
+
+def test_a_lamp_put_back_is_exact_at_once(gathered):
+    looks = [lamp_at(gathered, x) for x in (-0.5, 0.4)]
+    picture = follow_lamp(gathered, *looks)
+    picture.set_look(looks[0])
+    assert picture.advance(32).exact
+    np.testing.assert_array_equal(picture.image(), render_image(gathered, "front", looks[0]))
+
+
 def test_where_the_cache_has_no_room_light_is_glimpsed(gathered):
     picture = settle(Picture(gathered, "front", FrozenCache(300_000)))
     picture.set_look(colored(gathered, [0.1, 0.1, 0.8]))
