@@ -30,6 +30,7 @@ POINT, DIRECTIONAL, SURFACE = 0, 1, 2
 NEAREST = np.float32(1e-3)  # metres: a point light is no smaller
 _FAR = np.float32(np.inf)
 _SEED = 1
+_SHARES = {"rectangle": 1, "mesh": 4}  # of a mesh most samples face away from a point, or are far from it
 _PI = np.float32(math.pi)
 _SHARPEST_CONE = 1e-3  # of cosines, as KHR_lights_punctual has it
 _EDGE_ON = 1e-6
@@ -67,9 +68,14 @@ class Triangles(NamedTuple):
     is_two_sided: bool
 
 
-def pattern_of(geometry: LightGeometry, num_samples: int) -> Pattern:
-    """The samples of a light: `num_samples` where it has an extent, else one."""
-    return make_pattern(num_samples if geometry.kind in ("rectangle", "mesh") else 1, 0, _SEED)
+def num_samples(geometry: LightGeometry, of_rectangle: int) -> int:
+    """How many samples a light has where a rectangle has so many."""
+    return _SHARES.get(geometry.kind, 0) * of_rectangle or 1
+
+
+def pattern_of(geometry: LightGeometry, of_rectangle: int) -> Pattern:
+    """The samples of a light."""
+    return make_pattern(num_samples(geometry, of_rectangle), 0, _SEED)
 
 
 def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> LocalLight:

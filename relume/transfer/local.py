@@ -21,7 +21,7 @@ from relume.transfer.receivers import LocalRays
 
 F32 = NDArray[np.float32]
 
-SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a light that has an extent: for each view sample, for each point of a cell
+SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
 _LIGHTS_KEPT = 256
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
+from relume.light.local import num_samples
 from relume.look import LightGeometry, Look, validate
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
@@ -62,7 +63,7 @@ class ViewImages:
 
         def remembered(geometry: LightGeometry, points: Points) -> Shadows:
             key = (self.transfer.key, self.view.name, material, "shadows", geometry)
-            num_bytes = len(points.position) * SAMPLES // 8
+            num_bytes = len(points.position) * -(-num_samples(geometry, SAMPLES) // 8)
             return self.cache.get(key, Shadows, num_bytes, lambda: local.shadows(geometry, points))
 
         return local.all_rays(light, self.view.points(material), remembered)

@@ -141,7 +141,7 @@ def test_emitter_without_area_gives_no_light(corners):
     light = make_local(GEOMETRIES["one-sided"], Triangles(corners.astype(np.float32), True))
     pattern = pattern_of(GEOMETRIES["one-sided"], 64)
     up = np.array([[0, 1, 0]], np.float32)
-    seen = np.full((1, 8), 255, np.uint8)
+    seen = np.full((1, 32), 255, np.uint8)
     assert arriving(light, pattern, 0 * up, up, np.zeros(1, np.uint32), seen) == 0
 
 
@@ -149,6 +149,6 @@ def test_light_that_touches_a_surface_is_finite():
     up = np.array([[0, 1, 0]], np.float32)
     for geometry in (LightGeometry("point"), LightGeometry("rectangle", (0, 0, 0), (0, 1, 0), size=(1e-4, 1e4))):
         pattern = pattern_of(geometry, 64)
-        seen = np.full((1, 8), 255, np.uint8)
+        seen = np.full((1, 32), 255, np.uint8)
         found = arriving(make_local(geometry), pattern, 0 * up, up, np.zeros(1, np.uint32), seen)
         assert np.isfinite(found).all()

@@ -229,5 +229,5 @@ def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, Tran
     truth = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
     assert truth.mean() > 0.01
     assert frame.mean() == pytest.approx(truth.mean(), rel=0.01)
-    # curves in bands and 64 samples; the wall touches the floor, and few samples of it are near
-    assert relative_rmse(frame, truth) < {"rectangle": 0.03, "mesh": 0.1}.get(kind, 0.02)
+    # curves in bands and few samples; the wall touches the floor, and few samples of it are near
+    assert relative_rmse(frame, truth) < {"rectangle": 0.03, "mesh": 0.07}.get(kind, 0.02)
