@@ -89,7 +89,7 @@ def choose_sparse(view: View, material: int, *, has_rays: bool) -> Sparse:
     gathered = view.gather_rays(material, np.zeros((NO_CELL + 1, 3), np.float32)) if has_rays else None
     return Sparse(
         Receivers(whole.normal[chosen], whole.tangent[chosen], whole.wo[chosen], whole.visible[chosen]),
-        gathered and replace(gathered, links=gathered.links[chosen], numbers=gathered.numbers[chosen]),
+        gathered and gathered.alone(chosen),
         Points(points.position[chosen], points.normal[chosen], points.numbers[chosen]),
         csr_array((weight.ravel().astype(np.float32), nearest.ravel(), first), shape=shape),
     )

@@ -51,7 +51,7 @@ class Projector:
         for block in range(start, stop, _POINTS_A_BLOCK):
             end = min(block + _POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
-            self._rays.add(block, end, out[block - start : end - start])
+        self._rays.add(start, stop, out)
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _block(self, start: int, stop: int, out: F32) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +50,14 @@ class GatherRays:
         links: cell that each hits. (n, rays) uint16
         numbers: of the points among all that share the pattern. (n,) uint32
         radiance: of cells, from `CellLight.radiance`. (NO_CELL + 1, 3) float32
+        sharing: weights of the points for each other, from `relume.transfer.sharing`, (n, n) sparse; None: each alone.
     """
 
     links: NDArray[np.uint16]
     pattern: Pattern
     numbers: NDArray[np.uint32]
     radiance: F32
+    sharing: Any = None
 
     @property
     def rays_a_point(self) -> int:
@@ -65,6 +67,10 @@ class GatherRays:
     def times(self, factor: F32) -> GatherRays:
         """Light of every channel multiplied."""
         return replace(self, radiance=self.radiance * factor)
+
+    def alone(self, chosen: NDArray[np.integer]) -> GatherRays:
+        """Those of some points, which do not share them."""
+        return replace(self, links=self.links[chosen], numbers=self.numbers[chosen], sharing=None)
 
     def list_into(self, listed: Listed, points: Receivers, start: int, stop: int) -> int:
         """See `Rays`."""
@@ -121,3 +127,14 @@ class Receivers:
     wo: F32
     visible: NDArray[np.uint8]
     rays: Sequence[Rays] = ()
+
+    def places(self, chosen: NDArray[np.integer]) -> Receivers:
+        """Some of them, without their light."""
+        return replace(
+            self,
+            normal=self.normal[chosen],
+            tangent=self.tangent[chosen],
+            wo=self.wo[chosen],
+            visible=np.empty((len(chosen), 0), np.uint8),
+            rays=(),
+        )

@@ -156,3 +156,23 @@ def add_rows(kept, scale, rows, light, num_samples, start, stop, image):  # type
             image[tile, 0, offset] += red[s]
             image[tile, 1, offset] += green[s]
             image[tile, 2, offset] += blue[s]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def add_shared(first, among, weight, alone, start, stop, image):  # type: ignore[no-untyped-def]
+    """Add to samples [start, stop) of an image the weighted means of another's.
+
+    Args:
+        first, among, weight: rows of `relume.transfer.sharing`, compressed. alone, image: (tiles, 3, samples) float32
+    """
+    samples = image.shape[2]
+    for s in range(start, stop):
+        red = green = blue = np.float32(0)
+        for k in range(first[s], first[s + 1]):
+            tile, offset = among[k] // samples, among[k] % samples
+            red += weight[k] * alone[tile, 0, offset]
+            green += weight[k] * alone[tile, 1, offset]
+            blue += weight[k] * alone[tile, 2, offset]
+        image[s // samples, 0, s % samples] += red
+        image[s // samples, 1, s % samples] += green
+        image[s // samples, 2, s % samples] += blue

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from relume.parallel import for_shares, for_steps
 from relume.transfer.contraction import contract
 from relume.transfer.ray_projector import RayProjector
 from relume.transfer.receivers import GatherRays, Receivers
-from relume.transfer.row_kernel import BLOCK_SAMPLES, add_rows, keep, number_cells, sum_by_cell, transform
+from relume.transfer.row_kernel import BLOCK_SAMPLES, add_rows, add_shared, keep, number_cells, sum_by_cell, transform
 
 F32 = NDArray[np.float32]
 
@@ -39,12 +40,14 @@ class Rows:
         scale: what a step of their weights is worth. (blocks, K) float32
         weights: (blocks, K, channels, `BLOCK_SAMPLES`) int16; one channel where all are alike, else three
         num_samples: of the image, the last block's padding left out.
+        sharing: weights of the samples for each other, as in `GatherRays`; None: each alone.
     """
 
     kept: NDArray[np.int32]
     scale: F32
     weights: NDArray[np.int16]
     num_samples: int
+    sharing: Any
 
     @property
     def num_bytes(self) -> int:
@@ -59,7 +62,13 @@ class Rows:
         Cost: reads all weights once; bound by the memory's bandwidth.
         """
         args = (self.kept, self.scale, self.weights, light, self.num_samples)
-        for_shares(lambda start, stop: add_rows(*args, start, stop, image), len(self.kept))
+        if self.sharing is None:
+            for_shares(lambda start, stop: add_rows(*args, start, stop, image), len(self.kept))
+            return
+        alone = np.zeros_like(image)
+        for_shares(lambda start, stop: add_rows(*args, start, stop, alone), len(self.kept))
+        shares = (self.sharing.indptr, self.sharing.indices, self.sharing.data)
+        for_shares(lambda start, stop: add_shared(*shares, alone, start, stop, image), self.num_samples)
 
 
 def rows_bytes(num_samples: int, num_channels: int) -> int:
@@ -116,6 +125,7 @@ def freeze_rows(
         np.empty((blocks, NUM_KEPT), np.float32),
         np.empty((blocks, NUM_KEPT, num_channels(term, bands), BLOCK_SAMPLES), np.int16),
         num_samples,
+        rays.sharing,
     )
 
     def step(first: int, last: int) -> None:

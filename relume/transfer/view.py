@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from relume.trace.view_samples import BACKGROUND
 from relume.transfer.base import StoreReader
 from relume.transfer.local import Points
 from relume.transfer.receivers import GatherRays, LocalRays, Receivers
+from relume.transfer.sharing import sharing
 from relume.transfer.stored import read_camera, read_gather_rays, read_receivers
 
 F32 = NDArray[np.float32]
@@ -101,7 +103,16 @@ class View:
     def gather_rays(self, material: int, reflected: F32) -> GatherRays:
         """Rays of a material's samples that bring the radiance of gather cells; reads the store."""
         rows = self.rows(material)
-        return read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
+        alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
+        return replace(alone, sharing=self._sharing(material))
+
+    @cached_property
+    def _sharing(self) -> Callable[[int], Any]:
+        def of_material(material: int) -> Any:
+            points = self.points(material)
+            return sharing(self.pixel[self.rows(material)], self.width, points.position, points.normal)
+
+        return cache(of_material)
 
     def background(self) -> F32:
         """Radiance of the samples after the surfaces. (n, 3) float32"""

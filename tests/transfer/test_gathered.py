@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from relume.transfer.contraction import contract
 from relume.transfer.gathered import CellLight
 from relume.transfer.glimpse import Glimpse
 from relume.transfer.light import light_of
+from relume.transfer.opened import open_transfer
 from relume.transfer.picture import Picture
 from relume.transfer.projector import Projector
 from relume.transfer.receivers import GatherRays, Receivers
@@ -299,11 +301,14 @@ def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
         np.testing.assert_array_equal(settle(picture).image(), showing(gathered, show))
 
 
-def test_a_thinned_bake_has_the_same_light(gathered):
-    """Its samples keep the rays that were traced for them."""
-    step = 3
-    whole = Picture(gathered, "front", FrozenCache(BUDGET))
-    few = Picture(thinned(gathered, "front", step), "front", FrozenCache(BUDGET))
+def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
+    """Its samples keep the rays that were traced for them; its neighbours are others."""
+    monkeypatch.setattr("relume.transfer.view.sharing", lambda *of_samples: None)
+    transfer, step = open_transfer(Path(gathered.key)), 3
+    whole = Picture(transfer, "front", FrozenCache(BUDGET))
+    few = Picture(thinned(transfer, "front", step), "front", FrozenCache(BUDGET))
+    for picture in (whole, few):  # no look whose images are kept beside the store
+        picture.set_look(look_of(transfer, lambda document: document["transport"].update(bounces=5)))
     np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
 
 

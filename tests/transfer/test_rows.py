@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import twins
 from analytic_terms import ANALYTIC
+from scipy.sparse import csr_array
 
 from relume.basis.haar import haar
 from relume.brdf.curves import curve_bands
@@ -67,6 +68,17 @@ def image_by_rows(term, bands, receivers, radiance):
     rows.add(haar(radiance[:NUM_CELLS]).astype(np.float32), image)
     assert rows.num_bytes == rows_bytes(NUM_POINTS, num_channels(term, bands))
     return image.transpose(0, 2, 1).reshape(-1, 3)[:NUM_POINTS] - 1
+
+
+def test_rows_are_shared_as_rays_are(receivers):
+    """Samples take part in each other's image with the weights that the exact image has."""
+    rng = np.random.default_rng(8)
+    weights = csr_array(rng.random((NUM_POINTS,) * 2) * (rng.random((NUM_POINTS,) * 2) < 0.02) + np.eye(NUM_POINTS))
+    (rays,) = receivers.rays
+    shared = replace(receivers, rays=(replace(rays, sharing=weights.astype(np.float32)),))
+    term, bands = TERMS["lambert"], bands_of(TERMS["lambert"])
+    alone = image_by_rows(term, bands, receivers, light(1))
+    np.testing.assert_allclose(image_by_rows(term, bands, shared, light(1)), weights @ alone, rtol=1e-4, atol=1e-4)
 
 
 def freeze(term, bands, receivers, cancelled=lambda: False):
