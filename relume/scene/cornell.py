@@ -36,12 +36,12 @@ def cornell_box(is_floor_glossy: bool = False) -> Scene:
         is_floor_glossy: its floor has the terms `GLOSSY_FLOOR`.
     """
     parts: list[tuple[str, Surface, Sequence[float]]] = [
-        ("Floor", _rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
-        ("Walls", merged([_rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), _roof()]), WHITE),
-        ("Red wall", _rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0)), RED),
-        ("Green wall", _rectangle((1, 0, -1), (0, 0, 2), (0, 2, 0)), GREEN),
-        ("Tall block", _block(0.3, 1.2, 0.3).moved(turn_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
-        ("Short block", _block(0.3, 0.6, 0.3).moved(turn_y(-17.0), (0.34, 0.0, 0.38)), WHITE),
+        ("Floor", rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
+        ("Walls", merged([rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), _roof()]), WHITE),
+        ("Red wall", rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0)), RED),
+        ("Green wall", rectangle((1, 0, -1), (0, 0, 2), (0, 2, 0)), GREEN),
+        ("Tall block", block(0.3, 1.2, 0.3).moved(turn_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
+        ("Short block", block(0.3, 0.6, 0.3).moved(turn_y(-17.0), (0.34, 0.0, 0.38)), WHITE),
     ]
     meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(parts)]
     materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in parts]
@@ -51,10 +51,10 @@ def cornell_box(is_floor_glossy: bool = False) -> Scene:
     return make_scene("Cornell box", meshes, materials, [camera], sunny_sky())
 
 
-def sunny_sky() -> Environment:
-    """A sun nearly overhead, soft as through haze, in a blue sky; nothing from below."""
+def sunny_sky(sun: F64 = SUN) -> Environment:
+    """A sun, soft as through haze, in a blue sky; nothing from below. sun: towards it. (3,)"""
     towards = texel_directions(256, 512).astype(np.float64)
-    cosine = towards @ (SUN / np.linalg.norm(SUN))
+    cosine = towards @ (sun / np.linalg.norm(sun))
     edge = np.clip((cosine - np.cos(1.2 * SUN_RADIUS)) / (np.cos(0.8 * SUN_RADIUS) - np.cos(1.2 * SUN_RADIUS)), 0, 1)
     height = towards[..., 1:2]
     sky = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
@@ -62,7 +62,7 @@ def sunny_sky() -> Environment:
     return Environment("sunny sky", radiance.astype(np.float32))
 
 
-def _rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> Surface:
+def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> Surface:
     """corner + [0, 1] u + [0, 1] v, facing u × v."""
     start, along, up = (np.asarray(a, np.float64) for a in (corner, u, v))
     normal = np.cross(along, up)
@@ -80,20 +80,20 @@ def _roof() -> Surface:
     s, strip = SKYLIGHT, 1 - SKYLIGHT
     return merged(
         [
-            _rectangle((-1, 2, -1), (2, 0, 0), (0, 0, strip)),
-            _rectangle((-1, 2, s), (2, 0, 0), (0, 0, strip)),
-            _rectangle((-1, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
-            _rectangle((s, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
+            rectangle((-1, 2, -1), (2, 0, 0), (0, 0, strip)),
+            rectangle((-1, 2, s), (2, 0, 0), (0, 0, strip)),
+            rectangle((-1, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
+            rectangle((s, 2, -s), (strip, 0, 0), (0, 0, 2 * s)),
         ]
     )
 
 
-def _block(half_width: float, height: float, half_depth: float) -> Surface:
+def block(half_width: float, height: float, half_depth: float) -> Surface:
     """A block on y = 0 without its underside, which nothing sees."""
     x, z = half_width, half_depth
     corners = [(-x, z), (x, z), (x, -z), (-x, -z)]
     sides = [
-        _rectangle((a[0], 0, a[1]), (b[0] - a[0], 0, b[1] - a[1]), (0, height, 0))
+        rectangle((a[0], 0, a[1]), (b[0] - a[0], 0, b[1] - a[1]), (0, height, 0))
         for a, b in zip(corners, corners[1:] + corners[:1], strict=True)
     ]
-    return merged([*sides, _rectangle((-x, height, z), (2 * x, 0, 0), (0, 0, -2 * z))])
+    return merged([*sides, rectangle((-x, height, z), (2 * x, 0, 0), (0, 0, -2 * z))])

@@ -89,7 +89,8 @@ export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Curve point: pick up and put down", "Enter, click"],
   ["Curve point: delete, reset", "Delete  R"],
   ["Stretch: scale, shift", "↑ ↓  ← →"],
-  ["Handle of a light: move, near and away", "← → ↑ ↓  Shift ↑ ↓"],
+  ["Handle of a light: move", "← → ↑ ↓"],
+  ["Handle of a light: away, near", "Shift ↑ ↓"],
   ["Picture: pan", "← → ↑ ↓"],
   ["One of several views: show it alone", "Enter, double-click"],
 ];

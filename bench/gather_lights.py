@@ -1,0 +1,66 @@
+"""gather.light_move_fps and gather.light_scale_fps: a lamp is moved, and then dimmed, in the room of bench/gather.py.
+
+A rectangle of 0.5 × 0.5 m under the ceiling, held by the hand; from the look to the encoded bytes, with what is made
+for a frame; medians. A frame that shows a moved lamp may be near the look: at rest it is shaded exactly.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.gather import bake, recipe_of, settle
+from relume.look import validate
+from relume.scene.cornell import cornell_box
+from relume.transfer.cache import FrozenCache
+from relume.transfer.opened import Transfer, open_transfer
+from relume.transfer.picture import Picture
+
+_NAMES = ("gather.light_move_fps", "gather.light_scale_fps")
+_SPEED = "frames/s"
+_LAMP: dict[str, Any] = {"kind": "rectangle", "direction": [0.0, -1.0, 0.0], "emission": [4.0, 4.0, 4.0]}
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Two drags."""
+    num_frames, recipe = 3 if tiny else 24, recipe_of(tiny)
+    with tempfile.TemporaryDirectory() as folder:
+        scene = cornell_box(is_floor_glossy=True)
+        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path)
+        picture = Picture(transfer, "front", FrozenCache(4 << 30))
+        places = [{"position": [float(x), 1.7, 0.2]} for x in np.linspace(-0.4, 0.4, num_frames)]
+        scales = [{"position": [0.4, 1.7, 0.2], "scale": float(scale)} for scale in np.geomspace(0.1, 3, num_frames)]
+        found = [_frames_s(transfer, picture, changes) for changes in (places, scales)]
+    return [
+        Figure(name, 1 / float(np.median(taken)), _SPEED, {
+            "ms_p50": 1e3 * float(np.median(taken)), "ms_max": 1e3 * max(taken), "size": list(recipe.size),
+        })
+        for name, taken in zip(_NAMES, found, strict=True)
+    ]  # fmt: skip
+
+
+def _frames_s(transfer: Transfer, picture: Picture, changes: Sequence[dict[str, Any]]) -> list[float]:
+    """Seconds of each frame but the first, whose light is at rest before."""
+    taken = []
+    for k, change in enumerate(changes):
+        document = copy.deepcopy(transfer.default_look)
+        document["lights"]["Lamp"] = {**_LAMP, **change}
+        look = validate(document, transfer.default_look)
+        began = time.perf_counter()
+        picture.set_look(look)
+        while (need := picture.waiting()) is not None and not need.refines:
+            picture.freeze(lambda share: None, lambda: False)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        taken.append(time.perf_counter() - began)
+        if k == 0:
+            settle(picture)
+            picture.touch("/lights/Lamp")
+            settle(picture)
+    return taken[1:]

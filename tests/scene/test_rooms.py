@@ -1,0 +1,35 @@
+"""Scenes by code that light is reflected in: their surfaces face where they are seen from, and light gets in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relume.scene.cornell import cornell_box
+from relume.scene.interior import interior
+from relume.scene.tableau import tableau
+from relume.trace.geometry import merge
+from relume.trace.view_samples import BACKGROUND, sample_view
+
+SCENES = {"cornell": cornell_box, "interior": interior, "tableau": tableau}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_nothing_is_seen_from_behind(name):
+    scene = SCENES[name]()
+    for mesh in scene.meshes:
+        a, b, c = (mesh.positions[mesh.faces[:, k]].astype(float) for k in range(3))
+        agrees = np.einsum("nc,nc->n", np.cross(b - a, c - a), mesh.normals[mesh.faces[:, 0]].astype(float)) > 0
+        assert agrees.mean() > 0.99, mesh.name
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_all_materials_are_in_the_picture(name):
+    scene = SCENES[name]()
+    samples = sample_view(scene, merge(scene), "front", (64, 64))
+    assert set(range(len(scene.materials))) <= set(samples.material.tolist()) - {BACKGROUND}
+
+
+def test_the_floor_of_the_box_may_be_glossy():
+    plain, glossy = (cornell_box(is_floor_glossy).materials[0].terms for is_floor_glossy in (False, True))
+    assert [len(terms) for terms in (plain, glossy)] == [1, 2]
