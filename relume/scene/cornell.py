@@ -1,4 +1,5 @@
-"""A Cornell box under the sky: white room, red and green walls, two blocks; sun and sky come in through its roof."""
+"""A Cornell box under the sky: white room, red and green walls, two blocks; sun and sky come in through its roof, or a
+lamp hangs from its ceiling."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from relume.light.environment import texel_directions
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import Surface, merged, turn_y
-from relume.scene.model import Environment, Material, Scene
+from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene
 
 F64 = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ GLOSSY_FLOOR: tuple[dict[str, Any], ...] = (
     {"model": "lambert", "color": [0.36, 0.35, 0.33]},
     {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "params": {"exponent": 100.0}},
 )
+LAMP, LAMP_SIZE, LAMP_GAP = (18.0, 13.5, 8.5), (0.5, 0.4), 2e-3  # radiance; metres, the gap to the ceiling
 SUN = np.array([0.22, 1.0, 0.12])
 SUN_RADIUS = np.radians(4.0)
 
@@ -35,9 +37,33 @@ def cornell_box(is_floor_glossy: bool = False) -> Scene:
     Args:
         is_floor_glossy: its floor has the terms `GLOSSY_FLOOR`.
     """
+    meshes, materials = _room(_roof())
+    if is_floor_glossy:
+        materials[0] = Material("Floor", GLOSSY_FLOOR)
+    return make_scene("Cornell box", meshes, materials, [_camera()], sunny_sky())
+
+
+@cache
+def lamplit_cornell_box() -> Scene:
+    """The same room with a whole ceiling and a lamp in it, by night: the light "Lamp" is that of its material."""
+    meshes, materials = _room(rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2)))
+    x, z = LAMP_SIZE[0] / 2, LAMP_SIZE[1] / 2
+    plate = rectangle((-x, 2 - LAMP_GAP, -z), (2 * x, 0, 0), (0, 0, 2 * z))
+    shine = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": list(LAMP)})
+    return make_scene(
+        "Cornell box by lamplight",
+        [*meshes, plate.mesh("Lamp", len(materials))],
+        [*materials, Material("Lamp", ({"model": "lambert", "color": list(WHITE)},), double_sided=False)],
+        [_camera()],
+        Environment("night", np.full((4, 8, 3), 1e-6, np.float32)),
+        lights=[shine],
+    )
+
+
+def _room(roof: Surface) -> tuple[list[Mesh], list[Material]]:
     parts: list[tuple[str, Surface, Sequence[float]]] = [
         ("Floor", rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
-        ("Walls", merged([rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), _roof()]), WHITE),
+        ("Walls", merged([rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), roof]), WHITE),
         ("Red wall", rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0)), RED),
         ("Green wall", rectangle((1, 0, -1), (0, 0, 2), (0, 2, 0)), GREEN),
         ("Tall block", block(0.3, 1.2, 0.3).moved(turn_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
@@ -45,10 +71,11 @@ def cornell_box(is_floor_glossy: bool = False) -> Scene:
     ]
     meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(parts)]
     materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in parts]
-    if is_floor_glossy:
-        materials[0] = Material("Floor", GLOSSY_FLOOR)
-    camera = look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
-    return make_scene("Cornell box", meshes, materials, [camera], sunny_sky())
+    return meshes, materials
+
+
+def _camera() -> Camera:
+    return look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
 
 
 def sunny_sky(sun: F64 = SUN) -> Environment:
