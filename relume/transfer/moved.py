@@ -16,10 +16,9 @@ from relume.transfer.contraction import contract
 from relume.transfer.light import Light, Source
 from relume.transfer.local import Points
 from relume.transfer.material_image import MaterialImage
-from relume.transfer.need import need_of_image
 from relume.transfer.ray_projector import RayProjector
 from relume.transfer.receivers import LocalRays, Receivers
-from relume.transfer.shade import Shaded
+from relume.transfer.shade import Shaded, shaded_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
 
@@ -59,12 +58,26 @@ class MovedLights:
         return change - self._before(material, image, _alone(before, gone)) if gone else change
 
     def _now(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
-        lit, transfer = self._lit(material), self._images.transfer
         known, rays = self._rays.get(material.index, (None, []))
         if known != light:
-            rays = transfer.local.all_rays(light, lit.points, num_samples=ROUGH_SAMPLES)
+            local = self._images.transfer.local
+            rays = local.all_rays(light, self._lit(material).points, num_samples=ROUGH_SAMPLES)
             self._rays[material.index] = light, rays
-        points = replace(lit.receivers, rays=rays)
+        return self._shaded(material, image, rays).image
+
+    def _before(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
+        """As exact as in the picture that was shaded; the same in every frame, and so kept."""
+        images = self._images
+        key = (*images.key_of_image(material, image, light), "straight")
+
+        def shaded() -> Shaded:
+            return self._shaded(material, image, images.local_rays(material.index, light))
+
+        return images.cache.get(key, Shaded, shaded_bytes(material.num_samples), shaded).image
+
+    def _shaded(self, material: MaterialImage, image: TermImage, rays: list[LocalRays]) -> Shaded:
+        """What rays bring a term, in the threads of frames."""
+        points = replace(self._lit(material).receivers, rays=rays)
         contraction = contract(image.term, image.target, None)
         rows = np.zeros((material.num_samples, 3, 1), np.float32)
 
@@ -72,13 +85,7 @@ class MovedLights:
             RayProjector(image.term, contraction, points, stop - start).add(start, stop, rows[start:stop])
 
         for_shares(add, len(rows))
-        return Shaded.of(rows[:, :, 0]).image
-
-    def _before(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
-        """As exact as in the picture that was shaded; the same in every frame."""
-        shaded = need_of_image(self._images, material, image, light).make(lambda _: None, lambda: False)
-        assert isinstance(shaded, Shaded)
-        return shaded.image
+        return Shaded.of(rows[:, :, 0])
 
     def _lit(self, material: MaterialImage) -> _Lit:
         view, index = self._images.view, material.index

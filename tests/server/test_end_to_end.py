@@ -173,3 +173,23 @@ def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: Test
     first = next(material["terms"][0] for material in document if material["name"] == "Ball")
     looks = [{"materials": {"Ball": {"terms": [first, ggx]}}}]
     assert_same(picture, rendered_by(real, {"bake": bake, "view": "front", "looks": looks}, tmp_path))
+
+
+def test_colour_bleeding_follows_a_dragged_colour_and_ends_exact(real: TestClient) -> None:
+    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+    scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
+    bake = bakes.submit(scene, Recipe("gather", ("front",), (64, 48), 100))
+    with bakes.subscribe(bake) as changes:
+        assert list(changes)[-1].state == "ready"
+    color, picture = "/materials/Floor/terms/0/color", np.zeros((48, 64, 3))
+    with open_session(real, bake) as session:
+        session.edit(1, color, [0.1, 0.1, 0.8])  # rows are frozen for this one
+        put(picture, session.exact(1))
+        before = picture.copy()
+        session.edit(2, color, [0.8, 0.1, 0.1])
+        first = session.frame()
+        put(picture, first)
+        followed = picture.copy()
+        put(picture, session.exact(2))
+    assert (first.header["revision"], first.header["exact"]) == (2, False)
+    assert np.abs(followed - picture).mean() < 0.05 * np.abs(before - picture).mean()
