@@ -10,6 +10,7 @@ import copy
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from bench.figure import Figure
 from bench.gather import bake, recipe_of, settle
+from bench.timing import seconds
 from relume.look import validate
 from relume.scene.cornell import cornell_box
 from relume.transfer.cache import FrozenCache
@@ -40,15 +42,19 @@ def measure(tiny: bool) -> list[Figure]:
         found = [_frames_s(transfer, picture, changes) for changes in (places, scales)]
     return [
         Figure(name, 1 / float(np.median(taken)), _SPEED, {
-            "ms_p50": 1e3 * float(np.median(taken)), "ms_max": 1e3 * max(taken), "size": list(recipe.size),
+            "ms_p50": 1e3 * float(np.median(taken)), "ms_max": 1e3 * max(taken), "prepared_once_s": prepared_s,
+            "size": list(recipe.size),
         })
-        for name, taken in zip(_NAMES, found, strict=True)
+        for name, (taken, prepared_s) in zip(_NAMES, found, strict=True)
     ]  # fmt: skip
 
 
-def _frames_s(transfer: Transfer, picture: Picture, changes: Sequence[dict[str, Any]]) -> list[float]:
-    """Seconds of each frame but the first, which is at rest and held, and the second, which compiles."""
-    taken = []
+def _frames_s(transfer: Transfer, picture: Picture, changes: Sequence[dict[str, Any]]) -> tuple[list[float], float]:
+    """Seconds of each frame of a drag, and of what is made once for it: rows on touch, the lamp's image when dimmed.
+
+    The first two frames are left out: one is at rest, the other asks for that image, and compiles.
+    """
+    taken, prepared_s = [], 0.0
     for k, change in enumerate(changes):
         document = copy.deepcopy(transfer.default_look)
         document["lights"]["Lamp"] = {**_LAMP, **change}
@@ -60,5 +66,6 @@ def _frames_s(transfer: Transfer, picture: Picture, changes: Sequence[dict[str, 
         if k == 0:
             settle(picture)
             picture.touch("/lights/Lamp")
-            settle(picture)
-    return taken[2:]
+        if k <= 1:
+            prepared_s += seconds(partial(settle, picture))
+    return taken[2:], prepared_s

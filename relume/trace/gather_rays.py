@@ -101,7 +101,8 @@ def _sides(count: int) -> F64:
         long = long - times * short
 
 
-@nb.njit(nogil=True, cache=True)
+# What follows is inlined: a call would count references to the pattern's arrays, which threads share.
+@nb.njit(nogil=True, cache=True, inline="always")
 def shift_of(pattern, point):  # type: ignore[no-untyped-def]
     """A shift of the unit square. Two float32 in [0, 1).
 
@@ -114,14 +115,14 @@ def shift_of(pattern, point):  # type: ignore[no-untyped-def]
     return np.float32(u >> np.uint32(8)) * _PER_UNIT, np.float32(v >> np.uint32(8)) * _PER_UNIT
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, inline="always")
 def _along(sides, s, t):  # type: ignore[no-untyped-def]
     u = s * sides[0, 0] + t * sides[1, 0]
     turn = np.float32(2) * _PI * (s * sides[0, 1] + t * sides[1, 1])
     return np.float32(u), np.float32(math.exp(_LN * u)), np.float32(math.cos(turn)), np.float32(math.sin(turn))
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, inline="always")
 def small_shifts_of(pattern, point):  # type: ignore[no-untyped-def]
     """The shift of a point within a cell of each set's lattice: of u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
     s, t = shift_of(pattern, point)
@@ -129,7 +130,7 @@ def small_shifts_of(pattern, point):  # type: ignore[no-untyped-def]
     return _along(pattern.sides[0], s, t), _along(pattern.sides[1], s, t)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, inline="always")
 def density_about_mirror(cos_theta_h, cos_theta_d):  # type: ignore[no-untyped-def]
     """p(ωi) of the glossy rays, 1/sr."""
     away = np.float32(1) - cos_theta_h + _EPSILON
@@ -160,7 +161,7 @@ def glossy_ray(ray, shift, ox, oy, oz):  # type: ignore[no-untyped-def]
     return twice * hx - ox, twice * hy - oy, twice * hz - oz
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, inline="always")
 def local_ray(pattern, ray, shifts, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Direction of a ray of a point. shifts: from `small_shifts_of`"""
     if ray < pattern.num_cosine:
@@ -168,7 +169,7 @@ def local_ray(pattern, ray, shifts, ox, oy, oz):  # type: ignore[no-untyped-def]
     return glossy_ray(pattern.rays[ray], shifts[1], ox, oy, oz)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, inline="always")
 def weight_of(pattern, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """cos θi over the expected number of rays per solid angle, sr."""
     num_cosine = np.float32(pattern.num_cosine)
