@@ -3,33 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.options import Data
 
+if TYPE_CHECKING:
+    from relume.scene.model import Scene
+
 
 def import_scene(
     file: Annotated[
-        Path,
+        Path | None,
         typer.Argument(metavar="FILE.glb", help="A .glb, .gltf, .obj, .ply or .zip file; may name files beside it."),
-    ],
+    ] = None,
     environment: Annotated[
         Path | None,
         typer.Option(metavar="FILE.hdr", help="Equirectangular light, .hdr or .exr; else the demo's studio."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
+    built_in: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="In place of a file: still_life, cornell_box, lamplit_cornell_box, …"),
+    ] = None,
     data: Data = None,
 ) -> None:
     """Register a scene; print its id, what was understood, and a warning for each thing that was not."""
     from cli.house import open_bakes, open_settings
-    from relume.light.environment import read_environment
-    from relume.scene.importer import import_scene as read_scene
     from worker.scenes import get_scene, register_scene
 
-    light = None if environment is None else read_environment(environment, environment.stem)
-    scene = read_scene(file, name or file.stem, light)
+    scene = _find(file, environment, name, built_in)
     service = open_bakes(open_settings(data))
     try:
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))
@@ -46,3 +50,19 @@ def import_scene(
     typer.echo(f"  light: {scene.environment.name}, {width} × {height}")
     for warning in record.warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def _find(file: Path | None, environment: Path | None, name: str | None, made_by_code: str | None) -> Scene:
+    from relume.errors import ParameterError
+    from relume.light.environment import read_environment
+    from relume.scene.built_in import built_in
+    from relume.scene.importer import import_scene as read_scene
+
+    if made_by_code is not None:
+        if not (file is environment is name is None):
+            raise ParameterError("--built-in", made_by_code, "alone: such a scene has its own light and name")
+        return built_in(made_by_code)
+    if file is None:
+        raise ParameterError("FILE.glb", "nothing", "a scene file, or --built-in NAME")
+    light = None if environment is None else read_environment(environment, environment.stem)
+    return read_scene(file, name or file.stem, light)

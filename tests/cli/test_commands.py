@@ -17,6 +17,7 @@ import pytest
 from cli.interrupts import noted_interrupts
 from cli.main import main
 from relume.scene.archive import make_scene
+from relume.scene.built_in import BUILT_IN, built_in
 from relume.scene.model import Camera, Environment, Material, Mesh
 from worker.database import open_database
 from worker.ledger import Ledger
@@ -72,6 +73,14 @@ def test_help_loads_nothing_heavy() -> None:
         assert re.search(rf"^  {command} ", done.stdout, re.MULTILINE)
 
 
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert main(["import", "--built-in", name]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[0] == built_in(name).id
+    assert "warning" not in said.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -86,6 +95,9 @@ def test_help_loads_nothing_heavy() -> None:
         (["bake", "quad", "--method", "magic"], "direct"),
         (["bake", "quad", "--view", "top"], "front"),
         (["import", "no-such-file.glb"], "no-such-file.glb"),
+        (["import"], "--built-in"),
+        (["import", "--built-in", "nowhere"], "cornell_box"),
+        (["import", "--built-in", "interior", "--name", "mine"], "alone"),
         (["reference", "nowhere", "--spp", "4", "--output", "x.exr"], "no scene"),
         (["reference", "quad", "--spp", "0", "--output", "x.exr"], "spp"),
         (["worker", "--scheduler", "nonsense"], "tcp://"),
