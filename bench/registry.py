@@ -81,7 +81,7 @@ GROUPS = (
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group("bench.gather_rooms", ("gather.interior_bake_s", "gather.interior_store_mb")),
-    Group("bench.gather_lights", ("gather.light_move_fps", "gather.light_scale_fps")),
+    Group("bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group(
         "bench.lights",

@@ -43,6 +43,7 @@ TARGETS = {
     "gather.interior_bake_s": "≤ 120 s",
     "gather.interior_store_mb": "≤ 1390 MB",
     "gather.light_move_fps": "≥ 20",
+    "gather.panel_move_fps": "≥ 20",
     "gather.light_scale_fps": "≥ 60",
     "gather.rmse_diffuse": "≤ 2 %",
     "gather.rmse_glossy": "≤ 5 %",

@@ -18,7 +18,7 @@ F32 = NDArray[np.float32]
 
 # rows of RTCRay16, 16 floats each, after the origin
 _NEAR, _DIRECTION, _FAR, _MASK = 3, 4, 8, 9
-_POINTS_A_RANGE = 512
+_POINTS_A_RANGE = 4096
 
 
 @nb.njit(nogil=True, cache=True)
