@@ -59,7 +59,7 @@ def _find(file: Path | None, environment: Path | None, name: str | None, made_by
     from relume.scene.importer import import_scene as read_scene
 
     if made_by_code is not None:
-        if not (file is environment is name is None):
+        if any(given is not None for given in (file, environment, name)):
             raise ParameterError("--built-in", made_by_code, "alone: such a scene has its own light and name")
         return built_in(made_by_code)
     if file is None:
