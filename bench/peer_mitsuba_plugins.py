@@ -8,25 +8,65 @@ mi: Any = __import__("mitsuba")
 dr: Any = __import__("drjit")
 
 
-class LambertCookTorrance(mi.BSDF):  # type: ignore[misc]
+class _TwoLobes(mi.BSDF):  # type: ignore[misc]
+    """A diffuse and a glossy lobe. A subclass has, `wo` being towards the light as Mitsuba names it,
+
+    `_value(wi, wo)`, BRDF times the cosine; `_drawn(wi, which, place)`, a direction from numbers in [0, 1), and
+    `_density(wi, wo)` of drawing it, 1/sr.
+    """
+
+    def __init__(self, props: Any) -> None:
+        mi.BSDF.__init__(self, props)
+        flags = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
+        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
+        self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        bs = mi.BSDFSample3f()
+        bs.wo = self._drawn(si.wi, sample1, sample2)
+        bs.pdf = self.pdf(ctx, si, bs.wo, active)
+        bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
+        bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+        usable = active & (bs.pdf > 0)
+        return bs, dr.select(usable, self.eval(ctx, si, bs.wo, usable) / dr.maximum(bs.pdf, 1e-12), 0)
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return dr.select(_above(si.wi, wo, active), mi.Color3f(self._value(si.wi, wo)), 0)
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return dr.select(_above(si.wi, wo, active), self._density(si.wi, wo), 0)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def to_string(self) -> str:
+        """Mitsuba's interface."""
+        return f"{type(self).__name__}[]"
+
+
+def _above(wi: Any, wo: Any, active: Any) -> Any:
+    return active & (mi.Frame3f.cos_theta(wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
+
+
+class LambertCookTorrance(_TwoLobes):
     """albedo/π + D F G / (4π cos θi cos θo), Beckmann facets, dielectric Fresnel, V-cavity masking.
 
     Samples the cosine and the facets half and half.
     """
 
     def __init__(self, props: Any) -> None:
-        mi.BSDF.__init__(self, props)
+        super().__init__(props)
         self.albedo, self.gain = float(props["albedo"]), float(props["gain"])
         self.sigma, self.ior = float(props["sigma"]), float(props["ior"])
-        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide
-        self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide, glossy]
-        self.m_flags = self.m_components[0] | self.m_components[1]
 
     def _facets(self) -> Any:
         return mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, self.sigma, sample_visible=False)
 
     def _value(self, wi: Any, wo: Any) -> Any:
-        """BRDF times the cosine towards the light, `wo` in Mitsuba's naming."""
         h = dr.normalize(wi + wo)
         cos_h, cos_d = mi.Frame3f.cos_theta(h), dr.maximum(dr.dot(h, wi), 1e-6)
         cos_o, cos_i = mi.Frame3f.cos_theta(wi), mi.Frame3f.cos_theta(wo)
@@ -42,49 +82,26 @@ class LambertCookTorrance(mi.BSDF):  # type: ignore[misc]
         facets = self._facets().pdf(wi, h) / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
         return 0.5 * (mi.warp.square_to_cosine_hemisphere_pdf(wo) + facets)
 
-    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        h, _ = self._facets().sample(si.wi, sample2)
-        wo = dr.select(sample1 < 0.5, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(si.wi, h))
-        bs = mi.BSDFSample3f()
-        bs.wo, bs.pdf = wo, self.pdf(ctx, si, wo, active)
-        bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
-        bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        usable = active & (bs.pdf > 0)
-        return bs, dr.select(usable, self.eval(ctx, si, wo, usable) / dr.maximum(bs.pdf, 1e-12), 0)
-
-    def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        above = active & (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
-        return dr.select(above, mi.Color3f(self._value(si.wi, wo)), 0)
-
-    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        above = active & (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
-        return dr.select(above, self._density(si.wi, wo), 0)
-
-    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-    def to_string(self) -> str:
-        """Mitsuba's interface."""
-        return "LambertCookTorrance[]"
+    def _drawn(self, wi: Any, which: Any, place: Any) -> Any:
+        h, _ = self._facets().sample(wi, place)
+        return dr.select(which < 0.5, mi.warp.square_to_cosine_hemisphere(place), mi.reflect(wi, h))
 
 
 mi.register_bsdf("lambert_cook_torrance", lambda props: LambertCookTorrance(props))
 
 
-class LambertBlinnPhong(mi.BSDF):  # type: ignore[misc]
+class LambertBlinnPhong(_TwoLobes):
     """albedo/π + gain (s + 2)/(2π) cos^s θh; samples the two by their albedos' means."""
 
     def __init__(self, props: Any) -> None:
-        mi.BSDF.__init__(self, props)
+        super().__init__(props)
         self.albedo, self.gain = mi.Color3f(props["albedo"]), mi.Color3f(props["gain"])
         self.exponent, self.diffuse = float(props["exponent"]), float(props["diffuse_share"])
-        flags = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
-        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
-        self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def _value(self, wi: Any, wo: Any) -> Any:
+        cos_i, cos_h = mi.Frame3f.cos_theta(wo), mi.Frame3f.cos_theta(dr.normalize(wi + wo))
+        lobe = (self.exponent + 2) / (2 * dr.pi) * dr.power(dr.maximum(cos_h, 0), self.exponent)
+        return cos_i * (self.albedo / dr.pi + self.gain * lobe)
 
     def _density(self, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
@@ -92,38 +109,11 @@ class LambertBlinnPhong(mi.BSDF):  # type: ignore[misc]
         about_mirror = lobe / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
         return dr.lerp(about_mirror, mi.warp.square_to_cosine_hemisphere_pdf(wo), self.diffuse)
 
-    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        cos_h = dr.power(sample2.x, 1 / (self.exponent + 1))
-        sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * sample2.y
+    def _drawn(self, wi: Any, which: Any, place: Any) -> Any:
+        cos_h = dr.power(place.x, 1 / (self.exponent + 1))
+        sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * place.y
         h = mi.Vector3f(sin_h * dr.cos(phi), sin_h * dr.sin(phi), cos_h)
-        wo = dr.select(sample1 < self.diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(si.wi, h))
-        bs = mi.BSDFSample3f()
-        bs.wo, bs.pdf = wo, self.pdf(ctx, si, wo, active)
-        bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
-        bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        usable = active & (bs.pdf > 0)
-        return bs, dr.select(usable, self.eval(ctx, si, wo, usable) / dr.maximum(bs.pdf, 1e-12), 0)
-
-    def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        cos_i, cos_h = mi.Frame3f.cos_theta(wo), mi.Frame3f.cos_theta(dr.normalize(si.wi + wo))
-        lobe = (self.exponent + 2) / (2 * dr.pi) * dr.power(dr.maximum(cos_h, 0), self.exponent)
-        above = active & (mi.Frame3f.cos_theta(si.wi) > 0) & (cos_i > 0)
-        return dr.select(above, cos_i * (self.albedo / dr.pi + self.gain * lobe), 0)
-
-    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        above = active & (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
-        return dr.select(above, self._density(si.wi, wo), 0)
-
-    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-    def to_string(self) -> str:
-        """Mitsuba's interface."""
-        return "LambertBlinnPhong[]"
+        return dr.select(which < self.diffuse, mi.warp.square_to_cosine_hemisphere(place), mi.reflect(wi, h))
 
 
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))

@@ -16,6 +16,16 @@ from relume.trace.cell_tree import NO_CELL
 from relume.trace.gather_rays import local_ray, shift_of, small_shifts_of, weight_of
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _in_frame(n, t, o):  # type: ignore[no-untyped-def]
+    """The bitangent n × t of a shading frame, and direction o in the frame."""
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
+    oy = bx * o[0] + by * o[1] + bz * o[2]
+    oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    return (bx, by, bz), (ox, oy, oz)
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def list_gathered(  # type: ignore[no-untyped-def]
     normal, tangent, wo, links, pattern, numbers, radiance, start, stop, first, wi, out, power
@@ -30,11 +40,7 @@ def list_gathered(  # type: ignore[no-untyped-def]
     end = 0
     for p in range(start, stop):
         first[p - start] = end
-        n, t, o = normal[p], tangent[p], wo[p]
-        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-        ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
-        oy = bx * o[0] + by * o[1] + bz * o[2]
-        oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+        _, (ox, oy, oz) = _in_frame(normal[p], tangent[p], wo[p])
         shifts = small_shifts_of(pattern, numbers[p])
         for ray in range(links.shape[1]):
             cell = links[p, ray]
@@ -62,11 +68,8 @@ def list_local(  # type: ignore[no-untyped-def]
     end = 0
     for p in range(start, stop):
         first[p - start] = end
-        n, t, o = normal[p], tangent[p], wo[p]
-        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-        ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
-        oy = bx * o[0] + by * o[1] + bz * o[2]
-        oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+        n, t = normal[p], tangent[p]
+        (bx, by, bz), (ox, oy, oz) = _in_frame(n, t, wo[p])
         shift_u, shift_v = shift_of(pattern, numbers[p])
         for sample in range(pattern.uv.shape[0]):
             if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
