@@ -84,6 +84,15 @@ GROUPS = (
     Group("bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group(
+        "bench.estimators",
+        (
+            "estimators.final_gather",
+            "estimators.connect_equal_rays",
+            "estimators.connect_equal_store",
+            "estimators.connect_all",
+        ),
+    ),
+    Group(
         "bench.lights",
         (
             "lights.rmse_point",
