@@ -25,8 +25,8 @@ from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.coherent import trace_coherent
-from relume.trace.gather_rays import Pattern, make_pattern
-from relume.trace.links import Gatherers, Links, trace_links
+from relume.trace.gather_rays import make_pattern
+from relume.trace.links import Gatherers, trace_links
 from relume.trace.surface import any_tangent
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.transfer.direct import CHUNK_ROWS, DirectMethod
@@ -124,7 +124,7 @@ class GatherMethod(DirectMethod):
         pattern = make_pattern(RAYS_A_POINT, 0, int(store.attributes["gather_seed"]))
         points = Gatherers(position, normal, any_tangent(normal), normal)
         numbers = np.arange(POINTS_A_CELL * task.start, POINTS_A_CELL * task.stop, dtype=np.uint32)
-        links = self._links(scene, store, points, pattern, numbers)
+        links = trace_links(self.geometry_of(scene), read_tree(store), points, pattern, numbers)
         num_cells = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
             "cells/visibility": seen.visible.reshape(num_cells, -1),
@@ -138,18 +138,14 @@ class GatherMethod(DirectMethod):
         points = read_receivers(store, k, task.start, task.stop, np.empty((0, 0), np.uint8))
         material = store.read(f"views/{k}/material", task.start, task.stop)
         numbers, parts = np.arange(task.start, task.stop, dtype=np.uint32), []
+        geometry, tree = self.geometry_of(scene), read_tree(store)
         for index in np.unique(material):
             first, stop = np.searchsorted(material, [index, index + 1])
             some = Gatherers(*(a[first:stop] for a in (position, points.normal, points.tangent, points.wo)))
             pattern = pattern_of_material(store, k, int(index))
-            parts.append(self._links(scene, store, some, pattern, numbers[first:stop]))
+            parts.append(trace_links(geometry, tree, some, pattern, numbers[first:stop]))
         arrays = {f"views/{k}/links": np.concatenate([part.cell for part in parts]), f"views/{k}/number": numbers}
         return Written(arrays, sum(part.num_rays for part in parts), sum(part.trace_s for part in parts))
-
-    def _links(
-        self, scene: Scene, store: StoreReader, points: Gatherers, pattern: Pattern, numbers: NDArray[np.uint32]
-    ) -> Links:
-        return trace_links(self.geometry_of(scene), read_tree(store), points, pattern, numbers)
 
 
 def _num_cells(recipe: Recipe) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,11 +91,7 @@ class LocalLights:
         """
         if not light.paths.direct:
             return []
-
-        def traced(geometry: LightGeometry, points: Points) -> Shadows:
-            return Shadows(self._trace(geometry, points, num_samples))
-
-        find = shadows_of or traced
+        find = shadows_of or partial(self.shadows, num_samples=num_samples)
         return [
             LocalRays(
                 self._light(geometry),
@@ -108,15 +104,20 @@ class LocalLights:
             for geometry, gain in light.local
         ]
 
-    def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
+    def shadows(self, geometry: LightGeometry, points: Points, num_samples: int = SAMPLES) -> Shadows:
         """What points see of a light."""
-        return Shadows(self._trace(geometry, points, SAMPLES))
+        return Shadows(self._trace(geometry, points, num_samples))
 
     @cached_property
     def _cells(self) -> Points:
         """The points that stand for gather cells, those of a cell one after another."""
         position, normal = (self._store.read(f"cells/{name}").reshape(-1, 3) for name in ("position", "normal"))
         return Points(position, normal, np.arange(len(position), dtype=np.uint32))
+
+    @cached_property
+    def _few_cells(self) -> Points:
+        """One of each cell's points."""
+        return Points(*(np.ascontiguousarray(a[::POINTS_A_CELL]) for a in vars(self._cells).values()))
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
         """What comes to every gather cell from a light of unit emission, the mean over its points. (C,) float32"""
@@ -125,8 +126,7 @@ class LocalLights:
 
     def _rough_irradiance(self, geometry: LightGeometry) -> F32:
         """The same for a moving hand, at one of a cell's points."""
-        some = Points(*(np.ascontiguousarray(a[::POINTS_A_CELL]) for a in vars(self._cells).values()))
-        return self._arriving(geometry, some, POINTS_A_CELL)
+        return self._arriving(geometry, self._few_cells, POINTS_A_CELL)
 
     def _arriving(self, geometry: LightGeometry, points: Points, num_samples: int) -> F32:
         pattern, seen = pattern_of(geometry, num_samples), self._trace(geometry, points, num_samples)
