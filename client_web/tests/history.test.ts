@@ -1,15 +1,27 @@
 import { beforeEach, describe, expect, test } from "vitest";
-import { History } from "../src/state/history";
+import type { Look } from "../src/protocol";
+import { History, type Perform } from "../src/state/history";
+import { setAt } from "../src/state/pointer";
+import { LOOK } from "./look";
 
 let value = 0;
 let now = 0;
 let history: History;
 
+const exposed = (exposure: number): Look => setAt(LOOK, "/display/exposure", exposure);
+
+/** The look is a number here: its exposure. */
+const perform: Perform = (step, back) => {
+  if (step.of === "look") value = (back ? step.before : step.after).display.exposure;
+};
+const goTo = (count: number) => history.goTo(count, perform);
+const undo = () => goTo(history.cursor.value - 1);
+const redo = () => goTo(history.cursor.value + 1);
+
 function change(to: number, key?: string): void {
-  const from = value;
+  const step = { of: "look" as const, label: `to ${to}`, before: exposed(value), after: exposed(to) };
   value = to;
-  const operation = { label: `to ${to}`, redo: () => void (value = to), undo: () => void (value = from) };
-  history.record(key === undefined ? operation : { ...operation, key });
+  history.record(key === undefined ? step : { ...step, key });
 }
 
 beforeEach(() => {
@@ -20,10 +32,10 @@ beforeEach(() => {
 describe("History", () => {
   test("undo and redo walk through every step", async () => {
     [1, 2, 3].forEach((v) => change(v));
-    await history.undo();
-    await history.undo();
+    await undo();
+    await undo();
     expect(value).toBe(1);
-    await history.redo();
+    await redo();
     expect(value).toBe(2);
     expect([history.canUndo, history.canRedo]).toEqual([true, true]);
   });
@@ -33,9 +45,9 @@ describe("History", () => {
     for (let v = 10; v < 60; v++) change(v, "/sigma");
     history.seal();
     expect(history.steps.value).toHaveLength(2);
-    await history.undo();
+    await undo();
     expect(value).toBe(1);
-    await history.redo();
+    await redo();
     expect(value).toBe(59);
   });
 
@@ -62,27 +74,27 @@ describe("History", () => {
   test("an edit after undo forgets what could be redone", async () => {
     change(1);
     change(2);
-    await history.undo();
+    await undo();
     change(3);
     expect(history.canRedo).toBe(false);
-    await history.undo();
+    await undo();
     expect(value).toBe(1);
   });
 
   test("an operation that fails to undo leaves the cursor where it was", async () => {
-    history.record({ label: "delete look", redo: () => undefined, undo: () => Promise.reject(new Error("offline")) });
-    await expect(history.undo()).rejects.toThrow("offline");
+    history.record({ of: "shelf", label: "delete look", before: { name: "Look", look: {} }, after: null });
+    await expect(history.goTo(0, () => Promise.reject(new Error("offline")))).rejects.toThrow("offline");
     expect(history.cursor.value).toBe(1);
     expect(history.canUndo).toBe(true);
   });
 
   test("goTo jumps over several steps, clamped", async () => {
     [1, 2, 3, 4].forEach((v) => change(v));
-    await history.goTo(1);
+    await goTo(1);
     expect(value).toBe(1);
-    await history.goTo(99);
+    await goTo(99);
     expect(value).toBe(4);
-    await history.goTo(-5);
+    await goTo(-5);
     expect(value).toBe(0);
   });
 

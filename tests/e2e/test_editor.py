@@ -161,8 +161,9 @@ def test_a_saved_look_survives_a_reload(editor: Editor) -> None:
     expect(saved).to_have_count(0)
 
 
-def test_a_reload_returns_to_the_same_place(editor: Editor) -> None:
+def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: Editor) -> None:
     editor.choose("Ball", 1)
+    first = editor.slider(SIGMA).get_attribute("aria-valuenow")
     editor.slider(SIGMA).press("End")
     editor.page.keyboard.press("+")
     url, pixels = editor.page.url, editor.pixels()
@@ -171,6 +172,11 @@ def test_a_reload_returns_to_the_same_place(editor: Editor) -> None:
     assert changed(pixels, editor.pixels()) == 0
     assert editor.page.url == url
     expect(editor.page.locator("[role=option][aria-selected=true]")).to_have_text("Ball")
+    assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
+    expect(editor.page.locator(".tile.step img")).to_have_count(2)
+    editor.page.keyboard.press("Control+z")
+    assert editor.slider(SIGMA).get_attribute("aria-valuenow") == first
+    editor.page.keyboard.press("Control+Shift+z")
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
 
 

@@ -161,15 +161,16 @@ function Steps() {
     [history.cursor.value, steps.length],
   );
   const first = Math.max(0, steps.length - MAX_STEPS);
-  // steps that are not of the look (a look was deleted) show the picture before them
-  let last: Look | undefined = steps[0]?.before ?? look.value ?? undefined;
+  const opened = steps.find((step) => step.of === "look")?.before ?? look.value ?? undefined;
+  // steps that are not of the look (one was deleted) show the picture before them
+  let last = opened;
   const tiles = steps.map((step, i) => {
-    last = step.after ?? last;
+    if (step.of === "look") last = step.after;
     return { count: i + 1, label: step.label, of: last };
   });
   return (
     <ul class="tiles" ref={strip} aria-label="Steps of this visit">
-      {first === 0 && <StepTile count={0} label="Opened" of={steps[0]?.before ?? look.value ?? undefined} />}
+      {first === 0 && <StepTile count={0} label="Opened" of={opened} />}
       {tiles.slice(first).map((tile) => (
         <StepTile key={tile.count} {...tile} />
       ))}

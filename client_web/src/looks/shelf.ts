@@ -2,13 +2,12 @@
 import { signal } from "@preact/signals";
 import { ApiError, json, request } from "../net/api";
 import type { Look, LookEntry } from "../protocol";
+import type { NamedLook } from "../state/history";
 import { history, scene } from "../state/store";
 import { attempt } from "../ui/toasts";
 
-export interface SavedLook {
-  name: string;
+export interface SavedLook extends NamedLook {
   etag: string;
-  look: Partial<Look>;
 }
 
 export const shelf = signal<SavedLook[]>([]);
@@ -67,7 +66,11 @@ function conflict(error: unknown, name: string): never {
   throw error;
 }
 
-async function write(name: string, look: Partial<Look>, etag: string | null): Promise<void> {
+function etagOf(name: string): string | null {
+  return shelf.value.find((entry) => entry.name === name)?.etag ?? null;
+}
+
+async function write({ name, look }: NamedLook, etag: string | null): Promise<void> {
   const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
   const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) =>
     conflict(error, name),
@@ -78,56 +81,43 @@ async function write(name: string, look: Partial<Look>, etag: string | null): Pr
 }
 
 async function erase(name: string): Promise<void> {
-  const etag = shelf.value.find((entry) => entry.name === name)?.etag ?? "*";
-  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) =>
+  await request(path(name), { method: "DELETE", headers: { "If-Match": etagOf(name) ?? "*" } }).catch((error: unknown) =>
     conflict(error, name),
   );
   shelf.value = shelf.value.filter((entry) => entry.name !== name);
 }
 
-async function perform(label: string, redo: () => Promise<void>, undo: () => Promise<void>): Promise<void> {
+/** Put a saved look in the place of another; null where there is none. */
+export async function exchange(from: NamedLook | null, to: NamedLook | null): Promise<void> {
+  if (to !== null) await write(to, from?.name === to.name ? etagOf(to.name) : null);
+  if (from === null || from.name === to?.name) return;
+  const image = thumbnailOf(from.name);
+  if (to !== null && image !== null) keepThumbnail(to.name, image);
+  await erase(from.name);
+}
+
+async function perform(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
   await attempt(async () => {
-    await redo();
-    history.record({ label, redo, undo });
+    await exchange(before, after);
+    history.record({ of: "shelf", label, before, after });
     history.seal();
   });
 }
 
+const named = ({ name, look }: NamedLook): NamedLook => ({ name, look });
+
 export function addLook(name: string, look: Look): Promise<void> {
-  return perform(
-    `Save ${name}`,
-    () => write(name, look, null),
-    () => erase(name),
-  );
+  return perform(`Save ${name}`, null, { name, look });
 }
 
-export function deleteLook({ name, look }: SavedLook): Promise<void> {
-  return perform(
-    `Delete ${name}`,
-    () => erase(name),
-    () => write(name, look, null),
-  );
+export function deleteLook(saved: SavedLook): Promise<void> {
+  return perform(`Delete ${saved.name}`, named(saved), null);
 }
 
-export function updateLook({ name, look: before }: SavedLook, look: Look): Promise<void> {
-  const etag = () => shelf.value.find((entry) => entry.name === name)?.etag ?? null;
-  return perform(
-    `Update ${name}`,
-    () => write(name, look, etag()),
-    () => write(name, before, etag()),
-  );
+export function updateLook(saved: SavedLook, look: Look): Promise<void> {
+  return perform(`Update ${saved.name}`, named(saved), { name: saved.name, look });
 }
 
-export function renameLook({ name, look }: SavedLook, to: string): Promise<void> {
-  const move = async (a: string, b: string) => {
-    await write(b, look, null);
-    const image = thumbnailOf(a);
-    if (image !== null) keepThumbnail(b, image);
-    await erase(a);
-  };
-  return perform(
-    `Rename ${name}`,
-    () => move(name, to),
-    () => move(to, name),
-  );
+export function renameLook(saved: SavedLook, name: string): Promise<void> {
+  return perform(`Rename ${saved.name}`, named(saved), { name, look: saved.look });
 }

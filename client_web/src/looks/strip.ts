@@ -21,6 +21,11 @@ export function historyThumbnail(of: Look | undefined): string | null {
   return of === undefined ? null : (images.get(of) ?? null);
 }
 
+/** Take up the picture of a look that was kept. */
+export function giveThumbnail(of: Look, image: string): void {
+  images.set(of, image);
+}
+
 /** A saved look that was made elsewhere gets its picture when it is first shown here. */
 function giveToSaved(of: Look, image: string): void {
   const text = JSON.stringify(of);

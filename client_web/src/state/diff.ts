@@ -1,6 +1,6 @@
 /** The JSON Patch that turns the look the server has into the look the user wants. */
 import type { Look, PatchOp } from "../protocol";
-import { escapeToken } from "./pointer";
+import { escapeToken, setAt } from "./pointer";
 
 type Json = Record<string, unknown>;
 
@@ -49,4 +49,9 @@ export function diffLooks(from: Look | null, to: Look): PatchOp[] {
   const patch: PatchOp[] = [];
   walk("", from, to, patch);
   return patch;
+}
+
+/** What `diffLooks` took apart: the look with these operations done, sharing what they leave alone. */
+export function applied(from: Look, patch: readonly PatchOp[]): Look {
+  return patch.reduce((look, { op, path, value }) => setAt(look, path, op === "remove" ? undefined : value), from);
 }

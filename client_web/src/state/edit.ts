@@ -28,14 +28,7 @@ export function commit(label: string, next: Look, key?: string): void {
   const before = look.value;
   if (before === null || next === before) return;
   showLook(next);
-  history.record({
-    label,
-    ...(key === undefined ? {} : { key }),
-    before,
-    after: next,
-    redo: () => showLook(next),
-    undo: () => showLook(before),
-  });
+  history.record({ of: "look", label, ...(key === undefined ? {} : { key }), before, after: next });
 }
 
 /** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */

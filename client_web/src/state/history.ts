@@ -1,23 +1,41 @@
-/** Undo for everything: operations with do and undo; those of one drag become one. */
+/** Undo for everything: steps from a state to another, those of one drag as one. They are data, so that a reload can
+ * keep them. */
 import { signal } from "@preact/signals";
 import type { Look } from "../protocol";
 
-export interface Operation {
+export interface LookStep {
+  of: "look";
   label: string;
-  /** Operations in a row with the same key, within one gesture, are one step. */
+  /** Steps in a row with the same key, within one gesture, are one. */
   key?: string;
-  /** The looks it leads from and to, for steps that change the look. */
-  before?: Look;
-  after?: Look;
-  redo(): void | Promise<void>;
-  undo(): void | Promise<void>;
+  before: Look;
+  after: Look;
 }
+
+/** A look that was saved under a name. */
+export interface NamedLook {
+  name: string;
+  look: Partial<Look>;
+}
+
+/** What became of a saved look; null where there is none. */
+export interface ShelfStep {
+  of: "shelf";
+  label: string;
+  before: NamedLook | null;
+  after: NamedLook | null;
+}
+
+export type Step = LookStep | ShelfStep;
+
+/** Makes a step happen again, or undoes it. */
+export type Perform = (step: Step, back: boolean) => void | Promise<void>;
 
 const MAX_STEPS = 200;
 const IDLE_MS = 800;
 
 export class History {
-  readonly steps = signal<readonly Operation[]>([]);
+  readonly steps = signal<readonly Step[]>([]);
   /** Number of steps that are done; the ones after it can be redone. */
   readonly cursor = signal(0);
   private sealed = true;
@@ -34,14 +52,14 @@ export class History {
     return this.cursor.value < this.steps.value.length;
   }
 
-  /** Remember an operation that has been done. */
-  record(operation: Operation): void {
+  /** Remember a step that has been done. */
+  record(step: Step): void {
     const done = this.steps.value.slice(0, this.cursor.value);
     const last = done.at(-1);
     const idle = this.now() - this.lastTime > IDLE_MS;
-    if (last?.key !== undefined && last.key === operation.key && !this.sealed && !idle) {
-      done[done.length - 1] = { ...operation, undo: last.undo, ...(last.before ? { before: last.before } : {}) };
-    } else done.push(operation);
+    if (step.of === "look" && last?.of === "look" && step.key !== undefined && step.key === last.key && !this.sealed && !idle) {
+      done[done.length - 1] = { ...step, before: last.before };
+    } else done.push(step);
     this.steps.value = done.slice(-MAX_STEPS);
     this.cursor.value = this.steps.value.length;
     this.lastTime = this.now();
@@ -58,27 +76,19 @@ export class History {
     this.lastTime = this.now();
   }
 
-  async undo(): Promise<void> {
-    await this.goTo(this.cursor.value - 1);
-  }
-
-  async redo(): Promise<void> {
-    await this.goTo(this.cursor.value + 1);
-  }
-
   /** Undo or redo until `count` steps are done; the cursor moves only after each has succeeded. */
-  async goTo(count: number): Promise<void> {
+  async goTo(count: number, perform: Perform): Promise<void> {
     if (this.busy) return;
     this.busy = true;
     this.sealed = true;
     try {
       const target = Math.min(Math.max(count, 0), this.steps.value.length);
       while (this.cursor.value > target) {
-        await this.steps.value[this.cursor.value - 1]?.undo();
+        await perform(this.steps.value[this.cursor.value - 1] as Step, true);
         this.cursor.value -= 1;
       }
       while (this.cursor.value < target) {
-        await this.steps.value[this.cursor.value]?.redo();
+        await perform(this.steps.value[this.cursor.value] as Step, false);
         this.cursor.value += 1;
       }
     } finally {
@@ -94,8 +104,13 @@ export class History {
   }
 
   clear(): void {
-    this.steps.value = [];
-    this.cursor.value = 0;
+    this.restore([], 0);
+  }
+
+  /** Take up a history that was kept. */
+  restore(steps: readonly Step[], cursor: number): void {
+    this.steps.value = steps;
+    this.cursor.value = cursor;
     this.sealed = true;
   }
 }

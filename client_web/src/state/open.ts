@@ -6,7 +6,7 @@ import { MAX_VIEWS_SHOWN, type BakeBody, type SceneBody } from "../protocol";
 import type { Method } from "../start/methods";
 import { attempt, showError } from "../ui/toasts";
 import { connect, disconnect, whenBakeIsReady } from "./live";
-import { recall } from "./place";
+import { recall, recallHistory, remember } from "./place";
 import * as store from "./store";
 import { placeFromUrl, type Place } from "./url";
 import { availableOf } from "./views";
@@ -36,6 +36,7 @@ export async function bakesOf(scene: SceneBody): Promise<BakeBody[]> {
 }
 
 function reset(scene: SceneBody): void {
+  remember();
   disconnect();
   stopFollowing();
   stage.clear();
@@ -56,6 +57,7 @@ function restorePlace(scene: SceneBody, place: Place): void {
   const kept = recall(scene.id);
   if (kept !== null) {
     store.look.value = kept.look;
+    recallHistory(scene.id, kept.look);
     store.alonePlaces.value = new Map(kept.alone);
     store.besidePlaces.value = new Map(kept.beside);
   }
@@ -142,6 +144,7 @@ export async function openScene(
 }
 
 export function leave(): void {
+  remember();
   disconnect();
   stopFollowing();
   store.page.value = "start";

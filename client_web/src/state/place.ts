@@ -1,8 +1,10 @@
-/** Where the user is, kept so that a reload comes back to it: scene, bake, views and selection in the URL; look and zoom
- * in the tab's own storage. */
+/** Where the user is, kept so that a reload comes back to it: scene, bake, views and selection in the URL; look, zoom and
+ * history in the tab's own storage. */
 import { effect } from "@preact/signals";
+import { giveThumbnail, historyThumbnail } from "../looks/strip";
 import type { Transform } from "../picture/transform";
 import type { Look } from "../protocol";
+import { fromText, toText } from "./journal";
 import * as store from "./store";
 import { placeToUrl } from "./url";
 
@@ -14,6 +16,9 @@ interface Kept {
 }
 
 const keptKey = (scene: string) => `relume.scene.${scene}`;
+const HISTORY = "relume.history.";
+/** Of a scene's history; a browser gives a tab some millions of characters. */
+const MAX_HISTORY_LENGTH = 1 << 20;
 
 export function recall(scene: string): Kept | null {
   try {
@@ -23,12 +28,35 @@ export function recall(scene: string): Kept | null {
   }
 }
 
-function remember(): void {
+/** Take up the history that led to this look of a scene, where it was kept. */
+export function recallHistory(scene: string, look: Look): void {
+  try {
+    const text = sessionStorage.getItem(HISTORY + scene);
+    const story = text === null ? null : fromText(text, look, giveThumbnail);
+    if (story !== null) store.history.restore(story.steps, story.cursor);
+  } catch {
+    // of an older editor, or forbidden: a new one begins
+  }
+}
+
+/** Store a text; where there is no room, histories of other scenes make some. */
+function keep(key: string, text: string): void {
+  try {
+    sessionStorage.setItem(key, text);
+  } catch {
+    for (const other of Object.keys(sessionStorage)) if (other.startsWith(HISTORY)) sessionStorage.removeItem(other);
+    sessionStorage.setItem(key, text);
+  }
+}
+
+export function remember(): void {
   const [scene, look] = [store.scene.value, store.look.value];
   if (store.page.value !== "editor" || scene === null || look === null) return;
   const kept: Kept = { look, alone: [...store.alonePlaces.value], beside: [...store.besidePlaces.value] };
+  const story = { steps: store.history.steps.value, cursor: store.history.cursor.value };
   try {
-    sessionStorage.setItem(keptKey(scene.id), JSON.stringify(kept));
+    keep(keptKey(scene.id), JSON.stringify(kept));
+    keep(HISTORY + scene.id, toText(story, MAX_HISTORY_LENGTH, historyThumbnail));
   } catch {
     // storage is full or forbidden: a reload then starts from the scene's own look
   }

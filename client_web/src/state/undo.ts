@@ -1,7 +1,15 @@
 /** Undo and redo for buttons and keys: what cannot be undone now is said, and stays to be undone later. */
+import { exchange } from "../looks/shelf";
 import { attempt } from "../ui/toasts";
+import { showLook } from "./edit";
+import type { Step } from "./history";
 import { history } from "./store";
 
-export const undo = () => void attempt(() => history.undo());
-export const redo = () => void attempt(() => history.redo());
-export const goTo = (count: number) => void attempt(() => history.goTo(count));
+function perform(step: Step, back: boolean): void | Promise<void> {
+  if (step.of === "look") return showLook(back ? step.before : step.after);
+  return back ? exchange(step.after, step.before) : exchange(step.before, step.after);
+}
+
+export const goTo = (count: number) => void attempt(() => history.goTo(count, perform));
+export const undo = () => goTo(history.cursor.peek() - 1);
+export const redo = () => goTo(history.cursor.peek() + 1);
