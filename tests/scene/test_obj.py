@@ -13,7 +13,7 @@ import pytest
 from relume.errors import SceneError
 from relume.scene.importer import import_scene
 from relume.scene.mesh_files.corners import creased_normals
-from relume.scene.model import Environment, Mesh, Scene
+from relume.scene.model import Environment, Light, Mesh, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -109,7 +109,40 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     scene = import_scene(path, "thing", LIGHT)
     np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0])
     assert scene.materials[0].terms[0] == {"model": "lambert", "color": [1.0, 1.0, 1.0], "texture": "diffuse"}
-    assert len(scene.warnings) == 3
+    assert scene.lights == (Light("a", {"kind": "mesh", "material": "a", "emission": [1.0, 1.0, 1.0]}),)
+    assert len(scene.warnings) == 2
+
+
+def shining(tmp_path: Path, library: str, faces: str) -> Scene:
+    (tmp_path / "m.mtl").write_text(library)
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\n" + faces)
+    return import_scene(path, "thing", LIGHT)
+
+
+def test_emission_is_the_radiance_of_a_light_times_its_image_s_mean(tmp_path: Path) -> None:
+    encoded = io.BytesIO()
+    PIL.Image.fromarray(np.array([[[255, 255, 0], [0, 255, 0]]], np.uint8)).save(encoded, "PNG")
+    (tmp_path / "glow.png").write_bytes(encoded.getvalue())
+    library = "newmtl number\nKe 4 2 0\nnewmtl both\nKe 4 2 6\nmap_Ke glow.png\nnewmtl image\nKe 0\nmap_Ke glow.png\n"
+    scene = shining(tmp_path, library, "".join(f"usemtl {name}\nf 1 2 3\n" for name in ("number", "both", "image")))
+    emissions = {light.name: light.fields["emission"] for light in scene.lights}
+    assert emissions == {"number": [4, 2, 0], "both": [2, 2, 0], "image": [0.5, 1, 0]}
+    assert len(scene.warnings) == 2
+    assert all("map_Ke" in warning and "mean" in warning for warning in scene.warnings)
+
+
+def test_a_shining_material_without_a_surface_is_no_light(tmp_path: Path) -> None:
+    scene = shining(tmp_path, "newmtl lamp\nKe 1\n", "f 1 2 3\nusemtl lamp\nf 1 1 2\n")
+    assert scene.lights == ()
+    assert any("'lamp' shines, but no surface" in warning for warning in scene.warnings)
+
+
+def test_more_than_sixty_four_shining_materials_are_refused(tmp_path: Path) -> None:
+    library = "".join(f"newmtl m{k}\nKe 1\n" for k in range(65))
+    faces = "".join(f"usemtl m{k}\nf 1 2 3\n" for k in range(65))
+    with pytest.raises(SceneError, match="more than 64 lights"):
+        shining(tmp_path, library, faces)
 
 
 def test_what_is_not_there_is_a_warning(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.nodes import placed_nodes
 from relume.scene.gltf.uvs import made_tangents, turned_tangents
 from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
+from relume.scene.lights import LightCollector
 from relume.scene.model import Camera, Environment, Mesh, Scene
 
 F64 = NDArray[np.float64]
@@ -65,7 +66,8 @@ class _Reading:
         self._accessors = AccessorReader(container)
         self.warnings: list[str] = []
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
-        self._light_reader = LightReader(container.document, self.warnings)
+        self._collector = LightCollector(self.warnings)
+        self._light_reader = LightReader(container.document, self._collector, self.warnings)
         self._geometry: dict[tuple[int, int], Geometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
         self._mesh_names: dict[str, int] = {}
@@ -80,9 +82,9 @@ class _Reading:
             self._place(node, to_world)
         if not self.meshes:
             raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
-        for understood in self.materials:
-            self._light_reader.shine(understood.material.name, understood.emission)
-        self.lights = self._light_reader.lights
+        emissions = [np.array(understood.emission) for understood in self.materials]
+        self._collector.shine([understood.material for understood in self.materials], emissions, self.meshes)
+        self.lights = self._collector.lights
         self.variants = self._read_variants()
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, slug("front", self._camera_names)))

@@ -1,13 +1,11 @@
-"""KHR_lights_punctual and shining materials as the scene's local lights.
+"""KHR_lights_punctual as the scene's local lights.
 
 The extension counts light as eyes do: candela and lux. relume's radiance is radiometric, and 683 lumens are a watt (of
-green light; what exporters that think in watts multiply by). Emission of materials is taken as radiance as it stands:
-files mean by 1 what a white surface under an environment of 1 has, not a candela per square metre.
+green light; what exporters that think in watts multiply by).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -15,11 +13,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.errors import SceneError
-from relume.look.lights import MAX_EMISSION, MAX_METRES
-from relume.scene.checks import MAX_LIGHTS
+from relume.look.lights import MAX_METRES
 from relume.scene.gltf.document import Document, Factor, Index, Name, Node, Number
-from relume.scene.gltf.names import unique_name
-from relume.scene.model import Light
+from relume.scene.lights import LightCollector
 
 F64 = NDArray[np.float64]
 
@@ -60,12 +56,11 @@ class _Placed(BaseModel, frozen=True):
 
 
 class LightReader:
-    """Collects the lights of one file, each under a name of its own."""
+    """Reads the lamps at the nodes of one file."""
 
-    def __init__(self, document: Document, warnings: list[str]) -> None:
+    def __init__(self, document: Document, collector: LightCollector, warnings: list[str]) -> None:
+        self._collector = collector
         self._warnings = warnings
-        self._names: dict[str, int] = {}
-        self.lights: list[Light] = []
         try:
             self._defined = _Defined.model_validate(document.extensions.get(EXTENSION, {})).lights
         except (ValidationError, RecursionError):
@@ -85,7 +80,7 @@ class LightReader:
             light = self._defined[_Placed.model_validate(node.extensions[EXTENSION]).light]
         except (ValidationError, IndexError, RecursionError):
             raise SceneError(f"node {node.name[:80]!r} names a light that does not exist; export it again") from None
-        name = unique_name(light.name or node.name or light.type, self._names)
+        name = self._collector.name(light.name or node.name or light.type)
         direction, position = -to_world[:3, 2], to_world[:3, 3]
         length = float(np.linalg.norm(direction))
         if np.abs(position).max() > MAX_METRES or (light.type != "point" and length < 1e-12):
@@ -102,19 +97,4 @@ class LightReader:
         if light.range is not None:
             self._warnings.append(f"the range of light {name!r} is not used; its light ends nowhere")
         self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
-        self._add(name, fields, np.array(light.color) * light.intensity / LUMENS_A_WATT)
-
-    def shine(self, material: str, emission: Sequence[float]) -> None:
-        """A material that shines with some radiance, if any. Raises SceneError where there are too many lights."""
-        if max(emission) > 0:
-            self._add(unique_name(material, self._names), {"kind": "mesh", "material": material}, np.array(emission))
-
-    def _add(self, name: str, fields: dict[str, Any], emission: F64) -> None:
-        if len(self.lights) == MAX_LIGHTS:
-            raise SceneError(
-                f"the scene has more than {MAX_LIGHTS} lights, materials that shine included; remove those that "
-                "matter least, or light it by an environment"
-            )
-        if emission.max() > MAX_EMISSION:
-            self._warnings.append(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that")
-        self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
+        self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_A_WATT)

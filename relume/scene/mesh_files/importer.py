@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from relume.environments.studio import studio
 from relume.errors import SceneError
 from relume.scene.companions import Alone, Companions
 from relume.scene.finish import finished_scene
 from relume.scene.gltf.cameras import framing_camera
 from relume.scene.gltf.names import unique_name
+from relume.scene.lights import F64, LightCollector
 from relume.scene.mesh_files.corners import make_mesh
 from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
 from relume.scene.mesh_files.obj import Obj, read_obj
 from relume.scene.mesh_files.ply import read_ply
-from relume.scene.model import Environment, Material, Mesh, Scene
+from relume.scene.model import Environment, Light, Material, Mesh, Scene
 
 MAX_LIBRARIES = 100
 
@@ -26,6 +29,7 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
     maker = MaterialMaker(companions, warnings)
     numbers: dict[str, int] = {}
     materials: list[Material] = []
+    emissions: list[F64] = []
     meshes: list[Mesh] = []
     taken: dict[str, int] = {}
     for (thing, material), corners in obj.corners().items():
@@ -34,11 +38,14 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
             if material and obj.libraries and material not in library:
                 warnings.append(f"material {material[:80]!r} is not described; it is grey")
             materials.append(maker.make(material, library.get(material)))
+            emissions.append(maker.emission(materials[-1], library.get(material)))
         own_name = unique_name(thing or material or "mesh", taken)
         number = numbers[material]
         mesh = make_mesh(corners, own_name, number, materials[number], f"mesh {own_name!r}", warnings)
         meshes.extend([] if mesh is None else [mesh])
-    return _scene(name, meshes, materials, environment, warnings)
+    collector = LightCollector(warnings)
+    collector.shine(materials, emissions, meshes)
+    return _scene(name, meshes, materials, environment, warnings, collector.lights)
 
 
 def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
@@ -70,9 +77,14 @@ def _library(obj: Obj, companions: Companions, warnings: list[str]) -> dict[str,
 
 
 def _scene(
-    name: str, meshes: list[Mesh], materials: list[Material], environment: Environment | None, warnings: list[str]
+    name: str,
+    meshes: list[Mesh],
+    materials: list[Material],
+    environment: Environment | None,
+    warnings: list[str],
+    lights: Sequence[Light] = (),
 ) -> Scene:
     if not meshes:
         raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
     cameras = [framing_camera(meshes, "front")]
-    return finished_scene(name, meshes, materials, cameras, environment or studio(), warnings)
+    return finished_scene(name, meshes, materials, cameras, environment or studio(), warnings, lights=lights)

@@ -1,4 +1,4 @@
-"""Material libraries of OBJ files: Kd as lambert, Ks and Ns as blinn_phong, Pr and Pm as ggx.
+"""Material libraries of OBJ files: Kd as lambert, Ks and Ns as blinn_phong, Pr and Pm as ggx, Ke as radiance.
 
 Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), and the common PBR extension of it.
 """
@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import SceneError
@@ -19,6 +20,7 @@ from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.model import Material, Texture
 
+F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
 MAX_MATERIALS = 1_000
 GREY = [0.6, 0.6, 0.6]
@@ -99,6 +101,19 @@ class MaterialMaker:
         normal_map = self._image(described.maps.get("norm"), f"the normal map of {what}", _normals)
         return Material(own_name, _terms(described, textures), textures, normal_map)
 
+    def emission(self, material: Material, described: Described | None) -> F64:
+        """Radiance of the surfaces of a material that was made: Ke times the mean of map_Ke. (3,) Raises SceneError."""
+        if described is None:
+            return np.zeros(3)
+        factor = np.array(described.numbers.get("Ke", [0.0, 0.0, 0.0]))
+        texture = self._image(described.maps.get("map_Ke"), f"map_Ke of material {material.name!r}", to_linear)
+        if texture is None:
+            return factor
+        if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 0.01:
+            self._warnings.append(f"map_Ke of material {material.name!r} is replaced by its mean")
+        factor = factor if factor.any() else np.ones(3)  # exporters write zeros where they mean the image
+        return np.asarray(factor * texture.pixels.mean((0, 1), dtype=np.float64))
+
     def _textures(self, described: Described, what: str) -> dict[str, Texture]:
         textures = {}
         for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular")):
@@ -121,11 +136,9 @@ class MaterialMaker:
 
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
         numbers = described.numbers
-        if any(numbers.get("Ke", ())):
-            self._warnings.append(f"{what} glows; its emission is not used")
         if numbers.get("d", [1.0])[0] < 1 or numbers.get("Tr", [0.0])[0] > 0:
             self._warnings.append(f"{what} is see-through; it is opaque here")
-        unused = sorted(described.maps.keys() - {"map_Kd", "map_Ks", "norm"})
+        unused = sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "norm"})
         self._warnings.extend(f"{keyword[:40]} of {what} is not used" for keyword in unused)
 
 

@@ -1,0 +1,65 @@
+"""The lights that a scene file brings, under names of their own, as many and as bright as a look may have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.look.lights import MAX_EMISSION
+from relume.scene.checks import MAX_LIGHTS
+from relume.scene.gltf.names import unique_name
+from relume.scene.model import Light, Material, Mesh
+
+F64 = NDArray[np.float64]
+
+
+class LightCollector:
+    """Collects the lights of one file, whatever its format."""
+
+    def __init__(self, warnings: list[str]) -> None:
+        self._warnings = warnings
+        self._names: dict[str, int] = {}
+        self.lights: list[Light] = []
+
+    def name(self, wanted: str) -> str:
+        """A name that no other light of the file has."""
+        return unique_name(wanted, self._names)
+
+    def add(self, name: str, fields: Mapping[str, Any], emission: F64) -> None:
+        """A light with some emission in the unit of its kind, held to what a look may have.
+
+        Raises:
+            SceneError: there are more than a look may have.
+        """
+        if len(self.lights) == MAX_LIGHTS:
+            raise SceneError(
+                f"the scene has more than {MAX_LIGHTS} lights, materials that shine included; remove those that "
+                "matter least, or light it by an environment"
+            )
+        if emission.max() > MAX_EMISSION:
+            self._warnings.append(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that")
+        self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
+
+    def shine(self, materials: Sequence[Material], emissions: Sequence[F64], meshes: Sequence[Mesh]) -> None:
+        """A light for each material with an emission, which is radiance as it stands: files mean by 1 what a white
+        surface under an environment of 1 has, not a candela per square metre.
+
+        Args:
+            emissions: of each material. (3,)
+            meshes: those of the scene; a material without any is no light.
+
+        Raises:
+            SceneError: there are more lights than a look may have.
+        """
+        shown = {mesh.material for mesh in meshes}
+        for number, (material, emission) in enumerate(zip(materials, emissions, strict=True)):
+            if emission.max() <= 0:
+                continue
+            if number in shown:
+                self.add(self.name(material.name), {"kind": "mesh", "material": material.name}, emission)
+            else:
+                self._warnings.append(f"material {material.name!r} shines, but no surface is left of it")
