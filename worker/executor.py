@@ -13,13 +13,16 @@ import os
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from multiprocessing import resource_tracker
 from typing import Any
 
 from relume.errors import PlanError
 from relume.transfer.base import Plan
+from worker.dask_executor import DaskExecutor
+
+log = logging.getLogger(__name__)
 
 # About four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
 TINY_BAKE_RAYS = 100_000_000
@@ -82,8 +85,7 @@ class Executors:
                 self._client = None
             if self._client is None:
                 self._client = self._connect()
-            executor: Executor = self._client.get_executor(pure=False)
-            return executor
+            return DaskExecutor(self._client)
 
     def cluster_threads(self) -> int:
         """How many tasks the cluster runs at once; at least 1."""
@@ -97,9 +99,10 @@ class Executors:
             if self._here is not None:
                 self._here.shutdown(wait=False, cancel_futures=True)
             if self._client is not None:
-                self._client.close(timeout=2)
+                _attempt(self._client.close, timeout=2)
             if self._cluster is not None:
-                self._cluster.close(timeout=5)
+                _attempt(self._cluster.sync, _kill_workers, self._cluster, callback_timeout=5)
+                _attempt(self._cluster.close, timeout=5)
             self._here = self._client = self._cluster = None
 
     def _connect(self) -> Any:
@@ -130,6 +133,26 @@ class Executors:
                 env=ONE_THREAD,
             )
         return self._cluster
+
+
+def _attempt(stop: Callable[..., object], *args: object, **kwargs: object) -> None:
+    """Stop a part of the cluster. One that does not stop must not keep the others, or the service, from stopping."""
+    try:
+        stop(*args, **kwargs)
+    except Exception as error:  # Dask raises whatever it meets, AssertionError too
+        log.warning("a part of the cluster did not stop in order (%s: %s)", type(error).__name__, error)
+
+
+async def _kill_workers(cluster: Any) -> None:
+    """Kill a cluster's worker processes and start no others; runs in the cluster's loop.
+
+    Asked to close while a process is only just starting, after another died, a nanny fails and leaves it running.
+    """
+    for nanny in cluster.workers.values():
+        nanny.close_gracefully()
+        keeper = nanny.process
+        if keeper is not None and keeper.process is not None:
+            await keeper.process.kill()  # waits its turn behind a start
 
 
 @contextlib.contextmanager

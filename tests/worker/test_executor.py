@@ -1,0 +1,96 @@
+"""What becomes of tasks and processes when a cluster misbehaves; clusters here are stand-ins."""
+
+import asyncio
+import concurrent.futures
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from worker.dask_executor import DaskExecutor
+from worker.executor import Executors
+
+
+class FakeTask:
+    """A Dask future: awaited, it gives its outcome or raises it."""
+
+    def __init__(self, outcome: object) -> None:
+        self.outcome = outcome
+
+    def __await__(self) -> Any:
+        yield from asyncio.sleep(0).__await__()
+        if isinstance(self.outcome, Exception):
+            raise self.outcome
+        return self.outcome
+
+
+class FakeClient:
+    status = "running"
+
+    def __init__(self, *_: object, **__: object) -> None:
+        self.loop = self
+
+    def submit(self, fn: Callable[..., object], *args: object, **_: object) -> FakeTask:
+        return FakeTask(fn(*args))
+
+    def add_callback(self, follow: Callable[..., Coroutine[Any, Any, None]], *args: object) -> None:
+        asyncio.run(follow(*args))
+
+    def close(self, timeout: float) -> None:
+        raise TimeoutError
+
+
+class FakeCluster:
+    """One worker process is running; the other is only just starting, so closing fails as Dask's does."""
+
+    def __init__(self, **_: object) -> None:
+        self.log: list[str] = []
+        self.workers = {0: FakeNanny(self.log), 1: FakeNanny(self.log)}
+
+    def sync(self, work: Callable[..., Coroutine[Any, Any, None]], *args: object, callback_timeout: float) -> None:
+        asyncio.run(asyncio.wait_for(work(*args), callback_timeout))
+
+    def close(self, timeout: float) -> None:
+        self.log.append("close")
+        raise AssertionError("can only join a started process")
+
+
+class FakeNanny:
+    def __init__(self, log: list[str]) -> None:
+        self.log = log
+        self.process = self  # a nanny has a keeper of its process, which has the process
+        self.close_gracefully = lambda: log.append("no restart")
+
+    async def kill(self) -> None:
+        self.log.append("kill")
+
+
+def submit(outcome: object) -> "concurrent.futures.Future[Any]":
+    return DaskExecutor(FakeClient()).submit(lambda: outcome)
+
+
+def test_future_has_the_result_or_the_error_of_its_task() -> None:
+    assert submit(7).result(0) == 7
+    with pytest.raises(ZeroDivisionError):
+        submit(ZeroDivisionError()).result(0)
+
+
+def test_future_of_a_task_that_went_away_wakes_those_who_wait() -> None:
+    future = submit(concurrent.futures.CancelledError())
+    assert concurrent.futures.wait([future], timeout=0).done == {future}
+    assert future.cancelled()
+
+
+def test_cluster_that_does_not_close_in_order_loses_its_processes_and_stops_nobody(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    clusters: list[FakeCluster] = []
+    monkeypatch.setattr("distributed.LocalCluster", lambda **_: clusters.append(FakeCluster()) or clusters[-1])
+    monkeypatch.setattr("distributed.Client", FakeClient)
+    executors = Executors(num_workers=2)
+    executors.cluster()
+    executors.close()
+    assert clusters[0].log == ["no restart", "kill"] * 2 + ["close"]
+    assert "can only join a started process" in caplog.text
+    executors.close()  # nothing is left to stop
+    assert clusters[0].log.count("close") == 1

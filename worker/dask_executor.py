@@ -1,0 +1,44 @@
+"""`concurrent.futures` on a Dask cluster, where every future ends.
+
+Dask's own executor leaves a future pending for ever when a worker dies with a result that nobody had fetched yet and
+the repeated task then fails: a bake would wait for it without end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Any
+
+
+class DaskExecutor(Executor):
+    """Tasks of one Dask client, each run even where its like has run before."""
+
+    def __init__(self, client: Any) -> None:
+        """
+        Args:
+            client: a connected `distributed.Client`; whoever made it closes it.
+        """
+        self._client = client
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Hand a call out. Its future raises KilledWorker where the worker died, CancelledError where all went away."""
+        task = self._client.submit(fn, *args, pure=False, **kwargs)
+        outcome: Future[Any] = Future()
+        self._client.loop.add_callback(_follow, task, outcome)
+        return outcome
+
+
+async def _follow(task: Any, outcome: Future[Any]) -> None:
+    """Give a Dask future's outcome to `outcome`; runs in the client's loop."""
+    try:
+        result = await task
+    except (concurrent.futures.CancelledError, asyncio.CancelledError):
+        outcome.cancel()
+        outcome.set_running_or_notify_cancel()  # or nobody who waits would wake
+    except Exception as error:
+        outcome.set_exception(error)
+    else:
+        outcome.set_result(result)
