@@ -22,7 +22,7 @@ from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
-from relume.trace.photons import cosine_directions
+from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, trace_from
 from relume.trace.surface import surface_at
 
@@ -68,7 +68,7 @@ def reference_indirect(
         rows, weight = np.arange(points.num_points), np.ones((points.num_points, 3))
         found = np.zeros((points.num_points, 3))
         for bounce in range(num_bounces):
-            directions = cosine_directions(here.normal, rng)
+            directions = lobe_directions(here.normal, 1.0, rng)
             weight = weight * np.pi * _brdf(f_terms, here, of, directions)
             hits = trace_from(geometry.embree, here.position, directions)
             hit = np.nonzero(hits.face >= 0)[0]

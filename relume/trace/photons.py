@@ -1,10 +1,12 @@
 """Importance photons: where light that reaches the picture by reflection comes from.
 
 Paths start at the pictures' own points and go backward, as gather rays do; what they hit after the first surface is
-what gather rays will hit (backward photon shooting, Nguyen 2010, after Hašan 2006).
+what gather rays will hit (backward photon shooting, Nguyen 2010, section 5.1, after Hašan 2006). Where what is seen
+has a highlight, some leave it about the mirror direction, so that cells are small where they are seen in it.
 
 Where surfaces touch, rays fly a few pixels only, and what they hit fills much of the hemisphere: paths that fly so
-short a way are split, and split again where it is a quarter of that, so that cells are small along contacts.
+short a way are split, and split again where it is a quarter and a sixteenth of that, so that cells are small along
+contacts.
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import is_diffuse
 from relume.scene.model import Camera, Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, camera_directions, trace_from
@@ -26,8 +30,11 @@ F32 = NDArray[np.float32]
 _BOUNCES = 3
 _PATHS_A_PASS = 1 << 15
 _CONTACT_PIXELS = 12  # flights shorter than this many pixels are split
-_SPLIT, _SPLITS = 8, 2
+_SPLIT, _SPLITS = 8, 3
 _CONTACT_SHARE = 0.25  # of all photons, at most
+_LOBE = 200.0  # exponent of the mirror lobes
+_MIRROR_SHARE = 1 / 7  # of all photons, at most: a sixth of the others
+_MIRRORED = 4  # from each point that has a highlight
 _MOST_PASSES = 64  # of paths that nearly all leave the scene no more are worth their time
 
 
@@ -48,6 +55,14 @@ class Photons:
         return Photons(Hits(hits.face[which], hits.uv[which], hits.distance[which]), self.directions[which])
 
 
+class _Found(NamedTuple):
+    """Photons of all paths so far, by how they came about."""
+
+    anywhere: list[Photons]
+    at_contacts: list[Photons]
+    in_mirrors: list[Photons]
+
+
 def shoot_photons(
     scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_photons: int
 ) -> Photons:
@@ -59,17 +74,17 @@ def shoot_photons(
     rng = np.random.default_rng(int(scene.id, 16))
     cameras = [camera for camera in scene.cameras if camera.name in views]
     num_paths = max(256, _PATHS_A_PASS // len(cameras))
-    anywhere: list[Photons] = []
-    at_contacts: list[Photons] = []
+    shines = np.array([not all(map(is_diffuse, material.terms)) for material in scene.materials])
+    found = _Found([], [], [])
     for _ in range(_MOST_PASSES):
         for camera in cameras:
-            found, near = _walk(geometry, camera, size, num_paths, rng)
-            anywhere += found
-            at_contacts += near
-        if sum(len(photons.directions) for photons in anywhere) >= num_photons:
+            _walk(geometry, camera, size, num_paths, shines, rng, found)
+        if sum(len(photons.directions) for photons in found.anywhere) >= num_photons:
             break
-    short = _some(at_contacts, int(_CONTACT_SHARE * num_photons), rng)
-    return _joined([short, _some(anywhere, num_photons - len(short.directions), rng)])
+    short = _some(found.at_contacts, int(_CONTACT_SHARE * num_photons), rng)
+    mirrored = _some(found.in_mirrors, int(_MIRROR_SHARE * num_photons), rng)
+    num_others = num_photons - len(short.directions) - len(mirrored.directions)
+    return _joined([short, mirrored, _some(found.anywhere, num_others, rng)])
 
 
 def _joined(parts: Sequence[Photons]) -> Photons:
@@ -85,21 +100,30 @@ def _some(parts: Sequence[Photons], count: int, rng: np.random.Generator) -> Pho
 
 
 def _walk(
-    geometry: Geometry, camera: Camera, size: tuple[int, int], num_paths: int, rng: np.random.Generator
-) -> tuple[list[Photons], list[Photons]]:
-    """Paths through random positions of a picture; what they hit after each bounce, and what split ones do."""
+    geometry: Geometry,
+    camera: Camera,
+    size: tuple[int, int],
+    num_paths: int,
+    shines: NDArray[np.bool_],
+    rng: np.random.Generator,
+    found: _Found,
+) -> None:
+    """Paths through random positions of a picture: adds what they hit after each bounce. shines: of each material"""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
     hits, directions = _hits(geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y))
     surface = surface_at(geometry, hits, directions)
     pixel = np.float32(2 * math.tan(camera.yfov / 2) / height)
     reach = _CONTACT_PIXELS * pixel * hits.distance
-    found, near = [], _split(geometry, surface, reach, rng)
+    found.at_contacts.extend(_split(geometry, surface, reach, rng))
+    is_mirror = shines[geometry.face_material[hits.face]]
+    found.in_mirrors.append(
+        _mirrored(geometry, surface.position[is_mirror], surface.normal[is_mirror], directions[is_mirror], rng)
+    )
     for _ in range(_BOUNCES):
-        hits, directions = _hits(geometry, surface.position, cosine_directions(surface.normal, rng))
-        found.append(Photons(hits, directions))
+        hits, directions = _hits(geometry, surface.position, lobe_directions(surface.normal, 1.0, rng))
+        found.anywhere.append(Photons(hits, directions))
         surface = surface_at(geometry, hits, directions)
-    return found, near
 
 
 def _hits(geometry: Geometry, origin: F32, directions: F32) -> tuple[Hits, F32]:
@@ -109,11 +133,20 @@ def _hits(geometry: Geometry, origin: F32, directions: F32) -> tuple[Hits, F32]:
     return photons.hits, photons.directions
 
 
+def _mirrored(geometry: Geometry, position: F32, normal: F32, directions: F32, rng: np.random.Generator) -> Photons:
+    """What points seen along directions reflect, about the mirror direction: eq. (16), Nguyen 2010."""
+    position, normal, directions = (np.repeat(a, _MIRRORED, axis=0) for a in (position, normal, directions))
+    mirrored = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
+    leaving = lobe_directions(mirrored, _LOBE, rng)
+    is_above = np.einsum("nc,nc->n", leaving, normal) > 0
+    return Photons(*_hits(geometry, position[is_above], leaving[is_above]))
+
+
 def _split(geometry: Geometry, surface: Surface, reach: F32, rng: np.random.Generator) -> list[Photons]:
     """Photons of short flights from points, many from those that have any. reach: of the shortest, metres. (n,)"""
     position, normal, found = surface.position, surface.normal, []
     for split in range(_SPLITS + 1):
-        directions = cosine_directions(normal, rng)
+        directions = lobe_directions(normal, 1.0, rng)
         hits = trace_from(geometry.embree, position, directions)
         is_short = (hits.face >= 0) & (hits.distance < reach)
         if split > 0:
@@ -124,10 +157,11 @@ def _split(geometry: Geometry, surface: Surface, reach: F32, rng: np.random.Gene
     return found
 
 
-def cosine_directions(normal: F32, rng: np.random.Generator) -> F32:
-    """A random direction about each normal (n, 3), density cos θ / π. (n, 3) float32"""
-    u, phi = rng.random(len(normal)), 2 * np.pi * rng.random(len(normal))
-    tangent = any_tangent(normal)
-    bitangent = np.cross(normal, tangent)
-    x, y, z = np.sqrt(u) * np.cos(phi), np.sqrt(u) * np.sin(phi), np.sqrt(1 - u)
-    return np.asarray(x[:, None] * tangent + y[:, None] * bitangent + z[:, None] * normal, np.float32)
+def lobe_directions(axis: F32, exponent: float, rng: np.random.Generator) -> F32:
+    """A random direction about each axis (n, 3), unit, density ∝ cos^exponent; 1 is the cosine's. (n, 3) float32"""
+    z, phi = (1 - rng.random(len(axis))) ** (1 / (exponent + 1)), 2 * np.pi * rng.random(len(axis))
+    across = np.sqrt(1 - z * z)
+    tangent = any_tangent(axis)
+    bitangent = np.cross(axis, tangent)
+    x, y = across * np.cos(phi), across * np.sin(phi)
+    return np.asarray(x[:, None] * tangent + y[:, None] * bitangent + z[:, None] * axis, np.float32)

@@ -12,6 +12,7 @@ from relume.trace.cells import POINTS_A_CELL, choose_cells, face_normals
 from relume.trace.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.trace.geometry import merge
 from relume.trace.links import Gatherers, trace_links
+from relume.trace.photons import lobe_directions
 from relume.trace.primary import trace_from
 from relume.trace.surface import any_tangent
 
@@ -103,6 +104,33 @@ def test_cells_are_small_along_contacts(box):
     along = foot[0] + np.linspace(0.1, 0.9, 50)[:, None] * (foot[1] - foot[0])
     from_contact = np.linalg.norm(floor[:, None] - along[None], axis=2).min(axis=1)
     assert np.median(spacing[from_contact < 0.03]) < 0.5 * np.median(spacing[from_contact > 0.3])
+
+
+def test_cells_are_small_where_a_polished_floor_mirrors_them(box):
+    """More of the points lie on the blocks' feet, which the floor before them mirrors, than where it is matt."""
+    plain, _, cells = box
+    polished = cornell_box(is_floor_glossy=True)
+    mirrored = choose_cells(polished, merge(polished), ("front",), (400, 400), NUM_CELLS)
+    blocks = [k for k, material in enumerate(plain.materials) if material.name.endswith("block")]
+
+    def share(of):
+        is_low = (of.position[:, :, 1].mean(axis=1) < 0.5) & (of.normal[:, :, 2].mean(axis=1) > 0.5)
+        return np.mean(np.isin(of.material, blocks) & is_low)
+
+    assert share(mirrored) > 1.15 * share(cells)
+
+
+def test_lobes_have_the_cosine_of_their_exponent():
+    """E cos α = (e + 1)/(e + 2) where the density is ∝ cos^e α, and azimuths are even."""
+    axis = np.repeat(np.array([[0.36, 0.48, -0.8]], np.float32), 20_000, axis=0)
+    for exponent in (1.0, 200.0):
+        directions = lobe_directions(axis, exponent, np.random.default_rng(3))
+        assert np.linalg.norm(directions, axis=1) == pytest.approx(1, abs=1e-5)
+        assert (directions @ axis[0]).mean() == pytest.approx(
+            (exponent + 1) / (exponent + 2), abs=0.02 / (exponent + 2)
+        )
+        across = directions.mean(axis=0) - (directions @ axis[0]).mean() * axis[0]
+        assert np.linalg.norm(across) < 0.02
 
 
 def test_cells_are_the_same_every_time(box):
