@@ -15,8 +15,8 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.gather import bake, recipe_of
-from bench.indirect import bsdf, error_without_noise, reflected, reflected_by_mitsuba
-from bench.mitsuba import missing
+from bench.indirect import error_without_noise, reflected, reflected_by_mitsuba
+from bench.mitsuba import bsdf, missing
 from relume.scene.cornell import GLOSSY_FLOOR, cornell_box
 from relume.transfer.opened import Transfer, open_transfer
 
@@ -31,8 +31,8 @@ def measure(tiny: bool) -> list[Figure]:
     scene, recipe = cornell_box(is_floor_glossy=True), recipe_of(tiny)
     spp = {"diffuse": 2, "glossy": 2} if tiny else {"diffuse": 320, "glossy": 128}
     diffuse, glossy = GLOSSY_FLOOR
-    beyond = [bsdf(scene.materials[mesh.material].terms[0]["color"]) for mesh in scene.meshes]
-    highlight = bsdf((0, 0, 0), glossy["color"], glossy["params"]["exponent"])
+    beyond = [bsdf(scene.materials[mesh.material].terms[:1]) for mesh in scene.meshes]
+    highlight = bsdf([glossy])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path)

@@ -20,9 +20,6 @@ from relume.transfer.render import render_image
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-# Mitsuba shifts the rows of a map by half a texel; a sun near the zenith is sensitive to it
-_FINER = 8
-
 
 def reflected(transfer: Transfer, terms: Mapping[str, Sequence[Mapping[str, Any]]]) -> F64:
     """Light of a picture that surfaces have reflected onto what is seen. (height, width, 3)
@@ -41,18 +38,9 @@ def reflected(transfer: Transfer, terms: Mapping[str, Sequence[Mapping[str, Any]
     return np.asarray(pictures[0] - pictures[1])
 
 
-def bsdf(diffuse: Sequence[float], glossy: Sequence[float] = (0.0, 0.0, 0.0), exponent: float = 1.0) -> dict[str, Any]:
-    """`lambert` and `blinn_phong` as the plugin of peer_mitsuba_plugins.py."""
-    share = sum(diffuse) / max(1e-9, sum(diffuse) + 4 * sum(glossy))  # a highlight reflects up to four times its colour
-    return {
-        "type": "lambert_blinn_phong", "albedo": list(diffuse), "gain": list(glossy), "exponent": exponent,
-        "diffuse_share": share,
-    }  # fmt: skip
-
-
 def mitsuba_job(seen: Sequence[Any], beyond: Sequence[Any]) -> dict[str, Any]:
     """What `bench.mitsuba.render` is to be told besides counts; arguments as of `reflected_by_mitsuba`."""
-    return {"seen": seen, "bsdfs": beyond, "bounces": MAX_BOUNCES, "finer": _FINER}
+    return {"seen": seen, "bsdfs": beyond, "bounces": MAX_BOUNCES}
 
 
 def reflected_by_mitsuba(

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
-from bench.indirect import bsdf
-from bench.mitsuba import missing, render
+from bench.mitsuba import bsdf, missing, render
 from relume.light.local import rectangle
 from relume.look import Look, validate
 from relume.scene.archive import make_scene
@@ -66,7 +65,7 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
     scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
     recipe = Recipe("direct", ("front",), size, 20)
     transfer = open_transfer(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"))
-    bsdfs = [bsdf(scene.materials[mesh.material].terms[0]["color"]) for mesh in scene.meshes]
+    bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     figures = []
     for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
         ours = render_image(transfer, "front", _look(transfer, {"A": light})).astype(np.float64)

@@ -9,14 +9,19 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from relume.look.terms import complete_term
 from relume.scene.model import Scene
 
+F32 = NDArray[np.float32]
+
+_FINE_ROWS = 2048  # of a map that is handed over, where n times its rows may be as many
 _MOST_SPP = 32  # at once; more would not fit in memory
 
 
@@ -40,12 +45,43 @@ def _llvm() -> str | None:
     return os.environ.get("DRJIT_LIBLLVM_PATH") or (found[0] if found else None)
 
 
-def bsdf(lambert: Mapping[str, Any], glossy: Mapping[str, Any]) -> dict[str, Any]:
-    """Two complete grey terms, `lambert` and dielectric `cook_torrance`, as the plugin of peer_mitsuba_render.py."""
+def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Terms of a material as a plugin of peer_mitsuba_plugins.py.
+
+    Args:
+        terms: `lambert` ones, and at most one `blinn_phong` or dielectric `cook_torrance`; textures are left out.
+    """
+    whole = [complete_term(("mitsuba",), term, None) for term in terms]
+    diffuse = np.sum([term["color"] for term in whole if term["model"] == "lambert"] or [[0.0] * 3], axis=0).tolist()
+    lobes = [term for term in whole if term["model"] != "lambert"]
+    if lobes and lobes[0]["model"] == "cook_torrance":
+        params = lobes[0]["params"]
+        return {
+            "type": "lambert_cook_torrance", "albedo": diffuse, "gain": lobes[0]["color"],
+            "sigma": params["sigma"], "ior": params["ior"],
+        }  # fmt: skip
+    glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
+    share = sum(diffuse) / max(1e-9, sum(diffuse) + 4 * sum(glossy))  # a highlight reflects up to four times its colour
     return {
-        "type": "lambert_cook_torrance", "albedo": lambert["color"][0], "gain": glossy["color"][0],
-        "sigma": glossy["params"]["sigma"], "ior": glossy["params"]["ior"],
+        "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent, "diffuse_share": share,
     }  # fmt: skip
+
+
+def map_for_mitsuba(radiance: F32) -> F32:
+    """An environment's map as Mitsuba reads it: row j of R lies at θ = π j/(R − 1), the first and last at the poles.
+
+    Finer rows lie within one of ours, or on the border of two, where they are the mean of both. Columns lie as ours.
+
+    Args:
+        radiance: (height, width, 3)
+    Returns:
+        (n · height + 1, n · width, 3), n from 2 to 8.
+    """
+    height = len(radiance)
+    finer = min(8, max(2, _FINE_ROWS // height))
+    row = np.arange(finer * height + 1)
+    above, below = np.maximum(row - 1, 0) // finer, np.minimum(row, finer * height - 1) // finer
+    return np.asarray(0.5 * (radiance[above] + radiance[below]), np.float32).repeat(finer, axis=1)
 
 
 def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -53,17 +89,17 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
 
     Args:
         job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
-            and "seen" where reflected light alone is (peer_mitsuba_render.py); "finer", texels for each of the map's;
-            "emitters", Mitsuba's own descriptions of lights beside the map.
+            and "seen" where reflected light alone is (peer_mitsuba_render.py); "emitters", Mitsuba's own descriptions
+            of lights beside the map.
     Returns:
         What it wrote to result.json in `folder`.
     """
     camera, llvm = scene.cameras[0], _llvm()
-    arrays: dict[str, Any] = {"camera": camera.to_world, "environment": scene.environment.radiance}
+    arrays: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
     for k, mesh in enumerate(scene.meshes):
         arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
     np.savez(folder / "scene.npz", allow_pickle=False, **arrays)
-    whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, "finer": 1, **job}
+    whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, **job}
     (folder / "job.json").write_text(json.dumps(whole))
     script = Path(__file__).with_name("peer_mitsuba_render.py")
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(llvm)}

@@ -21,7 +21,7 @@ import numpy as np
 from bench import cycles, mitsuba
 from bench.figure import Figure, skipped
 from bench.gather import FLOOR, bake, edit_frames_s, opened, recipe_of, settle
-from bench.indirect import bsdf, error_without_noise, mitsuba_job, reflected
+from bench.indirect import error_without_noise, mitsuba_job, reflected
 from relume.look.document import MAX_BOUNCES
 from relume.scene.cornell import GLOSSY_FLOOR, cornell_box
 from relume.scene.model import Scene
@@ -83,9 +83,8 @@ def _edit_s(transfer: Transfer, num_frames: int) -> float:
 
 def _bsdfs(scene: Scene) -> tuple[list[Any], list[Any]]:
     """Of the meshes as the camera sees them, and beyond."""
-    beyond = [bsdf(scene.materials[mesh.material].terms[0]["color"]) for mesh in scene.meshes]
-    diffuse, glossy = GLOSSY_FLOOR
-    return [bsdf(diffuse["color"], glossy["color"], glossy["params"]["exponent"]), *beyond[1:]], beyond
+    beyond = [mitsuba.bsdf(scene.materials[mesh.material].terms[:1]) for mesh in scene.meshes]
+    return [mitsuba.bsdf(GLOSSY_FLOOR), *beyond[1:]], beyond
 
 
 def _materials(scene: Scene) -> list[dict[str, Any]]:

@@ -50,7 +50,7 @@ def measure(tiny: bool) -> list[Figure]:
     error = _our_error(scene, tiny)
     edit_s, frame = _our_edit(scene, size, tiny)
     with tempfile.TemporaryDirectory() as folder:
-        job = {"spp": [1, 4] if tiny else [8, 32, 128, 512], "bsdfs": [bsdf(*_TERMS)] * len(scene.meshes)}
+        job = {"spp": [1, 4] if tiny else [8, 32, 128, 512], "bsdfs": [bsdf(_TERMS)] * len(scene.meshes)}
         found = render(scene, size, job, Path(folder))
         picture = np.load(Path(folder) / "picture.npy", allow_pickle=False)
     last = found["steps"][-1]

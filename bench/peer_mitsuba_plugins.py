@@ -60,7 +60,7 @@ class LambertCookTorrance(_TwoLobes):
 
     def __init__(self, props: Any) -> None:
         super().__init__(props)
-        self.albedo, self.gain = float(props["albedo"]), float(props["gain"])
+        self.albedo, self.gain = mi.Color3f(props["albedo"]), mi.Color3f(props["gain"])
         self.sigma, self.ior = float(props["sigma"]), float(props["ior"])
 
     def _facets(self) -> Any:

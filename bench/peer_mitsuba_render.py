@@ -25,7 +25,7 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
     """The k-th mesh of scene.npz."""
     props = mi.Properties()
     colors = {key: mi.ScalarVector3f(value) for key, value in bsdf.items() if isinstance(value, list)}
-    props["mesh_bsdf"] = mi.load_dict({**bsdf, **colors})
+    props["mesh_bsdf"] = mi.load_dict({"type": "twosided", "front": {**bsdf, **colors}})
     positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
     shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), has_vertex_normals=True, props=props)
     params = mi.traverse(shape)
@@ -42,7 +42,6 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
     middle, Mitsuba's +Z.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
-    finer = job["finer"]
     transform = mi.ScalarTransform4f
     sensor = {
         "type": "perspective",
@@ -56,8 +55,7 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
     }  # fmt: skip
     environment = {
         "type": "envmap",
-        # it places rows at their ends, not their middles: finer maps are shifted less
-        "bitmap": mi.Bitmap(arrays["environment"].repeat(finer, axis=0).repeat(finer, axis=1)),
+        "bitmap": mi.Bitmap(arrays["environment"]),
         "to_world": transform().rotate([0, 1, 0], 90),
     }
     scene = {"type": "scene", "integrator": {"type": "direct"}, "sensor": sensor, "light": environment}

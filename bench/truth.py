@@ -69,7 +69,7 @@ def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
 
 def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) -> dict[str, float]:
     """`relume.reference.truth.Comparison` of the two means."""
-    bsdfs = [bsdf(*scene.materials[mesh.material].terms) for mesh in scene.meshes]
+    bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     with tempfile.TemporaryDirectory() as folder:
         render(scene, size, {"spp": [spp], "bsdfs": bsdfs, "passes": passes}, Path(folder))
         theirs = np.load(Path(folder) / "passes.npy", allow_pickle=False)

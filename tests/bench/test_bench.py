@@ -4,11 +4,13 @@ import json
 import math
 import re
 
+import numpy as np
 import pytest
 
 from bench import registry, table
 from bench.figure import Figure
 from bench.machine import stolen_share
+from bench.mitsuba import map_for_mitsuba
 
 FIXED_NAMES = {
     "frame.bandwidth_ratio", "frame.incremental_rmse", "session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95",
@@ -122,3 +124,16 @@ def test_documents_have_their_table(name: str) -> None:
 def test_figure_without_a_value_says_why() -> None:
     assert "not measured" in table.row({"name": "x", "value": None, "unit": "s", "context": {"skipped": "no browser"}})
     assert Figure("x", None, "s").context == {}
+
+
+@pytest.mark.parametrize("num_rows", [6, 500, 2048])
+def test_mitsuba_reads_the_rows_of_a_map_where_they_are(num_rows: int) -> None:
+    """It reads between rows that lie at the ends of [0, π]; the middles of ours are what they were."""
+    radiance = np.random.default_rng(1).random((num_rows, 3, 3)).astype(np.float32)
+    handed = map_for_mitsuba(radiance)
+    finer = handed.shape[1] // 3
+    places = np.linspace(0, 1, len(handed))
+    middles = (np.arange(num_rows) + 0.5) / num_rows
+    for column in range(3):
+        read = np.interp(middles, places, handed[:, finer * column + finer // 2, 0])
+        np.testing.assert_allclose(read, radiance[:, column, 0], rtol=1e-5)
