@@ -2,13 +2,12 @@
 
 import json
 import struct
-import time
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import SIZE, Control
-from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, open_session
+from session_client import SIGMA, THETA_H, Baked, open_session
 
 from server.live.window import Window
 from server.protocol import FrameHeader
@@ -93,180 +92,6 @@ def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: Tes
         assert "acknowledged" in closed.value.args[1]
 
 
-def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        curve = session.text("curve")
-        assert curve["curve"] == THETA_D
-        assert len(curve["bands"]) == 3
-        assert curve["bands"] == curve["generated"]
-        status = session.text("status")
-        assert status["state"] == "freezing"
-        assert status["what"] == "Paper, theta_d"
-        control.may_freeze.set()
-        while session.text("status")["state"] != "ready":
-            pass
-        session.edit(1, IOR, 2.0)
-        session.exact(1)
-        assert session.text("curve")["revision"] == 1
-
-
-def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_H)
-        assert session.text("curve")["curve"] == THETA_H
-        session.send(type="touch", parameter=IOR)
-        assert session.text("status")["what"] == "Paper, ior"
-        control.may_freeze.set()
-        while session.text("status")["state"] != "ready":
-            pass
-        session.edit(1, SIGMA, 0.4)
-        assert session.text("curve")["curve"] == THETA_H
-
-
-def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control: Control) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        control.may_freeze.set()
-        session.send(type="touch", parameter="/environment/rotation")
-        session.edit(1, SIGMA, 0.4)
-        session.exact(1)
-
-
-@pytest.mark.parametrize(
-    "touch",
-    [
-        {},
-        {"curve": THETA_H, "parameter": IOR},
-        {"parameter": THETA_H},
-        {"parameter": IOR.replace("ior", "colour")},
-        {"parameter": IOR.replace("Paper", "Nobody")},
-        {"parameter": IOR.replace("/1/", "/999/")},
-        {"parameter": "/lights/Nobody"},
-        {"parameter": "/environment"},
-    ],
-)
-def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", **touch)
-        assert session.text("problem")["problem"]["detail"]
-        session.edit(1, SIGMA, 0.4)
-        session.exact(1)
-
-
-def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
-    client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.live.frame_loop.SETTLE_S", 3600.0)
-    control.refines = True
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        for revision in (1, 3, 5):
-            session.edit(revision, IOR, 2.0 + revision)
-            session.edit(revision + 1, SIGMA, revision / 10)
-            session.frame()
-        assert not control.freezing.is_set()
-
-
-def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked, control: Control) -> None:
-    control.refines = True
-    control.may_freeze.set()
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.edit(1, IOR, 2.0)
-        session.exact(1)
-
-
-def test_moving_on_to_another_curve_cancels_the_freeze(client: TestClient, baked: Baked, control: Control) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        session.send(type="touch", curve=THETA_H)
-        while session.text("status")["state"] != "ready":
-            pass
-        assert control.num_cancelled == 1
-
-
-def test_edits_that_need_no_freeze_are_painted_while_one_runs(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        for revision in range(1, 6):
-            session.edit(revision, SIGMA, 0.2 + revision / 10)
-            frame = session.exact(revision)
-            assert np.frombuffer(frame.payload, "<u4")[0] == 700 + 100 * revision
-        assert not control.may_freeze.is_set()
-        assert control.num_cancelled == 0
-
-
-def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_go_on(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.edit(1, IOR, 2.0)
-        assert session.text("status")["what"] == "Paper, theta_d"
-        session.edit(2, SIGMA, 0.3)
-        frame = session.frame()  # the first since: revision 1 had nothing to show
-        assert (frame.header["revision"], frame.header["exact"]) == (2, False)
-        assert np.frombuffer(frame.payload, "<u4")[0] == 800
-        control.may_freeze.set()
-        assert np.frombuffer(session.exact(2).payload, "<u4")[0] == 1300
-
-
-def test_look_that_only_shows_otherwise_is_answered_while_a_freeze_is_awaited(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.edit(1, IOR, 2.0)
-        assert control.freezing.wait(60)
-        session.edit(2, "/display/exposure", 1.0)
-        frame = session.frame()
-        assert (frame.header["revision"], frame.header["exact"], frame.header["tiles"]) == (2, False, [])
-        session.send(type="probe", x=3, y=4)
-        assert session.text("probe")["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
-        control.may_freeze.set()
-        session.exact(2)
-
-
-def test_edit_that_goes_back_ends_the_freeze_it_does_not_need(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.edit(1, IOR, 2.0)
-        assert control.freezing.wait(60)
-        session.edit(2, IOR, 1.5)
-        session.exact(2)
-        while session.text("status")["state"] != "ready":
-            pass
-        assert control.num_cancelled == 1
-
-
-def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        session.edit(1, IOR, 2.0)
-        session.edit(2, IOR, 2.1)
-        control.may_freeze.set()
-        session.exact(2)
-        assert control.num_cancelled == 0
-
-
 def test_a_look_that_the_bake_cannot_follow_is_taken_back(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -342,18 +167,6 @@ def test_finer_bake_of_the_scene_is_announced(client: TestClient, baked: Baked) 
         while (news := session.text("bake"))["state"] != "ready":
             assert news["bake"] == bake
         assert (news["bake"], news["replaces"]) == (bake, baked.bake)
-
-
-def test_another_view_does_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
-    with open_session(client, baked.bake) as session:
-        session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        session.send(type="view", name="left")
-        assert session.exact(0).header["view"] == "left"
-        while control.num_cancelled == 0:
-            time.sleep(0.01)
-        control.may_freeze.set()
 
 
 def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Baked) -> None:

@@ -1,0 +1,13 @@
+"""The look that tests of looks change."""
+
+from __future__ import annotations
+
+import pytest
+from example_look import LIGHTS, MATERIALS
+
+from relume.look import default_look
+
+
+@pytest.fixture
+def default():
+    return default_look(MATERIALS, LIGHTS)

@@ -1,0 +1,153 @@
+"""Values of looks as they come from anybody: refused with a pointer and what is allowed."""
+
+from __future__ import annotations
+
+import copy
+
+import jsonpatch
+import pytest
+from example_look import CURVES, INF, MATERIALS, NAN, SIGMA, points
+
+from relume.errors import ParameterError
+from relume.look import apply_patch, default_look, validate
+from relume.scene.model import Light, Material
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "pointer", "allowed"),
+    [
+        ("", [], "the look", "an object"),
+        ("", {"material": {}}, "/material", "'materials'"),
+        ("/materials", 3, "/materials", "material"),
+        ("/transport", {"depth": 3}, "/transport/depth", "'bounces'"),
+        ("/transport/show", "shadows", "/transport/show", "'further_bounces'"),
+        ("/transport/show", ["all"], "/transport/show", "'further_bounces'"),
+        *(("/transport/bounces", bad, "/transport/bounces", "0 to 24") for bad in (-1, 25, 1.5, True, None, NAN)),
+        ("/materials", {"Cup": {}}, "/materials", "'Teapot'"),
+        ("/materials/Teapot", None, "/materials/Teapot", "an object"),
+        ("/materials/Teapot/terms", {}, "/materials/Teapot/terms", "at most 16"),
+        ("/materials/Teapot/terms", [{"model": "lambert"}] * 17, "/materials/Teapot/terms", "at most 16"),
+        ("/materials/Teapot/terms/1", {}, "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/model", "velvet", "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/model", ["ggx"], "/materials/Teapot/terms/1/model", "'cook_torrance'"),
+        ("/materials/Teapot/terms/1/texture", "bump", "/materials/Teapot/terms/1/texture", "'specular'"),
+        ("/materials/Teapot/terms/1/color", [1, 1], "/materials/Teapot/terms/1/color", "three numbers"),
+        ("/materials/Teapot/terms/1/color", [1, 1, -0.1], "/materials/Teapot/terms/1/color/2", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/color", [1, NAN, 1], "/materials/Teapot/terms/1/color/1", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/color", [True, 1, 1], "/materials/Teapot/terms/1/color/0", "[0, 10000]"),
+        ("/materials/Teapot/terms/1/params", {"roughness": 1}, "/materials/Teapot/terms/1/params/roughness", "'sigma'"),
+        ("/materials/a~1b~0c/terms/0/params/f0", [1, 2, 0], "/materials/a~1b~0c/terms/0/params/f0/1", "[0, 1]"),
+        *((SIGMA, bad, SIGMA, "[0.005, 1]") for bad in (0, 1.5, NAN, INF, -INF, True, None, "0.2", 10**400, [], {})),
+        (CURVES, {"theta_i": {"points": points(3)}}, f"{CURVES}/theta_i", "'theta_h'"),
+        (f"{CURVES}/theta_h", 7, f"{CURVES}/theta_h", "an object"),
+        (f"{CURVES}/theta_h", {}, f"{CURVES}/theta_h", "points or bands"),
+        (f"{CURVES}/theta_h", {"points": points(3), "bands": []}, f"{CURVES}/theta_h", "points or bands"),
+        (f"{CURVES}/theta_h", {"points": points(3), "x": 1}, f"{CURVES}/theta_h/x", "leave it out"),
+        (f"{CURVES}/theta_h", {"points": points(4097)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": points(1_000_000)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1]]}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [0, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
+        (f"{CURVES}/theta_h", {"points": [[3, 1], [2, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [91, 2]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [NAN, 2], [80, 1]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1.0], [5, NAN]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1.0], [5, INF]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, False], [5, 1]]}, f"{CURVES}/theta_h/points/0/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [5, 10**400]]}, f"{CURVES}/theta_h/points/1/1", "[0, 1e+06]"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [5]]}, f"{CURVES}/theta_h/points/1", "a point"),
+        (f"{CURVES}/theta_h", {"points": ["ab", "cd"]}, f"{CURVES}/theta_h/points/0", "a point"),
+        (f"{CURVES}/theta_h", {"points": "0123"}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"bands": [1.0] * 255}, f"{CURVES}/theta_h/bands", "256 values"),
+        (f"{CURVES}/theta_h", {"bands": [[1.0] * 256] * 2}, f"{CURVES}/theta_h/bands", "256 values"),
+        (f"{CURVES}/theta_h", {"bands": [1.0] * 255 + [NAN]}, f"{CURVES}/theta_h/bands/255", "[0, 1e+06]"),
+        (
+            f"{CURVES}/theta_h",
+            {"bands": [[1.0] * 256, [1.0] * 256, [1.0] * 9 + [-1.0] * 247]},
+            f"{CURVES}/theta_h/bands/2/9",
+            "[0, 1e+06]",
+        ),
+        *(
+            (f"{CURVES}/theta_h", {"points": points(3), "channels": bad}, f"{CURVES}/theta_h/channels", "letters")
+            for bad in ("", "rgba", "rr", 1, ["r"])
+        ),
+        (f"{CURVES}/theta_h", [], f"{CURVES}/theta_h", "one to three"),
+        (f"{CURVES}/theta_h", [{"points": points(3), "channels": "r"}] * 4, f"{CURVES}/theta_h", "one to three"),
+        (
+            f"{CURVES}/theta_h",
+            [{"points": points(3), "channels": "rg"}, {"points": points(3), "channels": "gb"}],
+            f"{CURVES}/theta_h/1/channels",
+            "no other object",
+        ),
+        ("/environment/scale", -1, "/environment/scale", "[0, 10000]"),
+        ("/environment/color", [1, -1, 1], "/environment/color/1", "[0, 10000]"),
+        ("/environment/color", 0.5, "/environment/color", "three numbers"),
+        ("/environment/rotation", 1e9, "/environment/rotation", "[-360, 360]"),
+        ("/environment/map", "env:0123456789abcdef", "/environment/map", "'studio'"),
+        ("/environment/map", "../studio", "/environment/map", "null for the scene's own"),
+        ("/environment/map", ["studio"], "/environment/map", "'sunset'"),
+        ("/environment/tilt", 1, "/environment/tilt", "'rotation'"),
+        ("/lights", [], "/lights", "each light"),
+        ("/lights", {f"L{k}": {"kind": "point"} for k in range(63)}, "/lights", "at most 64"),
+        ("/lights/Moon", 3, "/lights/Moon", "an object"),
+        ("/lights/Moon", {}, "/lights/Moon/kind", "'point'"),
+        ("/lights/Moon", {"kind": ["point"]}, "/lights/Moon/kind", "'point'"),
+        ("/lights/Moon", {"kind": "mesh", "material": "Teapot"}, "/lights/Moon/kind", "'point'"),
+        ("/lights/" + "x" * 81, {"kind": "point"}, "/lights/" + "x" * 80, "1 to 80"),
+        ("/lights/Moon", {"kind": "point", "cone": [1, 2]}, "/lights/Moon/cone", "'position'"),
+        ("/lights/Moon", {"kind": "point", "emission": [1, -1, 1]}, "/lights/Moon/emission/1", "[0, 1e+06]"),
+        ("/lights/Moon", {"kind": "rectangle", "size": [1, 0]}, "/lights/Moon/size/1", "[0.0001, 10000]"),
+        ("/lights/Moon", {"kind": "rectangle", "rotation": 361}, "/lights/Moon/rotation", "[-360, 360]"),
+        ("/lights/Key/on", 1, "/lights/Key/on", "true or false"),
+        ("/lights/Key/scale", NAN, "/lights/Key/scale", "[0, 10000]"),
+        ("/lights/Key/size", [1, 1], "/lights/Key/size", "'cone'"),
+        ("/lights/Key/position", [0, INF, 0], "/lights/Key/position/1", "[-1e+06, 1e+06]"),
+        ("/lights/Key/position", [0, 1], "/lights/Key/position", "three numbers"),
+        ("/lights/Key/direction", [0, 0, 1e-30], "/lights/Key/direction", "not all zero"),
+        ("/lights/Key/cone", [20], "/lights/Key/cone", "two numbers"),
+        ("/lights/Key/cone", [0, 0], "/lights/Key/cone", "above 0"),
+        ("/lights/Key/cone", [40, 30], "/lights/Key/cone", "inner ≤ outer"),
+        ("/lights/Key/cone", [20, 91], "/lights/Key/cone/1", "[0, 90]"),
+        ("/lights/Key/kind", "mesh", "/lights/Key/kind", "'spot'"),
+        ("/lights/Panel/kind", "point", "/lights/Panel/kind", "'mesh'"),
+        ("/lights/Panel/material", "a/b~c", "/lights/Panel/material", "'Teapot'"),
+        ("/lights/Panel/position", [0, 0, 0], "/lights/Panel/position", "'material'"),
+        ("/display/exposure", 21, "/display/exposure", "[-20, 20]"),
+        ("/display/tone_map", "reinhard", "/display/tone_map", "'agx'"),
+        ("/display/tone_map", {"a": 1}, "/display/tone_map", "'agx'"),
+    ],
+)
+def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path, value, pointer, allowed):
+    before = copy.deepcopy(default)
+    with pytest.raises(ParameterError) as caught:
+        apply_patch(default, [{"op": "add", "path": path, "value": value}], default)
+    assert caught.value.name == pointer
+    assert allowed in caught.value.allowed
+    assert len(str(caught.value)) < 600
+    assert "\n" not in str(caught.value)
+    assert default == before
+    # the same document whole, as a file or a PUT would bring it, is refused likewise
+    document = jsonpatch.apply_patch(default, [{"op": "add", "path": path, "value": value}])
+    with pytest.raises(ParameterError) as caught:
+        validate(document, default)
+    assert caught.value.name == pointer
+
+
+def test_scene_with_a_bad_term_is_refused_with_its_pointer():
+    with pytest.raises(ParameterError) as caught:
+        default_look([Material("Cup", ({"model": "ggx", "params": {"roughness": 0.0}},))])
+    assert caught.value.name == "/materials/Cup/terms/0/params/roughness"
+
+
+@pytest.mark.parametrize(
+    ("fields", "pointer"),
+    [
+        ({}, "/lights/A/kind"),
+        ({"kind": ["spot"]}, "/lights/A/kind"),
+        ({"kind": "mesh", "material": "Cup"}, "/lights/A/material"),
+        ({"kind": "spot", "size": [1, 1]}, "/lights/A/size"),
+    ],
+)
+def test_scene_with_a_bad_light_is_refused_with_its_pointer(fields, pointer):
+    with pytest.raises(ParameterError) as caught:
+        default_look(MATERIALS, [Light("A", fields)])
+    assert caught.value.name == pointer
