@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { cameraOf, project, pushed, slid } from "../src/lights/camera";
+import { anglesOf, numbersOf } from "../src/lights/fields";
 import { completedLight, freeLightName, lightFor, withKind } from "../src/lights/kinds";
 import { acrossOf, aimed, anchorsOf, moved, outlineOf } from "../src/lights/shape";
 import { add, cross, dot, length, subtract, unit } from "../src/lights/vector";
@@ -98,6 +99,27 @@ describe("a new light", () => {
   test("keeps as another kind what both have", () => {
     expect(withKind(spot, "point")).toEqual({ kind: "point", ...common, position: [0, 2, 0] });
     expect(withKind(sun, "spot")).toMatchObject({ direction: [0, -1, 0], cone: [20, 30], position: [0, 1, 0] });
+  });
+});
+
+describe("the inspector's fields", () => {
+  const labels = (light: Light) => [...numbersOf(light), ...anglesOf(light)].map(({ label }) => label);
+
+  test("are those that the kind has", () => {
+    expect(labels(spot)).toEqual(["Position", "Direction", "Cone, full light", "Cone, edge"]);
+    expect(labels(sun)).toEqual(["Direction"]);
+  });
+
+  test("of a cone push each other, so that the edge never lies within", () => {
+    const [inner, edge] = anglesOf(spot);
+    expect(inner?.changed(spot, 60)).toEqual([60, 60]);
+    expect(edge?.changed(spot, 10)).toEqual([10, 10]);
+    expect([inner?.read(spot), edge?.read(spot)]).toEqual([20, 45]);
+  });
+
+  test("refuse a direction without length", () => {
+    const direction = numbersOf(sun)[0];
+    expect([direction?.allows?.([0, 0, 0]), direction?.allows?.([0, 0, 1])]).toEqual([false, true]);
   });
 });
 

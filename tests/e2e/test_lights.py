@@ -136,6 +136,11 @@ def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
     page.get_by_role("button", name="Only the light of Point").wait_for()
     alone = editor.pixels()
     assert changed(lit, alone) > 0.2
+    with page.expect_request("**/api/renders") as asked:
+        page.get_by_role("button", name="EXR", exact=True).click()
+    (exported,) = asked.value.post_data_json["looks"]
+    assert exported["environment"]["scale"] == 0
+    expect(page.get_by_text("Rendering the EXR on the server: only the light of Point…")).to_be_visible()
     page.get_by_role("button", name="Environment alone").click()
     assert changed(dark, editor.pixels()) < 0.01
     page.get_by_role("button", name="Only the light of the environment").click()

@@ -1,47 +1,42 @@
 /** The selected light: its kind, how strong it is, and where it is. */
 import { ColorField } from "../inspector/ColorField";
-import type { Light, Triple } from "../protocol";
+import type { Light } from "../protocol";
 import { edit } from "../state/edit";
 import { hold } from "../state/live";
 import { defaultLook } from "../state/store";
 import { IconButton } from "../ui/Button";
+import { LabelledSlider } from "../ui/LabelledSlider";
 import { NumberField } from "../ui/NumberField";
-import { Slider } from "../ui/Slider";
-import { KINDS, labelOf, UNITS, withKind, type AddedKind } from "./kinds";
+import { anglesOf, numbersOf, type AngleField, type NumbersField } from "./fields";
+import { completedLight, KINDS, labelOf, UNITS, withKind, type AddedKind } from "./kinds";
 import { editLight, isAdded, lightPath, removeLight } from "./lights";
-import { length } from "./vector";
 
-const FARTHEST = 1e6;
-
-interface NumbersProps {
-  label: string;
-  unit: string;
-  /** What each number is called. */
-  names: readonly string[];
-  values: readonly number[];
-  minimum: number;
-  maximum: number;
-  step: number;
-  onChange(values: number[]): void;
+interface Shown {
+  name: string;
+  light: Light;
 }
 
-/** A few numbers on one line, each with its name. */
-function Numbers({ label, unit, names, values, minimum, maximum, step, onChange }: NumbersProps) {
+function Numbers({ name, light, of }: Shown & { of: NumbersField }) {
+  const { field, label, unit } = of;
+  const values = (light as Partial<Record<NumbersField["field"], number[]>>)[field] ?? [];
+  const put = (next: number[]) => {
+    if (of.allows?.(next) ?? true) editLight(of.deed, name, field, next);
+  };
   return (
-    <div class="numbers" role="group" aria-label={label} style={{ "--count": names.length }}>
+    <div class="numbers" role="group" aria-label={label} style={{ "--count": of.names.length }}>
       <span class="param-label">
         {label} {unit !== "" && <small>{unit}</small>}
       </span>
-      {names.map((name, k) => (
-        <label key={name}>
-          <small>{name}</small>
+      {of.names.map((each, k) => (
+        <label key={each}>
+          <small>{each}</small>
           <NumberField
-            label={`${label}, ${name}`}
+            label={`${label}, ${each}`}
             value={values[k] as number}
-            minimum={minimum}
-            maximum={maximum}
-            step={step}
-            onChange={(next) => onChange(values.map((value, i) => (i === k ? next : value)))}
+            minimum={of.minimum}
+            maximum={of.maximum}
+            step={of.step}
+            onChange={(next) => put(values.map((value, i) => (i === k ? next : value)))}
           />
         </label>
       ))}
@@ -49,126 +44,32 @@ function Numbers({ label, unit, names, values, minimum, maximum, step, onChange 
   );
 }
 
-const XYZ = ["x", "y", "z"] as const;
-
-function Place({ name, light }: { name: string; light: Light }) {
-  const put = (deed: string, field: string) => (value: unknown) => editLight(deed, name, field, value);
-  const range = { minimum: -FARTHEST, maximum: FARTHEST };
-  const aim = (direction: number[]) => {
-    if (length(direction as Triple) > 0) put("Aim", "direction")(direction);
-  };
+function Angle({ name, light, of }: Shown & { of: AngleField }) {
   return (
-    <>
-      {"position" in light && (
-        <Numbers
-          {...range}
-          label="Position"
-          unit="m"
-          names={XYZ}
-          values={light.position}
-          step={0.01}
-          onChange={put("Move", "position")}
-        />
-      )}
-      {"direction" in light && (
-        <Numbers
-          {...range}
-          label="Direction"
-          unit=""
-          names={XYZ}
-          values={light.direction}
-          step={0.05}
-          onChange={aim}
-        />
-      )}
-      {light.kind === "rectangle" && (
-        <Numbers
-          label="Size"
-          unit="m"
-          names={["width", "height"]}
-          values={light.size}
-          minimum={1e-4}
-          maximum={1e4}
-          step={0.01}
-          onChange={put("Size", "size")}
-        />
-      )}
-    </>
+    <LabelledSlider
+      label={of.label}
+      value={of.read(light)}
+      initial={of.read(completedLight({ kind: light.kind }, defaultLook.value?.lights[name]))}
+      minimum={of.minimum}
+      maximum={of.maximum}
+      scale="linear"
+      unit="°"
+      onChange={(angle) => editLight(of.deed, name, of.field, of.changed(light, angle))}
+      onHold={() => hold(lightPath(name))}
+    />
   );
 }
 
-interface AngleProps {
-  label: string;
-  value: number;
-  initial: number;
-  minimum: number;
-  maximum: number;
-  onChange(value: number): void;
-  onHold(): void;
-}
-
-function Angle({ label, ...slider }: AngleProps) {
-  return (
-    <div class="param alone">
-      <span class="param-label">{label}</span>
-      <Slider label={label} scale="linear" unit="°" {...slider} />
-    </div>
-  );
-}
-
-function Angles({ name, light, initial }: { name: string; light: Light; initial: Light | undefined }) {
-  const onHold = () => hold(lightPath(name));
-  const put = (deed: string, field: string, value: unknown) => editLight(deed, name, field, value);
-  if (light.kind === "rectangle") {
-    return (
-      <Angle
-        label="Rotation"
-        value={light.rotation}
-        initial={initial?.kind === "rectangle" ? initial.rotation : 0}
-        minimum={-180}
-        maximum={180}
-        onChange={(value) => put("Turn", "rotation", value)}
-        onHold={onHold}
-      />
-    );
-  }
-  if (light.kind !== "spot") return null;
-  const [inner, outer] = light.cone;
-  const own = initial?.kind === "spot" ? initial.cone : undefined;
-  return (
-    <>
-      <Angle
-        label="Cone, full light"
-        value={inner}
-        initial={own?.[0] ?? 20}
-        minimum={0}
-        maximum={90}
-        onChange={(value) => put("Cone", "cone", [value, Math.max(value, outer)])}
-        onHold={onHold}
-      />
-      <Angle
-        label="Cone, edge"
-        value={outer}
-        initial={own?.[1] ?? 30}
-        minimum={1}
-        maximum={90}
-        onChange={(value) => put("Cone", "cone", [Math.min(inner, value), value])}
-        onHold={onHold}
-      />
-    </>
-  );
-}
-
-function Kind({ name, light }: { name: string; light: Light }) {
-  if (light.kind === "mesh") return <p class="hint">The surfaces of “{light.material}” shine. Where they are is the scene’s own.</p>;
+function Kind({ name, light }: Shown) {
+  if (light.kind === "mesh")
+    return <p class="hint">The surfaces of “{light.material}” shine. Where they are is the scene’s own.</p>;
+  const change = (kind: AddedKind) => edit("Change kind", lightPath(name), withKind(light, kind));
   return (
     <div class="kind">
       <select
         aria-label="Kind of light"
         value={light.kind}
-        onChange={(event) =>
-          edit("Change kind", lightPath(name), withKind(light, event.currentTarget.value as AddedKind))
-        }
+        onChange={(event) => change(event.currentTarget.value as AddedKind)}
       >
         {KINDS.map(({ kind, label, help }) => (
           <option key={kind} value={kind} title={help}>
@@ -180,7 +81,7 @@ function Kind({ name, light }: { name: string; light: Light }) {
   );
 }
 
-export function LightInspector({ name, light }: { name: string; light: Light }) {
+export function LightInspector({ name, light }: Shown) {
   const initial = defaultLook.value?.lights[name];
   return (
     <aside class="panel inspector" aria-label="Inspector">
@@ -209,8 +110,12 @@ export function LightInspector({ name, light }: { name: string; light: Light }) 
           initial={initial?.emission ?? null}
           onChange={(value) => editLight("Emission", name, "emission", value)}
         />
-        <Place name={name} light={light} />
-        <Angles name={name} light={light} initial={initial} />
+        {numbersOf(light).map((of) => (
+          <Numbers key={of.label} name={name} light={light} of={of} />
+        ))}
+        {anglesOf(light).map((of) => (
+          <Angle key={of.label} name={name} light={light} of={of} />
+        ))}
       </section>
     </aside>
   );

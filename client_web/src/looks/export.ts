@@ -1,16 +1,20 @@
-/** Export: PNG as displayed, made here; EXR in linear radiance, rendered by the server. */
+/** Export: PNG as displayed, made here; EXR in linear radiance, rendered by the server. Both are of the light that is
+ * shown: one source alone, or some of its paths. */
 import { getRender, problemText, startRender } from "../net/api";
+import { lightLimits, lightLimitWords } from "../picture/limits";
 import { stage } from "../picture/stage";
 import type { RenderBody } from "../protocol";
 import { whenExact } from "../state/live";
-import { bake, look, scene, viewName } from "../state/store";
+import { withOneLight } from "../state/solo";
+import { bake, look, scene, soloLight, viewName } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { pngBlob } from "./image";
 
 const POLL_MS = 300;
 
 function fileName(suffix: string): string {
-  const stem = `${scene.value?.name ?? "picture"} ${viewName.value}`.trim().replace(/[^\p{L}\p{N}._-]+/gu, "-");
+  const limits = lightLimits.value.map((limit) => limit.words);
+  const stem = [scene.value?.name ?? "picture", viewName.value, ...limits].join(" ").trim().replace(/[^\p{L}\p{N}._-]+/gu, "-");
   return `${stem}.${suffix}`;
 }
 
@@ -46,11 +50,12 @@ export async function exportExr(): Promise<void> {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return;
   await attempt(async () => {
-    note("Rendering the EXR on the server…");
+    const [name, shown] = [fileName("exr"), withOneLight(current, soloLight.value)];
+    note(`Rendering the EXR on the server${lightLimitWords()}…`);
     const render = await finished(
-      await startRender({ bake: id, view: viewName.value, looks: [{ ...current }], format: "exr" }),
+      await startRender({ bake: id, view: viewName.value, looks: [{ ...shown }], format: "exr" }),
     );
-    download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, fileName("exr"));
+    download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, name);
   });
 }
 

@@ -6,7 +6,7 @@ import { hold } from "../state/live";
 import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
 import { defaultLook, look, soloLight } from "../state/store";
 import { IconButton } from "../ui/Button";
-import { Slider } from "../ui/Slider";
+import { LabelledSlider } from "../ui/LabelledSlider";
 import { imported, offerToDelete } from "./environments";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 
@@ -46,33 +46,29 @@ export function EnvironmentPanel() {
         <ImportEnvironment />
       </header>
       <EnvironmentGallery />
-      <div class="param alone">
-        <span class="param-label">Brightness</span>
-        <Slider
-          label="Environment brightness"
-          value={shown.scale}
-          initial={initial.scale}
-          minimum={0.01}
-          maximum={100}
-          scale="log"
-          unit="×"
-          onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
-        />
-      </div>
-      <div class="param alone">
-        <span class="param-label">Rotation</span>
-        <Slider
-          label="Environment rotation"
-          value={shown.rotation}
-          initial={initial.rotation}
-          minimum={-180}
-          maximum={180}
-          scale="linear"
-          unit="°"
-          onChange={(value) => edit("Environment rotation", "/environment/rotation", value)}
-          onHold={() => hold("/environment/rotation")}
-        />
-      </div>
+      <LabelledSlider
+        shown="Brightness"
+        label="Environment brightness"
+        value={shown.scale}
+        initial={initial.scale}
+        minimum={0.01}
+        maximum={100}
+        scale="log"
+        unit="×"
+        onChange={(value) => edit("Environment brightness", "/environment/scale", value)}
+      />
+      <LabelledSlider
+        shown="Rotation"
+        label="Environment rotation"
+        value={shown.rotation}
+        initial={initial.rotation}
+        minimum={-180}
+        maximum={180}
+        scale="linear"
+        unit="°"
+        onChange={(value) => edit("Environment rotation", "/environment/rotation", value)}
+        onHold={() => hold("/environment/rotation")}
+      />
       <div class="param alone">
         <span class="param-label">Tint</span>
         <ColorField

@@ -2,7 +2,7 @@
 import { edit } from "../state/edit";
 import { defaultLook, look, method } from "../state/store";
 import { onRadioKey } from "../ui/radio";
-import { Slider } from "../ui/Slider";
+import { LabelledSlider } from "../ui/LabelledSlider";
 import { MAX_BOUNCES, PATHS, type Show } from "./paths";
 
 function choose(show: Show): void {
@@ -37,21 +37,17 @@ export function TransportPanel() {
           </button>
         ))}
       </div>
-      <div class="param alone">
-        <span class="param-label" title="How many surfaces light may meet before the one that is seen">
-          Bounces
-        </span>
-        <Slider
-          label="Bounces"
-          value={transport.bounces}
-          initial={defaultLook.value?.transport.bounces ?? MAX_BOUNCES}
-          minimum={0}
-          maximum={MAX_BOUNCES}
-          step={1}
-          scale="linear"
-          onChange={(bounces) => edit("Bounces", "/transport/bounces", bounces)}
-        />
-      </div>
+      <LabelledSlider
+        title="How many surfaces light may meet before the one that is seen"
+        label="Bounces"
+        value={transport.bounces}
+        initial={defaultLook.value?.transport.bounces ?? MAX_BOUNCES}
+        minimum={0}
+        maximum={MAX_BOUNCES}
+        step={1}
+        scale="linear"
+        onChange={(bounces) => edit("Bounces", "/transport/bounces", bounces)}
+      />
     </>
   );
 }

@@ -4,7 +4,7 @@ import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
 import { formatNumber, fromFraction, keyStep, snap, toFraction, type Range } from "./scale";
 
-interface Props extends Range {
+export interface SliderProps extends Range {
   label: string;
   value: number;
   unit?: string;
@@ -25,7 +25,7 @@ const STEPS: Record<string, number> = {
   PageUp: 10,
 };
 
-export function Slider(props: Props) {
+export function Slider(props: SliderProps) {
   const { label, value, unit = "", initial, tint, onChange } = props;
   const track = useRef<HTMLDivElement>(null);
   const drag = useRef({ x: 0, at: 0, width: 1, before: value });

@@ -1,11 +1,11 @@
 /** What is going on, in words: connection, latency, exactness, freezing, bakes, memory. */
 import { useComputed } from "@preact/signals";
 import { cancelBake } from "../net/api";
+import { limits } from "../picture/limits";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
-import { coming, connection, freezing, latencyMs, look, retryInMs, settled, solo } from "../state/store";
+import { coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
 import { toggleTruth, truthOpen } from "../truth/truth";
-import { limitWords } from "../outline/paths";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
 
@@ -31,10 +31,6 @@ function pictureWords(): string {
   return settled.value ? "exact ✓" : "refining…";
 }
 
-function soloWords(): string {
-  return solo.value === null ? "" : `Only ${solo.value} is shown, the other materials in grey`;
-}
-
 function bakeWords(): string {
   const next = coming.value;
   if (next === null) return "";
@@ -52,8 +48,7 @@ export function StatusBar() {
     [
       connection.value === "open" ? "Connected" : connectionWords(),
       freezing.value && pictureWords(),
-      soloWords(),
-      look.value && limitWords(look.value.transport),
+      ...limits.value.map((limit) => limit.words),
     ]
       .filter(Boolean)
       .join(". "),

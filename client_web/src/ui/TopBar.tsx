@@ -1,6 +1,7 @@
 /** Scene, views, undo, comparison, display, export. */
 import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
 import { exportExr, exportPng, share } from "../looks/export";
+import { lightLimitWords } from "../picture/limits";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
 import { leave } from "../state/open";
@@ -147,10 +148,10 @@ export function TopBar() {
       <span class="spacer" />
       <Display />
       <div class="group" role="group" aria-label="Export">
-        <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)`} onClick={() => void exportPng()}>
+        <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`} onClick={() => void exportPng()}>
           PNG
         </button>
-        <button title={`Export the linear radiance of ${whichView()}`} onClick={() => void exportExr()}>
+        <button title={`Export the linear radiance of ${whichView()}${lightLimitWords()}`} onClick={() => void exportExr()}>
           EXR
         </button>
       </div>

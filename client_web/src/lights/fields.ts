@@ -1,0 +1,94 @@
+/** What of a light the inspector shows as numbers and as angles: which field, in which range, and how it is changed. */
+import type { Light, Triple } from "../protocol";
+import { length } from "./vector";
+
+type Spot = Extract<Light, { kind: "spot" }>;
+type Rectangle = Extract<Light, { kind: "rectangle" }>;
+
+/** A few numbers on one line. */
+export interface NumbersField {
+  field: "position" | "direction" | "size";
+  deed: string;
+  label: string;
+  unit: string;
+  /** What each number is called. */
+  names: readonly string[];
+  minimum: number;
+  maximum: number;
+  step: number;
+  /** Whether a light may have these; others are not taken. */
+  allows?(values: number[]): boolean;
+}
+
+const FARTHEST = 1e6;
+const XYZ = { names: ["x", "y", "z"], minimum: -FARTHEST, maximum: FARTHEST };
+
+const NUMBERS: readonly NumbersField[] = [
+  { field: "position", deed: "Move", label: "Position", unit: "m", ...XYZ, step: 0.01 },
+  {
+    field: "direction",
+    deed: "Aim",
+    label: "Direction",
+    unit: "",
+    ...XYZ,
+    step: 0.05,
+    allows: (values) => length(values as Triple) > 0,
+  },
+  {
+    field: "size",
+    deed: "Size",
+    label: "Size",
+    unit: "m",
+    names: ["width", "height"],
+    minimum: 1e-4,
+    maximum: 1e4,
+    step: 0.01,
+  },
+];
+
+/** An angle of the kinds of light that have its field, degrees. */
+export interface AngleField {
+  field: "rotation" | "cone";
+  deed: string;
+  label: string;
+  minimum: number;
+  maximum: number;
+  read(light: Light): number;
+  /** The field with another angle. */
+  changed(light: Light, angle: number): unknown;
+}
+
+const cone = (light: Light) => (light as Spot).cone;
+
+const ANGLES: readonly AngleField[] = [
+  {
+    field: "rotation",
+    deed: "Turn",
+    label: "Rotation",
+    minimum: -180,
+    maximum: 180,
+    read: (light) => (light as Rectangle).rotation,
+    changed: (_, angle) => angle,
+  },
+  {
+    field: "cone",
+    deed: "Cone",
+    label: "Cone, full light",
+    minimum: 0,
+    maximum: 90,
+    read: (light) => cone(light)[0],
+    changed: (light, angle) => [angle, Math.max(angle, cone(light)[1])],
+  },
+  {
+    field: "cone",
+    deed: "Cone",
+    label: "Cone, edge",
+    minimum: 1,
+    maximum: 90,
+    read: (light) => cone(light)[1],
+    changed: (light, angle) => [Math.min(cone(light)[0], angle), angle],
+  },
+];
+
+export const numbersOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
+export const anglesOf = (light: Light) => ANGLES.filter(({ field }) => field in light);
