@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,11 @@ from relume.light.environment import lookup, turned
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.reference.indirect import reference_indirect
-from relume.reference.local import emission_of, lamps_of
+from relume.reference.local import LocalLamp, emission_of, lamps_of
 from relume.reference.radiance import Points, reference_radiance
-from relume.reference.texels import texels_of
-from relume.scene.model import Scene
-from relume.trace.geometry import merge
+from relume.reference.texels import Texels, texels_of
+from relume.scene.model import Environment, Scene
+from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.transfer.base import Recipe
 from relume.transfer.direct import DirectMethod
@@ -62,67 +62,110 @@ def reference_image(
         NotFoundError: the look names an environment that is not here.
     """
     DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
+    shot = _shoot(scene, view, look, size)
+    paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
+    straight = _STRAIGHT_SHARE if paths.reflect else 1.0
+    draw = _Draw(spp, pass_index, cancelled)
+    radiance = np.zeros((len(shot.samples.pixel), 3))
+    if paths.direct:
+        _add_straight(radiance, shot, draw, lambda share: progress(straight * share))
+        _add_background(radiance, shot)
+    if paths.reflect:
+        _add_reflected(radiance, shot, paths, draw, lambda share: progress(straight + (1 - straight) * share))
+    return _resolve(shot.samples, radiance, size)
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """What a view sees of a scene, and by which light.
+
+    Attributes:
+        points: those of `samples`, which are sorted by material. eye: where they are seen from. (3,)
+        light: the environment that the look names; texels: it as the look turns and weighs it.
+    """
+
+    scene: Scene
+    geometry: Geometry
+    look: Look
+    samples: ViewSamples
+    points: Points
+    eye: F64
+    light: Environment
+    texels: Texels
+    lamps: Sequence[LocalLamp]
+
+    def rows(self, material: int) -> slice:
+        """The samples that see a material, by its number."""
+        first, last = np.searchsorted(self.samples.material, (material, material + 1))
+        return slice(int(first), int(last))
+
+    @property
+    def on_surface(self) -> slice:
+        """The samples that see a surface; they come before those of the background."""
+        return slice(0, int(np.searchsorted(self.samples.material, len(self.scene.materials))))
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """How much is drawn, with which seed, and who may end it."""
+
+    spp: int
+    pass_index: int
+    cancelled: Callable[[], bool]
+
+
+def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
+    """Trace a view's samples and find the look's light."""
     geometry = merge(scene)
     samples = sample_view(scene, geometry, view, size)
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
-    texels, lamps = texels_of(light, look.environment.rotation).times(look.environment.gain), lamps_of(scene, look)
-    paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
-    camera = next(camera for camera in scene.cameras if camera.name == view)
-    eye = camera.to_world[:3, 3]
-    points = points_of(samples, eye)
-    radiance = np.zeros((len(samples.pixel), 3))
-    straight = _STRAIGHT_SHARE if paths.reflect else 1.0
-    bounds = np.searchsorted(samples.material, np.arange(len(scene.materials) + 1))
-    for k, material in enumerate(scene.materials if paths.direct else ()):
-        rows, before = slice(int(bounds[k]), int(bounds[k + 1])), int(bounds[k])
-        terms: list[Any] = list(look.materials[material.name].terms)
+    texels = texels_of(light, look.environment.rotation).times(look.environment.gain)
+    eye = next(camera for camera in scene.cameras if camera.name == view).to_world[:3, 3]
+    return _Shot(
+        scene, geometry, look, samples, points_of(samples, eye), eye, light, texels, lamps_of(scene, look)
+    )  # fmt: skip
 
-        def share_of_all(share: float, rows: slice = rows, before: int = before) -> None:
-            progress(straight * (before + share * (rows.stop - rows.start)) / max(1, int(bounds[-1])))
 
-        radiance[rows] = reference_radiance(
-            geometry, texels, points.rows(rows), [terms], spp, share_of_all, cancelled, pass_index, lamps
+def _add_straight(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[float], object]) -> None:
+    """Add light that comes straight from lights, and that of surfaces which shine themselves."""
+    num_samples = max(1, shot.on_surface.stop)
+    for number, material in enumerate(shot.scene.materials):
+        rows = shot.rows(number)
+        terms: list[Any] = list(shot.look.materials[material.name].terms)
+
+        def share_of_all(share: float, rows: slice = rows) -> None:
+            progress((rows.start + share * (rows.stop - rows.start)) / num_samples)
+
+        radiance[rows] += reference_radiance(
+            shot.geometry, shot.texels, shot.points.rows(rows), [terms], draw.spp,
+            share_of_all, draw.cancelled, draw.pass_index, shot.lamps,
         )[0]  # fmt: skip
-        if (emission := emission_of(lamps, material.name)).any():
-            front = geometry.is_front(eye.astype(np.float32), points.position[rows])
+        if (emission := emission_of(shot.lamps, material.name)).any():
+            front = shot.geometry.is_front(shot.eye.astype(np.float32), shot.points.position[rows])
             radiance[rows] += emission * (front | material.double_sided)[:, None]
-    if paths.reflect:
-        on_surface = slice(0, int(bounds[-1]))
-        truth = partial(reference_indirect, scene, geometry, texels, look)
-        radiance[on_surface] += _reflected(
-            truth, points.rows(on_surface), samples.material[on_surface], paths, spp, pass_index, cancelled,
-            lambda share: progress(straight + (1 - straight) * share),
-        )  # fmt: skip
-    if paths.direct:
-        outside = samples.material == BACKGROUND
-        towards = turned(samples.surface.position[outside].astype(np.float64), -look.environment.rotation)
-        radiance[outside] = np.array(look.environment.gain) * lookup(light.radiance, towards.astype(np.float32))
-    return _resolve(samples, radiance, size)
 
 
-def _reflected(
-    truth: Callable[..., F64],
-    points: Points,
-    material: NDArray[np.integer],
-    paths: Paths,
-    spp: int,
-    pass_index: int,
-    cancelled: Callable[[], bool],
-    progress: Callable[[float], object],
-) -> F64:
-    """Radiance of points by way of other surfaces, block by block. truth: `reference_indirect` of a look. (n, 3)"""
-    num_blocks, num_paths = -(-points.num_points // _POINTS_A_BLOCK), max(1, spp // _SPP_A_PATH)
-    found = np.empty((points.num_points, 3))
+def _add_background(radiance: F64, shot: _Shot) -> None:
+    """Add the environment where there is no surface."""
+    environment, outside = shot.look.environment, shot.samples.material == BACKGROUND
+    towards = turned(shot.samples.surface.position[outside].astype(np.float64), -environment.rotation)
+    radiance[outside] += np.array(environment.gain) * lookup(shot.light.radiance, towards.astype(np.float32))
+
+
+def _add_reflected(radiance: F64, shot: _Shot, paths: Paths, draw: _Draw, progress: Callable[[float], object]) -> None:
+    """Add light by way of other surfaces, block by block."""
+    num_points = shot.on_surface.stop
+    num_blocks, num_paths = -(-num_points // _POINTS_A_BLOCK), max(1, draw.spp // _SPP_A_PATH)
     for block in range(num_blocks):
-        if cancelled():
+        if draw.cancelled():
             raise CancelledError("the reference was cancelled")
-        rows = slice(block * _POINTS_A_BLOCK, (block + 1) * _POINTS_A_BLOCK)
-        found[rows], _ = truth(
-            points.rows(rows), material[rows], paths.last, num_paths, _SPP_A_PATH,
-            seed=pass_index * num_blocks + block, first_bounce=paths.first,
+        rows = slice(block * _POINTS_A_BLOCK, min((block + 1) * _POINTS_A_BLOCK, num_points))
+        found, _ = reference_indirect(
+            shot.scene, shot.geometry, shot.texels, shot.look, shot.points.rows(rows), shot.samples.material[rows],
+            paths.last, num_paths, _SPP_A_PATH, seed=draw.pass_index * num_blocks + block, first_bounce=paths.first,
         )  # fmt: skip
+        radiance[rows] += found
         progress((block + 1) / num_blocks)
-    return found
 
 
 def points_of(samples: ViewSamples, eye: F64) -> Points:
