@@ -293,6 +293,52 @@ def _spend(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _divide(  # type: ignore[no-untyped-def]
+    kinds, scale, wo, support, local, gamma, origin, count, parts, lists, bend, leaves, shares, of_entry, num
+):  # fmt: skip
+    """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
+
+    Args:
+        parts: local, gamma and origin of two generations of divided triangles, written in turns.
+    Returns:
+        The new number of leaves.
+    """
+    part_local, part_gamma, part_origin = parts
+    for level in range(1, _MAX_DEPTH):
+        to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
+        num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
+        _angles(kinds, scale, wo, to_local, 3, num_parts, to_gamma)
+        _bends(to_gamma, support, num_parts, bend)
+        num, count = _sort_out(to_gamma, bend, num_parts, level, to_origin, leaves, shares, of_entry, num, lists)
+        local, gamma, origin = to_local, to_gamma, to_origin
+    return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
+    """Local nodes and their angles, which light each triangle is of, lists of numbers, bends: of lights and parts."""
+    room = _padded(num_lights)
+    widest = max(room, _MOST_DIVIDED)
+    local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
+    parts = (
+        np.zeros((2, 3, 6, _MOST_DIVIDED), np.float32),
+        np.zeros((2, num_curves, 6, _MOST_DIVIDED), np.float32),
+        np.empty((2, _MOST_DIVIDED), np.int64),
+    )
+    lists, bend = np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
+    return local, gamma, parts, np.arange(widest), lists, bend, np.empty(num_lights, np.int64)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
+    """Corners of leaves, their shares, their entries, overlaps, weights, and means and products of settings."""
+    leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
+    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
+    mean, product = np.empty(num_settings, np.float32), np.empty((_LEAVES_AT_ONCE, num_settings), np.float32)
+    return leaves, shares, np.empty(capacity, np.int64), overlap, weight, mean, product
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, power,
     kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, start, stop, out,
@@ -307,21 +353,11 @@ def project_points(  # type: ignore[no-untyped-def]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    room = _padded(num_lights)
-    widest = max(room, _MOST_DIVIDED)
-    local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
-    origin, lists, bend = np.arange(widest), np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
-    # two generations of divided triangles
-    part_local, part_gamma = (
-        np.zeros((2, 3, 6, _MOST_DIVIDED), np.float32), np.zeros((2, num_curves, 6, _MOST_DIVIDED), np.float32),
-    )  # fmt: skip
-    part_origin = np.empty((2, _MOST_DIVIDED), np.int64)
-    divided = np.empty(num_lights, np.int64)
+    local, gamma, parts, origin, lists, bend, divided = _scratch_of_lights(num_curves, num_lights)
     capacity = 4 * num_lights + _MOST_LEAVES
-    leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
-    of_entry = np.empty(capacity, np.int64)
-    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
-    mean, product = np.empty(settings.shape[2], np.float32), np.empty((_LEAVES_AT_ONCE, settings.shape[2]), np.float32)
+    leaves, shares, of_entry, overlap, weight, mean, product = _scratch_of_leaves(
+        num_curves, capacity, settings.shape[2]
+    )  # fmt: skip
     scaled_wo = np.empty((num_curves, 3), np.float32)
     for p in range(start, stop):
         row = p - start
@@ -347,16 +383,10 @@ def project_points(  # type: ignore[no-untyped-def]
                 num = 0
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
-            of_local, of_gamma, of_origin = local, gamma, origin
-            for level in range(1, _MAX_DEPTH):
-                to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
-                num_parts = _children(of_local, of_gamma, of_origin, lists[2], count, to_local, to_gamma, to_origin)
-                _angles(kinds, scale, scaled_wo, to_local, 3, num_parts, to_gamma)
-                _bends(to_gamma, support, num_parts, bend)
-                num, count = _sort_out(
-                    to_gamma, bend, num_parts, level, to_origin, leaves, shares, of_entry, num, lists
-                )
-                of_local, of_gamma, of_origin = to_local, to_gamma, to_origin
+            num = _divide(
+                kinds, scale, scaled_wo, support, local, gamma, origin, count, parts, lists, bend,
+                leaves, shares, of_entry, num,
+            )  # fmt: skip
         _weigh(power, light, shading, begin, of_entry, shares, num, weight)
         _spend(
             leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
