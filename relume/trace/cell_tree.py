@@ -60,6 +60,22 @@ def locate16(tree, keys, nodes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
+def _gap(along):  # type: ignore[no-untyped-def]
+    """The number of sorted values below a gap that is as near as possible to their middle.
+
+    Points of one plane differ by rounding, and their light comes from beside it: a plane between points that lie
+    together would put hits on the wrong side of it, so that gaps are no smaller than a quarter of the mean one.
+    """
+    num = along.shape[0]
+    least = np.float32(0.25) * (along[num - 1] - along[0]) / num
+    for away in range(num):
+        for below in (num // 2 - away, num // 2 + away):
+            if 0 < below < num and along[below] - along[below - 1] > least:
+                return below
+    return int(np.argmax(along[1:] - along[:-1])) + 1
+
+
+@nb.njit(nogil=True, cache=True)
 def _split(keys, rows):  # type: ignore[no-untyped-def]
     """Sort rows along the axis to divide them by.
 
@@ -81,11 +97,9 @@ def _split(keys, rows):  # type: ignore[no-untyped-def]
     rows[:] = rows[order]
     along = along[order]
     # directions fall into heaps, of which none is cut; places are divided evenly
-    middle = np.float32(0.5) * (low[axis] + high[axis])
-    value = middle if axis >= 3 else along[along.shape[0] // 2]
-    first = np.searchsorted(along, value)
-    if first == 0:  # more than half of the rows share the lowest value
-        first = np.searchsorted(along, value, side="right")
+    first = np.searchsorted(along, np.float32(0.5) * (low[axis] + high[axis])) if axis >= 3 else _gap(along)
+    value = np.float32(0.5) * (along[first - 1] + along[first])
+    if value <= along[first - 1]:  # they are one rounding apart
         value = along[first]
     return axis, first, value
 

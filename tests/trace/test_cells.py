@@ -59,6 +59,23 @@ def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_po
         assert {locate(tree, side[row], keys[row]) for row in rows} == {cell}
 
 
+def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
+    """Points lie off their surface, with rounding; rays hit it: a few on the plane before, many on the one behind."""
+    rng = np.random.default_rng(5)
+    near, far = np.float32(-1.2), np.float32(-2)
+    z = np.where(np.arange(3000) < 200, near, far)
+    x = np.where(z == near, rng.uniform(-2.7, -2.5, 3000), rng.uniform(-2.5, 2.5, 3000))
+    place = np.stack([x, rng.random(3000), z + 1e-4 + rng.uniform(-2e-7, 2e-7, 3000)], axis=1)
+    keys = np.concatenate([place, np.tile([0, 0, 1], (3000, 1))], axis=1).astype(np.float32)
+    tree, members = grow_tree(keys, np.zeros(3000, np.int32), 1, 200)
+    is_near = [set(z[rows]) == {near} for rows in members]
+    assert {len(set(z[rows])) for rows in members} == {1}
+    for x, y in rng.uniform((-2.7, 0), (-2.5, 1), (50, 2)):
+        assert is_near[locate(tree, 0, (x, y, near, 0, 0, 1))]
+    for x, y in rng.uniform((-2.4, 0), (2.5, 1), (50, 2)):
+        assert not is_near[locate(tree, 0, (x, y, far, 0, 0, 1))]
+
+
 def test_a_side_without_points_has_no_cell():
     keys, side = random_keys(100, 2, seed=1)
     tree, _ = grow_tree(keys, side, 4, 10)
