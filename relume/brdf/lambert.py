@@ -31,5 +31,6 @@ LAMBERT = Term(
     quotient=quotient,
     source="Lambert 1760: f = 1/π",
     texture="diffuse",
+    is_even=True,
     help="Light scattered evenly in all directions; the colour is the albedo.",
 )

@@ -104,7 +104,8 @@ def bounced_roughly(
     The bounces are a power iteration: their shape settles soon, and then only their size changes.
 
     Args:
-        few_links: some of the rays, for all bounces but the first, whose light is even already.
+        few_links: some of the rays, for all bounces but the first, whose light is even already. What noise they leave
+            is each cell's own, and gather rays see many cells.
     """
     first = min(num_bounces, _ROUGH_BOUNCES)
     total, radiance, before = direct.astype(np.float64), direct, direct

@@ -43,7 +43,7 @@ class LocalLight(NamedTuple):
         kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
         position: of points. (3,) float32. axis: unit, of spots, and the way that directional light goes. (3,)
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
-        corner, edges: of parallelograms or triangles. (T, 3), (T, 2, 3) float32
+        corner, edges, normal: of parallelograms or triangles. (T, 3), (T, 2, 3), (T, 3) float32; the last unit
         share: of the area, up to each piece and with it. (T,) float32. area: of all, m².
         is_rectangle: a parallelogram, else triangles. is_two_sided: shines to both sides.
     """
@@ -55,6 +55,7 @@ class LocalLight(NamedTuple):
     cone_offset: np.float32
     corner: F32
     edges: F32
+    normal: F32
     share: F32
     area: np.float32
     is_rectangle: bool
@@ -82,8 +83,10 @@ def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> L
     """A light of a look. triangles: of one of kind "mesh"; a surface without area gives no light."""
     is_rectangle = geometry.kind == "rectangle"
     corner, edges = _outline(geometry, triangles)
-    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) * (1.0 if is_rectangle else 0.5)
+    across = np.cross(edges[:, 0], edges[:, 1])
+    areas = np.linalg.norm(across, axis=1) * (1.0 if is_rectangle else 0.5)
     kept, area = areas > 0, areas.sum()
+    across = across[kept] / np.linalg.norm(across[kept], axis=1, keepdims=True)
     scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
     return LocalLight(
         kind={"point": POINT, "spot": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE),
@@ -93,6 +96,7 @@ def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> L
         cone_offset=np.float32(offset),
         corner=corner[kept].astype(np.float32),
         edges=edges[kept].astype(np.float32),
+        normal=across.astype(np.float32),
         share=(np.cumsum(areas[kept]) / max(area, 1e-300)).astype(np.float32),
         area=np.float32(area),
         is_rectangle=is_rectangle,
@@ -160,7 +164,8 @@ def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type:
     if light.kind == POINT:
         dx, dy, dz = light.position[0] - px, light.position[1] - py, light.position[2] - pz
         distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
-        dx, dy, dz = dx / distance, dy / distance, dz / distance
+        nearness = one / distance
+        dx, dy, dz = dx * nearness, dy * nearness, dz * nearness
         along = -(dx * light.axis[0] + dy * light.axis[1] + dz * light.axis[2])
         falloff = min(max(light.cone_scale * along + light.cone_offset, zero), one)
         nearest = max(distance, NEAREST)
@@ -168,10 +173,11 @@ def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type:
     if light.area == 0:
         return one, zero, zero, one, zero, zero, zero, zero
     u, v = pattern.uv[sample, 0] + shift_u, pattern.uv[sample, 1] + shift_v
-    u -= np.float32(math.floor(u))
-    v -= np.float32(math.floor(v))
-    piece = min(np.searchsorted(light.share, u, side="right"), light.share.shape[0] - 1)
+    u -= np.float32(u >= one)
+    v -= np.float32(v >= one)
+    piece = 0
     if not light.is_rectangle:
+        piece = min(np.searchsorted(light.share, u, side="right"), light.share.shape[0] - 1)
         below = light.share[piece - 1] if piece > 0 else zero
         root = np.float32(math.sqrt(min((u - below) / (light.share[piece] - below), one)))
         u, v = root * (one - v), root * v
@@ -180,10 +186,9 @@ def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type:
     dy = light.corner[piece, 1] + u * e[1] + v * f[1] - py
     dz = light.corner[piece, 2] + u * e[2] + v * f[2] - pz
     distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
-    dx, dy, dz = dx / distance, dy / distance, dz / distance
-    nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
-    length = np.float32(math.sqrt(nx * nx + ny * ny + nz * nz))
-    nx, ny, nz = nx / length, ny / length, nz / length
+    nearness = one / distance
+    dx, dy, dz = dx * nearness, dy * nearness, dz * nearness
+    nx, ny, nz = light.normal[piece, 0], light.normal[piece, 1], light.normal[piece, 2]
     cosine = -(dx * nx + dy * ny + dz * nz)
     if cosine < 0 and light.is_two_sided:
         nx, ny, nz, cosine = -nx, -ny, -nz, -cosine

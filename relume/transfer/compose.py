@@ -36,6 +36,28 @@ def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, repl
                 radiance[channel, first + row] += value
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_even(arriving, factor, start, stop, image):  # type: ignore[no-untyped-def]
+    """Samples [start, stop) of all channels."""
+    samples = image.shape[2]
+    for tile in range(start // samples, (stop - 1) // samples + 1):
+        first = tile * samples
+        begin, end = max(start, first), min(stop, first + samples)
+        for channel in range(3):
+            for s in range(begin, end):
+                image[tile, channel, s - first] += factor[channel] * arriving[s]
+
+
+def add_even(arriving: F32, factor: F32, image: F32) -> None:
+    """Add light that a term scatters alike wherever it comes from and goes to.
+
+    Args:
+        arriving: E of each sample, of a light of unit emission. (n,) factor: (3,). image: (tiles, 3, samples), written.
+    """
+    args = (np.ascontiguousarray(arriving, np.float32), np.asarray(factor, np.float32).reshape(3))
+    for_shares(lambda start, stop: _add_even(*args, start, stop, image), len(arriving))
+
+
 def add_term(
     image: F32,
     color: F32,

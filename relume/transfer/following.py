@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -109,7 +110,14 @@ class Follower:
                 continue
             if base.light not in changes:
                 changes[base.light] = self._change(base.light, light)
-            image.follow(rows, changes[base.light], self._moved.change(material, image, base.light, light))
+            image.follow(partial(self._add_change, material, image, base.light, rows, changes[base.light]))
+
+    def _add_change(
+        self, material: MaterialImage, image: TermImage, before: Light, rows: Rows | None, change: F32, out: F32
+    ) -> None:
+        self._moved.add_change(material, image, before, self._images.light, out)
+        if rows is not None:
+            rows.add(change, out)
 
     def _change(self, before: Light, after: Light) -> F32:
         """Haar coefficients of what cells send out more. (padded cells, 3) float32"""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,15 @@ from relume.trace.cells import POINTS_A_CELL
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import is_front, off_surface
 from relume.trace.local_shadows import arriving, trace_local
+from relume.trace.rough_light import RoughLight, light_roughly
 from relume.transfer.base import StoreReader
-from relume.transfer.light import Light
+from relume.transfer.light import Light, Source
 from relume.transfer.receivers import LocalRays
 
 F32 = NDArray[np.float32]
 
 SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
+ROUGH_SAMPLES = 4  # for each of both while a hand moves it
 _LIGHTS_KEPT = 256
 
 
@@ -81,21 +83,19 @@ class LocalLights:
         light: Light,
         points: Points,
         shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None,
-        num_samples: int = SAMPLES,
     ) -> list[LocalRays]:
         """Local light that comes straight to points.
 
         Args:
             shadows_of: where they are remembered; they are traced where there is no such place.
-            num_samples: of a light that has an extent.
         """
         if not light.paths.direct:
             return []
-        find = shadows_of or partial(self.shadows, num_samples=num_samples)
+        find = shadows_of or self.shadows
         return [
             LocalRays(
                 self._light(geometry),
-                pattern_of(geometry, num_samples),
+                pattern_of(geometry, SAMPLES),
                 np.array(gain, np.float32),
                 points.position,
                 points.numbers,
@@ -104,9 +104,19 @@ class LocalLights:
             for geometry, gain in light.local
         ]
 
-    def shadows(self, geometry: LightGeometry, points: Points, num_samples: int = SAMPLES) -> Shadows:
+    def roughly(self, geometry: LightGeometry, points: Points) -> RoughLight:
+        """What comes to points from a light of unit emission, few samples of it where it has an extent."""
+        pattern, along = pattern_of(geometry, ROUGH_SAMPLES), (points.position, points.normal, points.numbers)
+        return light_roughly(self._embree, self._off_surface, self._light(geometry), pattern, *along)
+
+    def rough_rays(self, source: Source, points: Points, seen: NDArray[np.uint8]) -> LocalRays:
+        """The same as rays, for terms that ask where light comes from. seen: of `RoughLight`"""
+        light, pattern = self._light(source.geometry), pattern_of(source.geometry, ROUGH_SAMPLES)
+        return LocalRays(light, pattern, np.array(source.gain, np.float32), points.position, points.numbers, seen)
+
+    def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""
-        return Shadows(self._trace(geometry, points, num_samples))
+        return Shadows(self._trace(geometry, points, SAMPLES))
 
     @cached_property
     def _cells(self) -> Points:
@@ -121,16 +131,15 @@ class LocalLights:
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
         """What comes to every gather cell from a light of unit emission, the mean over its points. (C,) float32"""
-        of_points = self._arriving(geometry, self._cells, SAMPLES_OF_CELLS).reshape(-1, POINTS_A_CELL)
+        points, pattern = self._cells, pattern_of(geometry, SAMPLES_OF_CELLS)
+        seen = self._trace(geometry, points, SAMPLES_OF_CELLS)
+        along = (points.position, points.normal, points.numbers, seen)
+        of_points = arriving(self._light(geometry), pattern, *along).reshape(-1, POINTS_A_CELL)
         return np.asarray(of_points.mean(axis=1, dtype=np.float64), np.float32)
 
     def _rough_irradiance(self, geometry: LightGeometry) -> F32:
         """The same for a moving hand, at one of a cell's points."""
-        return self._arriving(geometry, self._few_cells, POINTS_A_CELL)
-
-    def _arriving(self, geometry: LightGeometry, points: Points, num_samples: int) -> F32:
-        pattern, seen = pattern_of(geometry, num_samples), self._trace(geometry, points, num_samples)
-        return arriving(self._light(geometry), pattern, points.position, points.normal, points.numbers, seen)
+        return self.roughly(geometry, self._few_cells).arriving
 
     def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
         """Whether points (n, 3) of a material that shines are seen from a side that does."""

@@ -1,7 +1,7 @@
 """Local lights that were moved: what they give straight to a picture, evaluated anew each frame.
 
-Shadows are traced for the place where a light is now and kept nowhere: it will be elsewhere in the next frame. A light
-that has an extent is seen through few samples meanwhile.
+Shadows are traced for the place where a light is now, for the whole view at once, and kept for no longer than it is
+there. Terms that scatter evenly need no more of a light than what arrives; others list its rays.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.look import LightGeometry
 from relume.parallel import for_shares
+from relume.trace.rough_light import RoughLight
+from relume.transfer.compose import add_even
 from relume.transfer.contraction import contract
 from relume.transfer.light import Light, Source
 from relume.transfer.local import Points
@@ -24,20 +27,19 @@ from relume.transfer.view_images import ViewImages
 
 F32 = NDArray[np.float32]
 
-ROUGH_SAMPLES = 4  # of a light that has an extent
-
 
 @dataclass(frozen=True)
 class _Lit:
-    """A material's samples, read once."""
+    """Samples of a view or of a material, read once. receivers: of those of a material."""
 
     points: Points
-    receivers: Receivers
+    receivers: Receivers | None = None
 
     @property
     def num_bytes(self) -> int:
         """Memory it holds."""
-        return int(5 * self.points.position.nbytes + self.points.numbers.nbytes)
+        frames = 0 if self.receivers is None else 3 * self.receivers.normal.nbytes
+        return int(2 * self.points.position.nbytes + self.points.numbers.nbytes + frames)
 
 
 class MovedLights:
@@ -45,28 +47,27 @@ class MovedLights:
 
     def __init__(self, images: ViewImages) -> None:
         self._images = images
-        self._rays: dict[int, tuple[Light, list[LocalRays]]] = {}  # of each material, for all its terms
+        self._now: dict[LightGeometry, RoughLight] = {}
 
-    def change(self, material: MaterialImage, image: TermImage, before: Light, after: Light) -> F32 | None:
-        """What comes straight to a term's samples from lights that were not there before, less what came from those
-        that are not there any more; None where there are no such lights. (tiles, 3, samples)"""
-        come = tuple(source for source in after.local if source not in before.local)
+    def add_change(self, material: MaterialImage, image: TermImage, before: Light, after: Light, out: F32) -> None:
+        """Add what comes straight to a term's samples from lights that were not there before, and take off what came
+        from those that are not there any more.
+
+        Args:
+            out: shaped like the term's image.
+        """
+        if not after.paths.direct:
+            return
         gone = tuple(source for source in before.local if source not in after.local)
-        if not (after.paths.direct and (come or gone)):
-            return None
-        change = self._now(material, image, _alone(after, come)) if come else np.zeros_like(image.image)
-        return change - self._before(material, image, _alone(before, gone)) if gone else change
-
-    def _now(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
-        known, rays = self._rays.get(material.index, (None, []))
-        if known != light:
-            local = self._images.transfer.local
-            rays = local.all_rays(light, self._lit(material).points, num_samples=ROUGH_SAMPLES)
-            self._rays[material.index] = light, rays
-        return self._shaded(material, image, rays).image
+        come = [source for source in after.local if source not in before.local]
+        if gone:
+            out -= self._before(material, image, _alone(before, gone))
+        if come:
+            self._add_now(material, image, come, out)
 
     def _before(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
-        """As exact as in the picture that was shaded; the same in every frame, and so kept."""
+        """What comes straight from lights that stood still, as exact as in the picture that was shaded; the same in
+        every frame, and so kept."""
         images = self._images
         key = (*images.key_of_image(material, image, light), "straight")
 
@@ -75,10 +76,32 @@ class MovedLights:
 
         return images.cache.get(key, Shaded, shaded_bytes(material.num_samples), shaded).image
 
+    def _add_now(self, material: MaterialImage, image: TermImage, come: list[Source], out: F32) -> None:
+        contraction, rows = contract(image.term, image.target, None), self._images.view.rows(material.index)
+        lights = [(source, self._roughly(source.geometry)) for source in come]
+        if image.term.is_even and contraction.kinds.size == 0:
+            upright = image.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))
+            for source, light in lights:
+                add_even(light.arriving[rows], contraction.constant * upright * source.gain, out)
+            return
+        rays = [
+            self._images.transfer.local.rough_rays(source, self._lit(material).points, light.visible[rows])
+            for source, light in lights
+        ]
+        out += self._shaded(material, image, rays).image
+
+    def _roughly(self, geometry: LightGeometry) -> RoughLight:
+        if geometry not in self._now:
+            present = {source.geometry for source in self._images.light.local}
+            self._now = {known: light for known, light in self._now.items() if known in present}
+            self._now[geometry] = self._images.transfer.local.roughly(geometry, self._all_points())
+        return self._now[geometry]
+
     def _shaded(self, material: MaterialImage, image: TermImage, rays: list[LocalRays]) -> Shaded:
         """What rays bring a term, in the threads of frames."""
-        points = replace(self._lit(material).receivers, rays=rays)
-        contraction = contract(image.term, image.target, None)
+        receivers = self._lit(material).receivers
+        assert receivers is not None
+        points, contraction = replace(receivers, rays=rays), contract(image.term, image.target, None)
         rows = np.zeros((material.num_samples, 3, 1), np.float32)
 
         def add(start: int, stop: int) -> None:
@@ -89,13 +112,23 @@ class MovedLights:
 
     def _lit(self, material: MaterialImage) -> _Lit:
         view, index = self._images.view, material.index
-        key = (self._images.transfer.key, view.name, index, "lit")
-        num_bytes = material.num_samples * 64
+        key, num_bytes = (self._images.transfer.key, view.name, index, "lit"), material.num_samples * 64
 
         def read() -> _Lit:
             return _Lit(view.points(index), view.receivers(index, is_lit=False))
 
         return self._images.cache.get(key, _Lit, num_bytes, read)
+
+    def _all_points(self) -> Points:
+        """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""
+        view = self._images.view
+
+        def read() -> _Lit:
+            points = view.all_points()
+            return _Lit(replace(points, normal=points.normal * (view.cos_theta_o > 0)[:, None].astype(np.float32)))
+
+        key, num_bytes = (self._images.transfer.key, view.name, "lit"), view.num_surface_samples * 28
+        return self._images.cache.get(key, _Lit, num_bytes, read).points
 
 
 def _alone(light: Light, local: tuple[Source, ...]) -> Light:

@@ -120,14 +120,15 @@ def keep(index, details, expected, kept, scale, rows):  # type: ignore[no-untype
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
-def add_rows(kept, scale, rows, light, num_samples, start, stop, image):  # type: ignore[no-untyped-def]
-    """Add what blocks [start, stop) make of light to an image.
+def apply_rows(kept, scale, rows, light, start, stop, alone):  # type: ignore[no-untyped-def]
+    """What blocks [start, stop) make of light.
 
     Args:
         kept, scale: (blocks, K). rows: (blocks, K, 1 or 3 channels, `BLOCK_SAMPLES`) int16.
-        light: Haar coefficients. (padded cells, 3) float32. image: (tiles, 3, samples) float32
+        light: Haar coefficients. (padded cells, 3) float32
+    Writes alone (blocks · `BLOCK_SAMPLES`, 4) float32, whose last channel says nothing.
     """
-    num_channels, samples = rows.shape[2], image.shape[2]
+    num_channels = rows.shape[2]
     # arrays of their own, so that the compiler knows that they do not overlap
     red, green, blue = (
         np.empty(BLOCK_SAMPLES, np.float32), np.empty(BLOCK_SAMPLES, np.float32), np.empty(BLOCK_SAMPLES, np.float32)
@@ -151,28 +152,25 @@ def add_rows(kept, scale, rows, light, num_samples, start, stop, image):  # type
                     green[s] += g * np.float32(of_green[s])
                     blue[s] += b * np.float32(of_blue[s])
         first = block * BLOCK_SAMPLES
-        for s in range(min(BLOCK_SAMPLES, num_samples - first)):
-            tile, offset = (first + s) // samples, (first + s) % samples
-            image[tile, 0, offset] += red[s]
-            image[tile, 1, offset] += green[s]
-            image[tile, 2, offset] += blue[s]
+        for s in range(BLOCK_SAMPLES):
+            alone[first + s, 0], alone[first + s, 1], alone[first + s, 2] = red[s], green[s], blue[s]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def add_shared(first, among, weight, alone, start, stop, image):  # type: ignore[no-untyped-def]
-    """Add to samples [start, stop) of an image the weighted means of another's.
+    """Add to samples [start, stop) of an image the weighted means of what samples have alone.
 
     Args:
-        first, among, weight: rows of `relume.transfer.sharing`, compressed. alone, image: (tiles, 3, samples) float32
+        first, among, weight: rows of `relume.transfer.sharing`, compressed. alone: from `apply_rows`.
+        image: (tiles, 3, samples) float32
     """
     samples = image.shape[2]
+    total = np.empty(4, np.float32)
     for s in range(start, stop):
-        red = green = blue = np.float32(0)
+        total[:] = 0
         for k in range(first[s], first[s + 1]):
-            tile, offset = among[k] // samples, among[k] % samples
-            red += weight[k] * alone[tile, 0, offset]
-            green += weight[k] * alone[tile, 1, offset]
-            blue += weight[k] * alone[tile, 2, offset]
-        image[s // samples, 0, s % samples] += red
-        image[s // samples, 1, s % samples] += green
-        image[s // samples, 2, s % samples] += blue
+            for channel in range(4):  # of one line of the cache
+                total[channel] += weight[k] * alone[among[k], channel]
+        tile, offset = s // samples, s % samples
+        for channel in range(3):
+            image[tile, channel, offset] += total[channel]

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import eye_array
 
 from relume.basis.haar import haar, levels
 from relume.brdf.term import Term
@@ -22,7 +23,7 @@ from relume.parallel import for_shares, for_steps
 from relume.transfer.contraction import contract
 from relume.transfer.ray_projector import RayProjector
 from relume.transfer.receivers import GatherRays, Receivers
-from relume.transfer.row_kernel import BLOCK_SAMPLES, add_rows, add_shared, keep, number_cells, sum_by_cell, transform
+from relume.transfer.row_kernel import BLOCK_SAMPLES, add_shared, apply_rows, keep, number_cells, sum_by_cell, transform
 
 F32 = NDArray[np.float32]
 
@@ -40,7 +41,7 @@ class Rows:
         scale: what a step of their weights is worth. (blocks, K) float32
         weights: (blocks, K, channels, `BLOCK_SAMPLES`) int16; one channel where all are alike, else three
         num_samples: of the image, the last block's padding left out.
-        sharing: weights of the samples for each other, as in `GatherRays`; None: each alone.
+        sharing: weights of the samples for each other, as in `GatherRays`. (n, n) sparse
     """
 
     kept: NDArray[np.int32]
@@ -61,12 +62,9 @@ class Rows:
             light: its Haar coefficients. (padded cells, 3) float32. image: (tiles, 3, samples) float32
         Cost: reads all weights once; bound by the memory's bandwidth.
         """
-        args = (self.kept, self.scale, self.weights, light, self.num_samples)
-        if self.sharing is None:
-            for_shares(lambda start, stop: add_rows(*args, start, stop, image), len(self.kept))
-            return
-        alone = np.zeros_like(image)
-        for_shares(lambda start, stop: add_rows(*args, start, stop, alone), len(self.kept))
+        args = (self.kept, self.scale, self.weights, light)
+        alone = np.empty((len(self.kept) * BLOCK_SAMPLES, 4), np.float32)
+        for_shares(lambda start, stop: apply_rows(*args, start, stop, alone), len(self.kept))
         shares = (self.sharing.indptr, self.sharing.indices, self.sharing.data)
         for_shares(lambda start, stop: add_shared(*shares, alone, start, stop, image), self.num_samples)
 
@@ -125,7 +123,7 @@ def freeze_rows(
         np.empty((blocks, NUM_KEPT), np.float32),
         np.empty((blocks, NUM_KEPT, num_channels(term, bands), BLOCK_SAMPLES), np.int16),
         num_samples,
-        rays.sharing,
+        eye_array(num_samples, dtype=np.float32, format="csr") if rays.sharing is None else rays.sharing,
     )
 
     def step(first: int, last: int) -> None:

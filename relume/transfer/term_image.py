@@ -7,7 +7,7 @@ parameter, whose few coefficients say curves only nearly, a step sums all of the
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,6 @@ from relume.errors import EditError
 from relume.look.model import Rgb
 from relume.transfer.along import Along
 from relume.transfer.frozen import Frozen, tiles_of
-from relume.transfer.rows import Rows
 from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
 
@@ -134,16 +133,12 @@ class TermImage:
         """Whether it shows its look but for what rows leave out."""
         return self.can_follow() and self.followed == self._light
 
-    def follow(self, rows: Rows | None, change: F32, direct: F32 | None) -> None:
-        """Show the base and what has changed since: what rows make of the change of reflected light (see `Rows.add`),
-        and `direct`, shaped like the image."""
+    def follow(self, add_change: Callable[[F32], None]) -> None:
+        """Show the base and what has changed since, which `add_change` adds to an image in place."""
         if self.base is None:
             raise EditError("the term has no image to go on from; shade it first")
         self.image[:] = self.base.image
-        if direct is not None:
-            self.image += direct
-        if rows is not None:
-            rows.add(change, self.image)
+        add_change(self.image)
         self.followed = self._light
         self.is_glimpse, self.is_composed = True, False
 

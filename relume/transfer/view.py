@@ -70,7 +70,13 @@ class View:
 
     def points(self, material: int) -> Points:
         """A material's samples as points that see local lights; reads the store."""
-        rows = self.rows(material)
+        return self._points(self.rows(material))
+
+    def all_points(self) -> Points:
+        """The same of all samples on surfaces, material after material."""
+        return self._points(slice(0, self.num_surface_samples))
+
+    def _points(self, rows: slice) -> Points:
         position, normal = (
             self.store.read(f"views/{self.index}/{name}", rows.start, rows.stop) for name in ("position", "normal")
         )
