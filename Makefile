@@ -22,6 +22,9 @@ LOCK_TOOLS := build/lock-tools
 CHROMIUM := $(firstword $(foreach name,chromium chromium-browser google-chrome,$(shell command -v $(name) 2>/dev/null)))
 MARKERS := not slow$(if $(CHROMIUM),, and not e2e)
 
+# Tests are shared out to processes; those of a group (tests/conftest.py) go to the same one.
+SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadgroup --no-loadscope-reorder
+
 .PHONY: help setup demo test test-slow bench lint lock clean client-check
 
 help:  ## what each target does
@@ -32,9 +35,10 @@ setup: $(PROJECT_STAMP) $(CLIENT_BUILD) $(KERNEL_STAMP)  ## virtual environment,
 demo: setup  ## bake the built-in scene, serve it, open the editor
 	$(BIN)/relume demo $(ARGS)
 
-test: setup lint client-check  ## everything that must hold before a commit
+test:  ## everything that must hold before a commit
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line setup lint client-check
 	$(if $(CHROMIUM),,@echo "No chromium on this machine: the browser tests (marker e2e) are left out.")
-	$(BIN)/python -m pytest -m "$(MARKERS)"
+	$(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
 
 test-slow: setup  ## the long tests
 	$(BIN)/python -m pytest -m slow
@@ -79,7 +83,7 @@ $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
 	@touch $@
 
 $(KERNEL_STAMP): $(PROJECT_STAMP) $(KERNEL_SOURCES)
-	@echo "Compiling kernels (once, about 30 s) …"
+	@echo "Compiling kernels (once, a minute or two) …"
 	@$(BIN)/python -m relume.warm
 	@touch $@
 

@@ -1,4 +1,4 @@
-"""What all tests share: where real files lie, and helper modules beside this file."""
+"""What all tests share: where real files lie, helper modules beside this file, and which tests stay in one process."""
 
 from __future__ import annotations
 
@@ -6,6 +6,19 @@ import os
 from pathlib import Path
 
 import pytest
+
+TOGETHER = ("e2e",)  # folders whose tests share what is dear to start: a server, its bake, a browser
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one.
+
+    Such folders begin, as they take longest.
+    """
+    for item in items:
+        folder = item.path.parent.name
+        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.path.stem))
+    items.sort(key=lambda item: item.path.parent.name not in TOGETHER)
 
 
 @pytest.fixture(scope="session")
