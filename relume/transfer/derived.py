@@ -1,4 +1,4 @@
-"""Images of a scene's own look, kept beside the rays they were made from, so that a bake opens quickly the second time.
+"""Images of terms, kept beside the rays they were made from, so that a bake opens quickly the second time.
 
 They can be lost without loss: whatever cannot be read, or does not fit, is made again.
 """
@@ -15,14 +15,16 @@ import numpy as np
 
 from relume.transfer.shade import Shaded
 
-_FOLDER = "derived"
-
 
 class DerivedImages:
-    """Files in a store's own folder; they go with it."""
+    """Files in a folder of a store's own; they go with it.
 
-    def __init__(self, store: Path) -> None:
-        self._folder = store / _FOLDER
+    Args:
+        max_bytes: those that were used longest ago go where they would be larger together; None for no bound.
+    """
+
+    def __init__(self, folder: Path, max_bytes: int | None = None) -> None:
+        self._folder, self._max_bytes = folder, max_bytes
 
     def get(self, key: Hashable, shape: tuple[int, ...], make: Callable[[], Shaded]) -> Shaded:
         """The image of a key, from its file where there is a sound one, else from `make`."""
@@ -30,6 +32,7 @@ class DerivedImages:
         with suppress(OSError, ValueError, EOFError):
             found = np.load(path, mmap_mode="r", allow_pickle=False)
             if found.shape == shape and found.dtype == np.float32:
+                path.touch()
                 return Shaded(np.array(found))
         shaded = make()
         with suppress(OSError):  # a full or read-only disk costs time at the next opening, nothing else
@@ -45,3 +48,15 @@ class DerivedImages:
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
+        if self._max_bytes is not None:
+            self._forget(self._max_bytes)
+
+    def _forget(self, max_bytes: int) -> None:
+        """Remove what was used longest ago until the rest is small enough."""
+        used = [(path.stat(), path) for path in self._folder.glob("*.npy")]
+        num_bytes = sum(stat.st_size for stat, _ in used)
+        for stat, path in sorted(used, key=lambda entry: entry[0].st_mtime_ns):
+            if num_bytes <= max_bytes:
+                break
+            path.unlink(missing_ok=True)
+            num_bytes -= stat.st_size

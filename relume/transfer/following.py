@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relume.basis.haar import haar
 from relume.brdf.term import Term
-from relume.transfer.light import Light, is_same_but_for_gains, is_same_environment
+from relume.transfer.light import Light, is_moved_by_hand, is_same_but_for_gains, is_same_environment
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.moved import MovedLights
 from relume.transfer.rows import Rows, expected_light, freeze_rows, num_channels, rows_bytes
@@ -82,7 +82,8 @@ class Follower:
     def follow_look(self, before: Light) -> None:
         """The look has changed, and with it perhaps the light, which was this before."""
         self._is_wanted, after = False, self._images.light
-        if before != after and is_same_environment(before, after) and not is_same_but_for_gains(before, after):
+        is_followed = is_same_environment(before, after) and is_moved_by_hand(before, after)
+        if before != after and is_followed and not is_same_but_for_gains(before, after):
             self.prepare()
 
     def follows_all(self) -> bool:

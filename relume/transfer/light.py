@@ -75,6 +75,15 @@ def emission_of(light: Light, material: str) -> Rgb:
     return red, green, blue
 
 
+def is_moved_by_hand(before: Light, after: Light) -> bool:
+    """Whether one thing alone differs, a light or what one material reflects, as where a hand is on it: many things at
+    once are another look."""
+    num_lights = len(set(before.local) ^ set(after.local))  # one that has moved counts twice
+    pairs = zip(before.reflectances, after.reflectances, strict=False)
+    num_materials = sum(one != other for one, other in pairs)
+    return num_lights <= 2 and num_materials <= 1 and not (num_lights and num_materials)
+
+
 def is_same_environment(before: Light, after: Light) -> bool:
     """Whether the environment's own light is as before: only local lights differ, and light between surfaces."""
     alike = before._replace(reflectances=after.reflectances, paths=after.paths, local=after.local) == after

@@ -46,7 +46,7 @@ class Need:
         what: in words. key: its name in the cache; equal keys are the same need.
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
         light: what arrives at it.
-        is_default: the term is one of the scene's own look, whose images are kept beside the store.
+        is_default: the term is one of the scene's own look, whose images stay beside the store.
         refines: the picture is near its look without it, or shows a glimpse; it can wait until the hand rests.
     """
 
@@ -92,9 +92,8 @@ class Need:
             return shade(self.term, self.bands, lights, receivers(), progress, cancelled)
 
         def shaded_once() -> Shaded:
-            if not self.is_default:
-                return shaded()
-            return images.transfer.derived.get(self.key[1:], self.image.image.shape, shaded)
+            kept = images.transfer.derived if self.is_default else images.transfer.edited
+            return kept.get(self.key[1:], self.image.image.shape, shaded)
 
         if active is None:
             return images.cache.get(self.key, Shaded, self.num_bytes, shaded_once)

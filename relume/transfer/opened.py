@@ -29,6 +29,7 @@ from relume.transfer.view import View, open_view
 
 _LIGHTS_KEPT = 4
 _ROUGH_WIDTH = 512
+_EDITED_BYTES = 256 << 20
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,12 @@ class Transfer:
     @cached_property
     def derived(self) -> DerivedImages:
         """Images of the default look, made once."""
-        return DerivedImages(Path(self.key))
+        return DerivedImages(Path(self.key) / "derived")
+
+    @cached_property
+    def edited(self) -> DerivedImages:
+        """Those of other looks, the newest of them, for when the same look is opened after a restart."""
+        return DerivedImages(Path(self.key) / "edited", _EDITED_BYTES)
 
     @cached_property
     def local(self) -> LocalLights:
