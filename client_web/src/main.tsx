@@ -2,6 +2,7 @@ import { render } from "preact";
 import { Editor } from "./ui/Editor";
 import { StartPage } from "./start/StartPage";
 import { openScene } from "./state/open";
+import { followPanels } from "./state/panels";
 import { followPlace } from "./state/place";
 import { history, page } from "./state/store";
 import { placeFromUrl } from "./state/url";
@@ -33,6 +34,7 @@ function start(): void {
   const place = placeFromUrl(location.search);
   if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
+  followPanels();
   // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());

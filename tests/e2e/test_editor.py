@@ -166,6 +166,8 @@ def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: E
     first = editor.slider(SIGMA).get_attribute("aria-valuenow")
     editor.slider(SIGMA).press("End")
     editor.page.keyboard.press("+")
+    section = editor.page.get_by_role("button", name="Environment", exact=True)
+    section.click()
     url, pixels = editor.page.url, editor.pixels()
     value = editor.slider(SIGMA).get_attribute("aria-valuenow")
     editor.page.reload()
@@ -173,6 +175,7 @@ def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: E
     assert editor.page.url == url
     expect(editor.page.locator("[role=option][aria-selected=true]")).to_have_text("Ball")
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
+    expect(section).to_have_attribute("aria-expanded", "false")
     expect(editor.page.locator(".tile.step img")).to_have_count(2)
     editor.page.keyboard.press("Control+z")
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == first

@@ -2,7 +2,7 @@
 import { IconButton } from "../ui/Button";
 import type { IconName } from "../ui/Icon";
 import { Switch } from "../ui/Switch";
-import { inspectorWidth } from "../state/store";
+import { inspectorWidth } from "../state/panels";
 import { CHANNELS, type Active } from "./channels";
 import { pointsOf, put } from "./model";
 import { active, isStretched, lights, logarithmic, stretched, tableOpen, tool, type Tool } from "./settings";

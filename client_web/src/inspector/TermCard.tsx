@@ -11,7 +11,7 @@ import { selectTerm } from "../state/select";
 import { toHex } from "./color";
 import { ColorField } from "./ColorField";
 import { ParamRow } from "./ParamRow";
-import { modelsFor, withModel } from "./terms";
+import { modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 
 interface Props {
   material: string;
@@ -54,6 +54,31 @@ function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: n
       </div>
       {editor}
     </>
+  );
+}
+
+interface TextureProps {
+  /** The images that the material has. */
+  channels: readonly string[];
+  value: string | null;
+  onChange(value: string | null): void;
+}
+
+/** Which image of the material multiplies the colour. */
+function Texture({ channels, value, onChange }: TextureProps) {
+  if (channels.length === 0) return null;
+  return (
+    <label class="param texture">
+      <span class="param-label">Texture</span>
+      <select value={value ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
+        <option value="">None</option>
+        {channels.map((name) => (
+          <option key={name} value={name}>
+            {TEXTURES[name]}
+          </option>
+        ))}
+      </select>
+    </label>
   );
 }
 
@@ -101,6 +126,11 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             value={term.color}
             initial={same?.color ?? null}
             onChange={(value: Rgb) => edit("Colour", `${path}/color`, value)}
+          />
+          <Texture
+            channels={texturesOf(material)}
+            value={term.texture ?? null}
+            onChange={(value) => edit("Texture", `${path}/texture`, value)}
           />
           {model?.parameters.map((info) => (
             <ParamRow

@@ -1,5 +1,15 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
 import type { ModelInfo, Term } from "../protocol";
+import { scene } from "../state/store";
+
+/** The images that a material may have, in words. */
+export const TEXTURES: Record<string, string> = { diffuse: "Base colour", specular: "Highlight" };
+
+/** Those that a material of the scene has: its own terms take them. */
+export function texturesOf(material: string): string[] {
+  const own = scene.value?.materials.find(({ name }) => name === material)?.terms ?? [];
+  return Object.keys(TEXTURES).filter((channel) => own.some((term) => term.texture === channel));
+}
 
 export function defaultTerm(model: ModelInfo): Term {
   return {

@@ -3,14 +3,18 @@ import { fromHex, toHex } from "../inspector/color";
 import type { Light } from "../protocol";
 import { selectLight } from "../state/select";
 import { hold } from "../state/live";
+import { folded, toggleFolded } from "../state/panels";
 import { toggleLightSolo } from "../state/solo";
 import { defaultLook, handlesOpen, selectedLight, soloLight } from "../state/store";
 import { IconButton } from "../ui/Button";
+import { Section } from "../ui/Section";
 import { Slider } from "../ui/Slider";
 import { Switch } from "../ui/Switch";
 import { KINDS, labelOf } from "./kinds";
 import { editLight, lightPath, lights } from "./lights";
 import { adding, placing, startPlacing, stopAdding } from "./place";
+
+const TITLE = "Lights";
 
 function Row({ name, light }: { name: string; light: Light }) {
   const selected = name === selectedLight.value;
@@ -70,22 +74,31 @@ function Kinds() {
   );
 }
 
+function Actions() {
+  const toggle = () => {
+    if (adding.value) return stopAdding();
+    adding.value = true;
+    if (folded.value.includes(TITLE)) toggleFolded(TITLE);
+  };
+  const movable = Object.values(lights.value).some(({ kind }) => kind !== "mesh");
+  return (
+    <>
+      {movable && <Switch icon="handles" label="Handles in the picture" keys="G" of={handlesOpen} />}
+      <IconButton icon="plus" label="Add a light" pressed={adding.value} onClick={toggle} />
+    </>
+  );
+}
+
 export function LightsPanel() {
   const all = Object.entries(lights.value);
   return (
-    <>
-      <header class="panel-head">
-        <h2>Lights</h2>
-        <span class="spacer count">{all.length > 0 && all.length}</span>
-        {all.length > 0 && <Switch icon="handles" label="Handles in the picture" keys="G" of={handlesOpen} />}
-        <IconButton icon="plus" label="Add a light" pressed={adding.value} onClick={() => (adding.value ? stopAdding() : (adding.value = true))} />
-      </header>
+    <Section title={TITLE} count={all.length} actions={<Actions />}>
       {adding.value && <Kinds />}
       <ul class="lights">
         {all.map(([name, light]) => (
           <Row key={name} name={name} light={light} />
         ))}
       </ul>
-    </>
+    </Section>
   );
 }

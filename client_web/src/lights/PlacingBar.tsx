@@ -16,7 +16,7 @@ export function PlacingBar() {
         In the middle
       </button>
       <button title="Add no light (Esc)" onClick={stopAdding}>
-        Stop
+        Cancel
       </button>
     </div>
   );

@@ -7,44 +7,50 @@ import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
 import { defaultLook, look, soloLight } from "../state/store";
 import { IconButton } from "../ui/Button";
 import { LabelledSlider } from "../ui/LabelledSlider";
+import { Section } from "../ui/Section";
 import { imported, offerToDelete } from "./environments";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 
-export function EnvironmentPanel() {
-  const shown = look.value?.environment;
+function Actions({ scale }: { scale: number }) {
   /** How bright it was when it was switched off. */
   const before = useRef(1);
-  const initial = defaultLook.value?.environment;
-  if (shown === undefined || initial === undefined) return null;
+  const isOn = scale > 0;
   const toggle = () => {
-    if (shown.scale > 0) before.current = shown.scale;
-    edit(shown.scale > 0 ? "Environment off" : "Environment on", "/environment/scale", shown.scale > 0 ? 0 : before.current);
+    if (isOn) before.current = scale;
+    edit(isOn ? "Environment off" : "Environment on", "/environment/scale", isOn ? 0 : before.current);
   };
   return (
     <>
-      <header class="panel-head">
-        <h2 class="spacer">Environment</h2>
+      <IconButton
+        icon="lamp"
+        label={`Environment: ${isOn ? "switch off" : "switch on"}`}
+        pressed={isOn}
+        onClick={toggle}
+      />
+      <IconButton
+        icon="solo"
+        label="Environment alone"
+        pressed={soloLight.value === ENVIRONMENT}
+        onClick={() => toggleLightSolo(ENVIRONMENT)}
+      />
+      {imported.value !== null && (
         <IconButton
-          icon="lamp"
-          label={`Environment: ${shown.scale > 0 ? "switch off" : "switch on"}`}
-          pressed={shown.scale > 0}
-          onClick={toggle}
+          icon="trash"
+          label={`Delete the environment ${imported.value.name}`}
+          onClick={() => imported.value && offerToDelete(imported.value)}
         />
-        <IconButton
-          icon="solo"
-          label="Environment alone"
-          pressed={soloLight.value === ENVIRONMENT}
-          onClick={() => toggleLightSolo(ENVIRONMENT)}
-        />
-        {imported.value !== null && (
-          <IconButton
-            icon="trash"
-            label={`Delete the environment ${imported.value.name}`}
-            onClick={() => imported.value && offerToDelete(imported.value)}
-          />
-        )}
-        <ImportEnvironment />
-      </header>
+      )}
+      <ImportEnvironment />
+    </>
+  );
+}
+
+export function EnvironmentPanel() {
+  const shown = look.value?.environment;
+  const initial = defaultLook.value?.environment;
+  if (shown === undefined || initial === undefined) return null;
+  return (
+    <Section title="Environment" actions={<Actions scale={shown.scale} />}>
       <EnvironmentGallery />
       <LabelledSlider
         shown="Brightness"
@@ -78,6 +84,6 @@ export function EnvironmentPanel() {
           onChange={(value) => edit("Environment tint", "/environment/color", value)}
         />
       </div>
-    </>
+    </Section>
   );
 }

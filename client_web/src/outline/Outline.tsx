@@ -6,6 +6,7 @@ import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMat
 import { toggleMaterialSolo } from "../state/solo";
 import { LightsPanel } from "../lights/LightsPanel";
 import { IconButton } from "../ui/Button";
+import { Section } from "../ui/Section";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
 
@@ -74,23 +75,26 @@ function Materials() {
   );
 }
 
-export function Outline() {
+function SoloButton() {
   const selected = selectedMaterial.value;
   return (
+    <IconButton
+      icon="solo"
+      label={selected === null ? "Select a material to show it alone" : `Show ${selected} alone`}
+      keys="S"
+      pressed={solo.value !== null}
+      disabled={selected === null && solo.value === null}
+      onClick={toggleMaterialSolo}
+    />
+  );
+}
+
+export function Outline() {
+  return (
     <nav class="panel outline" aria-label="Scene">
-      <header class="panel-head">
-        <h2>Materials</h2>
-        <span class="spacer count">{materialNames.value.length}</span>
-        <IconButton
-          icon="solo"
-          label={selected === null ? "Select a material to show it alone" : `Show ${selected} alone`}
-          keys="S"
-          pressed={solo.value !== null}
-          disabled={selected === null && solo.value === null}
-          onClick={toggleMaterialSolo}
-        />
-      </header>
-      <Materials />
+      <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
+        <Materials />
+      </Section>
       <LightsPanel />
       <EnvironmentPanel />
       <TransportPanel />

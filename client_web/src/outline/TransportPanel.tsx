@@ -1,8 +1,9 @@
 /** Which light paths are shown, of a bake that has light between surfaces. */
 import { edit } from "../state/edit";
 import { defaultLook, look, method } from "../state/store";
-import { onRadioKey } from "../ui/radio";
 import { LabelledSlider } from "../ui/LabelledSlider";
+import { onRadioKey } from "../ui/radio";
+import { Section } from "../ui/Section";
 import { MAX_BOUNCES, PATHS, type Show } from "./paths";
 
 function choose(show: Show): void {
@@ -14,10 +15,7 @@ export function TransportPanel() {
   if (transport === undefined || method.value !== "gather") return null;
   const chosen = PATHS.findIndex(({ show }) => show === transport.show);
   return (
-    <>
-      <header class="panel-head">
-        <h2>Light paths</h2>
-      </header>
+    <Section title="Light paths">
       <div
         class="group segmented"
         role="radiogroup"
@@ -48,6 +46,6 @@ export function TransportPanel() {
         scale="linear"
         onChange={(bounces) => edit("Bounces", "/transport/bounces", bounces)}
       />
-    </>
+    </Section>
   );
 }

@@ -1,6 +1,7 @@
 /** The shown picture's histogram, made when the hand rests. */
 import { useLayoutEffect, useMemo, useRef } from "preact/hooks";
-import { bake, exposure, histogramOpen, settled, viewName } from "../state/store";
+import { histogramOpen } from "../state/panels";
+import { bake, exposure, settled, viewName } from "../state/store";
 import { histogramOf, MAX_STOP, MIN_STOP, NUM_BINS, percentile, type Histogram } from "./histogram";
 import { stage } from "./stage";
 

@@ -1,5 +1,6 @@
 /** Under the picture: the probed pixel on the left, zoom on the right. */
-import { drawn, exposure, falseColour, histogramOpen, probe, toneMap } from "../state/store";
+import { histogramOpen } from "../state/panels";
+import { drawn, exposure, falseColour, probe, toneMap } from "../state/store";
 import { formatNumber } from "../ui/scale";
 import { stage } from "./stage";
 import { toDisplay } from "./tonemap";
@@ -58,7 +59,7 @@ export function PictureBar() {
         −
       </button>
       <span class="zoom" aria-live="off">
-        {Math.round(100 * zoomFactor())} %
+        {stage.active.isThere ? `${Math.round(100 * zoomFactor())} %` : "–"}
       </span>
       <button class="icon" aria-label="Zoom in" title="Zoom in (+)" onClick={() => zoomBy(1.25)}>
         +

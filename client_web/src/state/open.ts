@@ -58,6 +58,8 @@ function restorePlace(scene: SceneBody, place: Place): void {
   if (kept !== null) {
     store.look.value = kept.look;
     recallHistory(scene.id, kept.look);
+    store.solo.value = kept.solo ?? null;
+    store.soloLight.value = kept.soloLight ?? null;
     store.alonePlaces.value = new Map(kept.alone);
     store.besidePlaces.value = new Map(kept.beside);
   }

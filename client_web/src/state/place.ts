@@ -13,6 +13,9 @@ interface Kept {
   /** Where each view's picture lies, alone and beside others. */
   alone: [view: string, transform: Transform][];
   beside: [view: string, transform: Transform][];
+  /** The material and the source of light that are shown alone. */
+  solo?: string | null;
+  soloLight?: string | null;
 }
 
 const keptKey = (scene: string) => `relume.scene.${scene}`;
@@ -52,7 +55,13 @@ function keep(key: string, text: string): void {
 export function remember(): void {
   const [scene, look] = [store.scene.value, store.look.value];
   if (store.page.value !== "editor" || scene === null || look === null) return;
-  const kept: Kept = { look, alone: [...store.alonePlaces.value], beside: [...store.besidePlaces.value] };
+  const kept: Kept = {
+    look,
+    alone: [...store.alonePlaces.value],
+    beside: [...store.besidePlaces.value],
+    solo: store.solo.value,
+    soloLight: store.soloLight.value,
+  };
   const story = { steps: store.history.steps.value, cursor: store.history.cursor.value };
   try {
     keep(keptKey(scene.id), JSON.stringify(kept));

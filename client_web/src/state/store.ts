@@ -67,7 +67,6 @@ export const brushed = signal<[from: number, to: number] | null>(null);
 export const alonePlaces = signal<ReadonlyMap<string, Transform>>(new Map());
 export const besidePlaces = signal<ReadonlyMap<string, Transform>>(new Map());
 export const falseColour = signal(false);
-export const histogramOpen = signal(false);
 /** The material that is shown alone, the others in dim grey; display only, no edit. */
 export const solo = signal<string | null>(null);
 /** The source of light that is seen alone, see `solo.ts`; no edit either. */
@@ -92,10 +91,6 @@ export const held = signal(false);
 /** Counts up with every frame that is drawn. */
 export const drawn = signal(0);
 
-export const outlineOpen = signal(true);
-export const inspectorOpen = signal(true);
-export const filmstripOpen = signal(true);
-export const inspectorWidth = signal(320);
 export const helpOpen = signal(false);
 
 export function modelOf(term: Term): ModelInfo | undefined {

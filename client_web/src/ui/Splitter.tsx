@@ -1,5 +1,5 @@
 /** The border between picture and inspector: drag it, or move it by keys. */
-import { inspectorWidth } from "../state/store";
+import { inspectorWidth } from "../state/panels";
 
 const NARROWEST = 288;
 const WIDEST = 720;

@@ -5,20 +5,8 @@ import { lightLimitWords } from "../picture/limits";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
 import { leave } from "../state/open";
-import {
-  filmstripOpen,
-  helpOpen,
-  history,
-  inspectorOpen,
-  look,
-  outlineOpen,
-  scene,
-  showBefore,
-  sideBySide,
-  viewName,
-  views,
-  wipe,
-} from "../state/store";
+import { filmstripOpen, inspectorOpen, outlineOpen } from "../state/panels";
+import { helpOpen, history, look, scene, showBefore, sideBySide, viewName, views, wipe } from "../state/store";
 import { redo, undo } from "../state/undo";
 import { showAlone, toggleSideBySide } from "../state/views";
 import { IconButton } from "./Button";
@@ -95,7 +83,7 @@ function Compare() {
 function Display() {
   const display = look.value?.display ?? { exposure: 0, tone_map: "agx" };
   return (
-    <div class="display-controls">
+    <div class="display-controls" title="Exposure and tone map">
       <span class="label">Exposure</span>
       <Slider
         label="Exposure"

@@ -7,18 +7,8 @@ import { edit } from "../state/edit";
 import { toggleSolo } from "../state/solo";
 import { redo, undo } from "../state/undo";
 import { toggleSideBySide } from "../state/views";
-import {
-  falseColour,
-  filmstripOpen,
-  handlesOpen,
-  helpOpen,
-  histogramOpen,
-  inspectorOpen,
-  look,
-  outlineOpen,
-  showBefore,
-  wipe,
-} from "../state/store";
+import { filmstripOpen, histogramOpen, inspectorOpen, outlineOpen } from "../state/panels";
+import { falseColour, handlesOpen, helpOpen, look, showBefore, wipe } from "../state/store";
 
 export interface Action {
   group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";

@@ -1,0 +1,30 @@
+/** A part of a panel below its heading, which folds it away. */
+import type { ComponentChildren } from "preact";
+import { folded, toggleFolded } from "../state/panels";
+
+interface Props {
+  title: string;
+  /** How many there are. */
+  count?: number;
+  /** Buttons beside the heading; they stay when it is folded. */
+  actions?: ComponentChildren;
+  children: ComponentChildren;
+}
+
+export function Section({ title, count, actions, children }: Props) {
+  const open = !folded.value.includes(title);
+  return (
+    <section aria-label={title}>
+      <header class="panel-head">
+        <h2 class="spacer">
+          <button class="fold" aria-expanded={open} onClick={() => toggleFolded(title)}>
+            <span aria-hidden="true">{open ? "▾" : "▸"}</span> {title}
+            {count !== undefined && count > 0 && <span class="count">{count}</span>}
+          </button>
+        </h2>
+        {actions}
+      </header>
+      {open && children}
+    </section>
+  );
+}
