@@ -48,7 +48,7 @@ def _add_even(arriving, factor, start, stop, image):  # type: ignore[no-untyped-
                 image[tile, channel, s - first] += factor[channel] * arriving[s]
 
 
-def add_even(arriving: F32, factor: F32, image: F32) -> None:
+def add_even(arriving: F32, factor: NDArray[np.floating], image: F32) -> None:
     """Add light that a term scatters alike wherever it comes from and goes to.
 
     Args:

@@ -40,13 +40,21 @@ class Light(NamedTuple):
         return any(self.environment_gain)
 
 
+def of_source(light: Light, geometry: LightGeometry | None) -> Light:
+    """The light of one source alone, its gain 1: a local light, or the environment where that is None."""
+    one = (1.0, 1.0, 1.0)
+    if geometry is None:
+        return light._replace(local=(), environment_gain=one)
+    return light._replace(local=(Source(geometry, one),), environment_gain=(0.0, 0.0, 0.0))
+
+
 def gains_of(light: Light) -> dict[Light, Rgb]:
     """The gain of each source of a light by the light of that source alone, its gain 1."""
     alone: dict[Light, Rgb] = {}
     if light.is_environment_lit:
-        alone[light._replace(local=(), environment_gain=(1.0, 1.0, 1.0))] = light.environment_gain
+        alone[of_source(light, None)] = light.environment_gain
     for geometry, (red, green, blue) in light.local:
-        source = light._replace(local=(Source(geometry, (1.0, 1.0, 1.0)),), environment_gain=(0.0, 0.0, 0.0))
+        source = of_source(light, geometry)
         r, g, b = alone.get(source, (0.0, 0.0, 0.0))  # two lights in one place are one source
         alone[source] = (r + red, g + green, b + blue)
     return alone

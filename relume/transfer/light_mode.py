@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from relume.look import Look
 from relume.transfer.following import Follower, RowsNeed
 from relume.transfer.glimpse import Glimpse, can_glimpse, is_prepared
 from relume.transfer.light import Light
@@ -24,8 +25,10 @@ class LightMode:
         self._images, self._follower, self._mixer = images, Follower(images), Mixer(images)
         self._is_turning = self._lacks_glimpse = False
 
-    def hold(self, pointer: Pointer) -> None:
-        """A hand takes hold of something that may change the light."""
+    def hold(self, pointer: Pointer, look: Look) -> None:
+        """A hand takes hold of something that may change the light. look: as it is now."""
+        held = look.lights.get(pointer.name) if isinstance(pointer, LightPointer) else None
+        self._mixer.hold(None if held is None else held.geometry)
         self._is_turning = pointer == ROTATION
         if isinstance(pointer, ColorPointer | LightPointer | TransportPointer):
             self._follower.prepare()
@@ -51,6 +54,10 @@ class LightMode:
         if self._lacks_glimpse or (self._is_turning and can_glimpse(images) and not is_prepared(images)):
             return Glimpse.of(images)
         return self._mixer.next_need()
+
+    def held_need(self) -> Need | None:
+        """What can be made ahead for what a hand is on, when nothing else is lacking."""
+        return self._mixer.held_need()
 
     def adopt(self, need: RowsNeed | Glimpse, made: Any) -> None:
         """Show what a need has made."""

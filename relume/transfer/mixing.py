@@ -9,15 +9,16 @@ frame costs the sum of two images. Whichever formula lacks fewer images is taken
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from relume.look import LightGeometry
 from relume.look.model import Rgb
-from relume.transfer.light import Light, gains_of, is_same_but_for_gains
+from relume.transfer.light import Light, gains_of, is_same_but_for_gains, of_source
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.need import Need, need_of_image
-from relume.transfer.shade import Shaded
+from relume.transfer.shade import Shaded, shaded_bytes
 from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
 
@@ -43,6 +44,11 @@ class Mixer:
 
     def __init__(self, images: ViewImages) -> None:
         self._images = images
+        self._held: LightGeometry | None = None
+
+    def hold(self, geometry: LightGeometry | None) -> None:
+        """A hand is on a local light, or on none."""
+        self._held = geometry
 
     def mixes_all(self) -> bool:
         """Whether every term that lacks its light can have it at once."""
@@ -58,6 +64,22 @@ class Mixer:
         material, image, source = min(lacking, key=lambda item: item[0].num_samples)
         return need_of_image(self._images, material, image, source)
 
+    def held_need(self) -> Need | None:
+        """The image of the light that a hand is on, of a material with few samples first; it can wait for all else.
+
+        None where that light is elsewhere by now, or where the cache has no room to spare.
+        """
+        light, cache = self._images.light, self._images.cache
+        sources = {source.geometry for source in light.local}
+        if self._held not in sources:
+            return None
+        source = of_source(light, self._held)
+        lacking = [(m, t) for m, t in self._terms() if self._alone(m, t, source) is None]
+        if not lacking or sum(shaded_bytes(m.num_samples) for m, _ in lacking) > cache.budget_bytes - cache.used_bytes:
+            return None
+        material, image = min(lacking, key=lambda item: item[0].num_samples)
+        return replace(need_of_image(self._images, material, image, source), refines=True)
+
     def step(self) -> None:
         """Mix all terms that can be."""
         for material, image in self._unlit():
@@ -69,9 +91,11 @@ class Mixer:
 
     def _unlit(self) -> Iterator[tuple[MaterialImage, TermImage]]:
         """Terms that show their curves in another light."""
+        return ((material, image) for material, image in self._terms() if image.can_follow())
+
+    def _terms(self) -> Iterator[tuple[MaterialImage, TermImage]]:
         materials = self._images.by_name.values()
-        terms = ((material, image) for material in materials if material.num_samples for image in material.terms)
-        return ((material, image) for material, image in terms if image.can_follow())
+        return ((material, image) for material in materials if material.num_samples for image in material.terms)
 
     def _recipe(self, material: MaterialImage, image: TermImage) -> _Recipe | None:
         """How the term's image is mixed; None where other things than gains have changed."""

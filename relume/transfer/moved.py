@@ -6,13 +6,16 @@ there. Terms that scatter evenly need no more of a light than what arrives; othe
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.look import LightGeometry
 from relume.parallel import for_shares
+from relume.trace.local_shadows import arriving
 from relume.trace.rough_light import RoughLight
 from relume.transfer.compose import add_even
 from relume.transfer.contraction import contract
@@ -26,20 +29,15 @@ from relume.transfer.term_image import TermImage
 from relume.transfer.view_images import ViewImages
 
 F32 = NDArray[np.float32]
+Found = TypeVar("Found", Points, Receivers)
 
 
 @dataclass(frozen=True)
-class _Lit:
-    """Samples of a view or of a material, read once. receivers: of those of a material."""
+class _Read:
+    """Points of a view, or a material's samples as receivers, read once."""
 
-    points: Points
-    receivers: Receivers | None = None
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory it holds."""
-        frames = 0 if self.receivers is None else 3 * self.receivers.normal.nbytes
-        return int(2 * self.points.position.nbytes + self.points.numbers.nbytes + frames)
+    found: Points | Receivers
+    num_bytes: int
 
 
 class MovedLights:
@@ -72,36 +70,39 @@ class MovedLights:
         key = (*images.key_of_image(material, image, light), "straight")
 
         def shaded() -> Shaded:
-            return self._shaded(material, image, images.local_rays(material.index, light))
+            rays, factor = images.local_rays(material.index, light), _even_factor(image)
+            if factor is None:
+                return self._shaded(material, image, rays)
+            found, normal = np.zeros_like(image.image), self._points().normal[images.view.rows(material.index)]
+            for of_light in rays:
+                seen = of_light.position, normal, of_light.numbers, of_light.visible
+                add_even(arriving(of_light.light, of_light.pattern, *seen), factor * of_light.gain, found)
+            return Shaded(found)
 
         return images.cache.get(key, Shaded, shaded_bytes(material.num_samples), shaded).image
 
     def _add_now(self, material: MaterialImage, image: TermImage, come: list[Source], out: F32) -> None:
-        contraction, rows = contract(image.term, image.target, None), self._images.view.rows(material.index)
+        factor, rows = _even_factor(image), self._images.view.rows(material.index)
         lights = [(source, self._roughly(source.geometry)) for source in come]
-        if image.term.is_even and contraction.kinds.size == 0:
-            upright = image.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))
+        if factor is not None:
             for source, light in lights:
-                add_even(light.arriving[rows], contraction.constant * upright * source.gain, out)
+                add_even(light.arriving[rows], factor * source.gain, out)
             return
-        rays = [
-            self._images.transfer.local.rough_rays(source, self._lit(material).points, light.visible[rows])
-            for source, light in lights
-        ]
+        whole, local = self._points(), self._images.transfer.local
+        points = Points(whole.position[rows], whole.normal[rows], whole.numbers[rows])
+        rays = [local.rough_rays(source, points, light.visible[rows]) for source, light in lights]
         out += self._shaded(material, image, rays).image
 
     def _roughly(self, geometry: LightGeometry) -> RoughLight:
         if geometry not in self._now:
             present = {source.geometry for source in self._images.light.local}
             self._now = {known: light for known, light in self._now.items() if known in present}
-            self._now[geometry] = self._images.transfer.local.roughly(geometry, self._all_points())
+            self._now[geometry] = self._images.transfer.local.roughly(geometry, self._points())
         return self._now[geometry]
 
     def _shaded(self, material: MaterialImage, image: TermImage, rays: list[LocalRays]) -> Shaded:
         """What rays bring a term, in the threads of frames."""
-        receivers = self._lit(material).receivers
-        assert receivers is not None
-        points, contraction = replace(receivers, rays=rays), contract(image.term, image.target, None)
+        points, contraction = replace(self._receivers(material), rays=rays), contract(image.term, image.target, None)
         rows = np.zeros((material.num_samples, 3, 1), np.float32)
 
         def add(start: int, stop: int) -> None:
@@ -110,25 +111,37 @@ class MovedLights:
         for_shares(add, len(rows))
         return Shaded.of(rows[:, :, 0])
 
-    def _lit(self, material: MaterialImage) -> _Lit:
+    def _receivers(self, material: MaterialImage) -> Receivers:
         view, index = self._images.view, material.index
-        key, num_bytes = (self._images.transfer.key, view.name, index, "lit"), material.num_samples * 64
 
-        def read() -> _Lit:
-            return _Lit(view.points(index), view.receivers(index, is_lit=False))
+        def read() -> Receivers:
+            return view.receivers(index, is_lit=False)
 
-        return self._images.cache.get(key, _Lit, num_bytes, read)
+        return self._kept(("receivers", index), read, material.num_samples * 36)
 
-    def _all_points(self) -> Points:
+    def _points(self) -> Points:
         """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""
         view = self._images.view
 
-        def read() -> _Lit:
+        def read() -> Points:
             points = view.all_points()
-            return _Lit(replace(points, normal=points.normal * (view.cos_theta_o > 0)[:, None].astype(np.float32)))
+            return replace(points, normal=points.normal * (view.cos_theta_o > 0)[:, None].astype(np.float32))
 
-        key, num_bytes = (self._images.transfer.key, view.name, "lit"), view.num_surface_samples * 28
-        return self._images.cache.get(key, _Lit, num_bytes, read).points
+        return self._kept(("points",), read, view.num_surface_samples * 28)
+
+    def _kept(self, name: tuple[Hashable, ...], read: Callable[[], Found], num_bytes: int) -> Found:
+        key = (self._images.transfer.key, self._images.view.name, *name)
+        found: Any = self._images.cache.get(key, _Read, num_bytes, lambda: _Read(read(), num_bytes)).found
+        return found  # type: ignore[no-any-return]
+
+
+def _even_factor(image: TermImage) -> NDArray[np.float64] | None:
+    """What a term makes of all light that arrives; None where it asks where that comes from. (3,)"""
+    contraction = contract(image.term, image.target, None)
+    if not image.term.is_even or contraction.kinds.size:
+        return None
+    upright = image.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))
+    return np.asarray(contraction.constant * upright, np.float64)
 
 
 def _alone(light: Light, local: tuple[Source, ...]) -> Light:

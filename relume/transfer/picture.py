@@ -90,7 +90,7 @@ class Picture:
             MemoryBudgetError: its operator is larger than the cache may be.
         """
         touched = parse_pointer(pointer)
-        self._light_mode.hold(touched)
+        self._light_mode.hold(touched, self._look)
         if isinstance(touched, CurvePointer | ParameterPointer):
             check_room(self._images, Candidate(*self._images.find(touched), self._images.along(touched)))
             self._touched = touched
@@ -104,7 +104,8 @@ class Picture:
             MemoryBudgetError: something that the look lacks is larger than the cache may be.
         """
         of_light = self._light_mode.next_need()
-        return of_light or next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
+        of_look = of_light or next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
+        return of_look or self._light_mode.held_need()
 
     def adopt(self, need: Need | RowsNeed | Glimpse, made: Any) -> None:
         """Go on with what a need has made, unless the look has moved on to where it is of no use."""

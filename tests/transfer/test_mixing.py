@@ -108,3 +108,27 @@ def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
         settle(lit)
         expected = render_image(transfer, "front", edited(scale, exponent))
         np.testing.assert_allclose(lit.image(), expected, rtol=3e-3, atol=1e-4)
+
+
+def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
+    lit.touch("/lights/Panel")
+    while (need := lit.waiting()) is not None:
+        lit.adopt(need, need.make(lambda share: None, lambda: False))
+        assert lit.advance(None).exact
+    look = look_with(transfer, changed("Panel", scale=0.3))
+    lit.set_look(look)
+    assert lit.advance(None).exact
+    np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=3e-3, atol=1e-4)
+
+
+def test_nothing_is_made_ahead_where_the_cache_would_drop_something_for_it(transfer):
+    picture = Picture(transfer, "front", FrozenCache(BUDGET))
+    picture.set_look(look_with(transfer, ALL))
+    settle(picture).touch("/lights/Panel")
+    assert picture.waiting() is not None
+    full = Picture(transfer, "front", cache := FrozenCache(BUDGET))
+    full.set_look(look_with(transfer, ALL))
+    settle(full)
+    cache.budget_bytes = cache.used_bytes
+    full.touch("/lights/Panel")
+    assert full.waiting() is None
