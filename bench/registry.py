@@ -84,6 +84,10 @@ GROUPS = (
     Group("bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group(
+        "bench.gather_scenes",
+        ("gather.cornell_box_rmse", "gather.tableau_rmse", "gather.still_life_rmse", "gather.interior_rmse"),
+    ),
+    Group(
         "bench.estimators",
         (
             "estimators.final_gather",

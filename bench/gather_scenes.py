@@ -1,0 +1,103 @@
+"""gather.SCENE_rmse: reflected light of the scenes made by code, each a whole picture.
+
+As gather.rmse_diffuse, but with the highlights that the camera sees. We have twice the width and height,
+averaged over 2 × 2 pixels as Mitsuba's box filter averages over one of its own. Mitsuba's side has no textures, and of
+highlights those of peer_mitsuba_plugins.py: in the still life both renderers have the mean colour of the tray's wood,
+and Cook and Torrance's highlights on teapot, handles and bowl. The other scenes are as they are.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.figure import Figure, skipped
+from bench.gather import bake
+from bench.indirect import error_without_noise, reflected, reflected_by_mitsuba
+from bench.mitsuba import bsdf, missing
+from relume.brdf.albedo import is_diffuse
+from relume.scene.built_in import built_in
+from relume.scene.cornell import cornell_box
+from relume.scene.model import Scene
+from relume.transfer.base import Recipe
+from relume.transfer.opened import open_transfer
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Terms = tuple[Mapping[str, Any], ...]
+
+SIZES = {"cornell_box": (400, 400), "tableau": (400, 300), "still_life": (400, 300), "interior": (400, 400)}
+_FINER = 2
+_SPP = {"cornell_box": 160, "tableau": 128, "still_life": 128, "interior": 160}  # of each half
+_UNIT = "relative RMSE"
+
+
+class Pair(NamedTuple):
+    """Reflected light of one scene.
+
+    Attributes:
+        ours: (height, width, 3). halves: two independent ones of Mitsuba's. (2, height, width, 3)
+    """
+
+    ours: F64
+    halves: F32
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake and a render of each."""
+    names = tuple(f"gather.{name}_rmse" for name in SIZES)
+    if (why := missing()) is not None:
+        return skipped(names, _UNIT, why)
+    figures = []
+    for figure, name in zip(names, SIZES, strict=True):
+        pair = rendered(name, tiny)
+        error = error_without_noise(*pair)
+        about = {"size": list(pair.ours.shape[1::-1]), "spp": 2 * _spp(name, tiny)}
+        figures.append(Figure(figure, error["error"], _UNIT, {**error, **about}))
+    return figures
+
+
+def rendered(name: str, tiny: bool = False) -> Pair:
+    """One of `SIZES` by both."""
+    scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)
+    size = (40, 30) if tiny else SIZES[name]
+    terms: dict[str, Terms] = {material.name: material.terms for material in scene.materials}
+    if name == "still_life":
+        terms |= _in_place_of(scene)
+    of_meshes = [terms[scene.materials[mesh.material].name] for mesh in scene.meshes]
+    seen = [bsdf(of_mesh) for of_mesh in of_meshes]
+    beyond = [bsdf([term for term in of_mesh if is_diffuse(term)]) for of_mesh in of_meshes]
+    finer = (_FINER * size[0], _FINER * size[1])
+    recipe = Recipe("gather", (scene.cameras[0].name,), finer, 60 if tiny else 2000)
+    with tempfile.TemporaryDirectory() as folder:
+        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path)
+        fine = reflected(transfer, terms).reshape(size[1], _FINER, size[0], _FINER, 3)
+        return Pair(
+            fine.mean(axis=(1, 3)), reflected_by_mitsuba(scene, size, seen, beyond, _spp(name, tiny), Path(folder))
+        )
+
+
+def _spp(name: str, tiny: bool) -> int:
+    return 2 if tiny else _SPP[name]
+
+
+def _in_place_of(scene: Scene) -> dict[str, Terms]:
+    """Terms of the still life that both have."""
+    of = {material.name: material for material in scene.materials}
+    wood = of["Tray"].textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64).tolist()
+    teapot, bowl = of["Teapot"].terms[0], of["Bowl"].terms[0]
+    return {
+        "Teapot": (teapot, _facets([1.0, 1.0, 1.0], 0.1, 1.7)),
+        "Tray": ({"model": "lambert", "color": wood, "texture": None}, of["Tray"].terms[1]),
+        "Handles": (_facets([0.91, 0.70, 0.34], 0.2, 5.0),),
+        "Bowl": (bowl, _facets([1.0, 1.0, 1.0], 0.12, 1.5)),
+    }
+
+
+def _facets(color: list[float], sigma: float, ior: float) -> dict[str, Any]:
+    return {"model": "cook_torrance", "color": color, "params": {"sigma": sigma, "ior": ior}}
