@@ -65,6 +65,7 @@ def test_a_light_is_placed_by_keys_alone(editor: Editor) -> None:
     middle.press("Enter")
     expect(page.get_by_role("combobox", name="Kind of light")).to_have_value("spot")
     expect(middle).to_have_count(0)
+    expect(page.locator(".light .name", has_text="Spot")).to_be_focused()
 
 
 def test_escape_places_nothing(editor: Editor) -> None:

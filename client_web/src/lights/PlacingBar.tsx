@@ -3,6 +3,21 @@ import { useEffect, useRef } from "preact/hooks";
 import { KINDS } from "./kinds";
 import { placeInTheMiddle, placing, stopAdding } from "./place";
 
+/** The bar goes, and with it the focus: the keys go on here. */
+function focusOn(selector: string): void {
+  requestAnimationFrame(() => document.querySelector<HTMLElement>(selector)?.focus());
+}
+
+async function putInTheMiddle(): Promise<void> {
+  await placeInTheMiddle();
+  if (placing.peek() === null) focusOn(".light.selected .name");
+}
+
+function cancel(): void {
+  stopAdding();
+  focusOn("[aria-label='Add a light']");
+}
+
 export function PlacingBar() {
   const middle = useRef<HTMLButtonElement>(null);
   const kind = placing.value;
@@ -12,10 +27,10 @@ export function PlacingBar() {
   return (
     <div class="placing" role="group" aria-label={`Place a light: ${words.label}`}>
       <span role="status">Click where to {words.click}</span>
-      <button ref={middle} onClick={placeInTheMiddle}>
+      <button ref={middle} onClick={() => void putInTheMiddle()}>
         In the middle
       </button>
-      <button title="Add no light (Esc)" onClick={stopAdding}>
+      <button title="Add no light (Esc)" onClick={cancel}>
         Cancel
       </button>
     </div>

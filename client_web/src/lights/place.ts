@@ -57,9 +57,9 @@ export async function placeAt(view: string, x: number, y: number): Promise<void>
 }
 
 /** Put the light where the middle of the active view's picture is. */
-export function placeInTheMiddle(): void {
+export function placeInTheMiddle(): Promise<void> {
   const { view, pixels } = stage.active;
-  void placeAt(view, Math.floor(pixels.width / 2), Math.floor(pixels.height / 2));
+  return placeAt(view, Math.floor(pixels.width / 2), Math.floor(pixels.height / 2));
 }
 
 export function startPlacing(kind: AddedKind): void {
