@@ -48,6 +48,12 @@ def of_source(light: Light, geometry: LightGeometry | None) -> Light:
     return light._replace(local=(Source(geometry, one),), environment_gain=(0.0, 0.0, 0.0))
 
 
+def straight_from(light: Light, local: tuple[Source, ...]) -> Light:
+    """Some local lights of a light, as they come straight."""
+    dark = light._replace(environment_gain=(0.0, 0.0, 0.0), reflectances=(), local=local)
+    return dark._replace(paths=light.paths.without_reflections())
+
+
 def gains_of(light: Light) -> dict[Light, Rgb]:
     """The gain of each source of a light by the light of that source alone, its gain 1."""
     alone: dict[Light, Rgb] = {}

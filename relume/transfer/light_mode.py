@@ -24,22 +24,28 @@ class LightMode:
     def __init__(self, images: ViewImages) -> None:
         self._images, self._follower, self._mixer = images, Follower(images), Mixer(images)
         self._is_turning = self._lacks_glimpse = False
+        self._held: str | None = None
 
     def hold(self, pointer: Pointer, look: Look) -> None:
         """A hand takes hold of something that may change the light. look: as it is now."""
-        held = look.lights.get(pointer.name) if isinstance(pointer, LightPointer) else None
-        self._mixer.hold(None if held is None else held.geometry)
+        self._held = pointer.name if isinstance(pointer, LightPointer) else None
+        self._hold_light(look)
         self._is_turning = pointer == ROTATION
         if isinstance(pointer, ColorPointer | LightPointer | TransportPointer):
             self._follower.prepare()
 
-    def follow_look(self, before: Light, *, was_shown: bool) -> None:
+    def _hold_light(self, look: Look) -> None:
+        held = None if self._held is None else look.lights.get(self._held)
+        self._mixer.hold(None if held is None else held.geometry)
+
+    def follow_look(self, before: Light, look: Look, *, was_shown: bool) -> None:
         """The images have a new look.
 
         Args:
             before: the light until now. was_shown: whether the picture showed anything then.
         """
         images = self._images
+        self._hold_light(look)
         self._follower.follow_look(before)
         if images.light != before:
             is_wanted = (was_shown or self._lacks_glimpse) and can_glimpse(images)

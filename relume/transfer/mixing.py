@@ -15,7 +15,7 @@ import numpy as np
 
 from relume.look import LightGeometry
 from relume.look.model import Rgb
-from relume.transfer.light import Light, gains_of, is_same_but_for_gains, of_source
+from relume.transfer.light import Light, gains_of, is_same_but_for_gains, of_source, straight_from
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.need import Need, need_of_image
 from relume.transfer.shade import Shaded, shaded_bytes
@@ -65,19 +65,21 @@ class Mixer:
         return need_of_image(self._images, material, image, source)
 
     def held_need(self) -> Need | None:
-        """The image of the light that a hand is on, of a material with few samples first; it can wait for all else.
+        """An image of the light that a hand is on, of a material with few samples first; it can wait for all else.
 
+        What comes straight from it is taken off as soon as it moves; all that comes from it is what it is dimmed by.
         None where that light is elsewhere by now, or where the cache has no room to spare.
         """
         light, cache = self._images.light, self._images.cache
-        sources = {source.geometry for source in light.local}
-        if self._held not in sources:
+        held = tuple(source for source in light.local if source.geometry == self._held)
+        if self._held is None or not held:
             return None
-        source = of_source(light, self._held)
-        lacking = [(m, t) for m, t in self._terms() if self._alone(m, t, source) is None]
-        if not lacking or sum(shaded_bytes(m.num_samples) for m, _ in lacking) > cache.budget_bytes - cache.used_bytes:
+        wanted = straight_from(light, held), of_source(light, self._held)
+        lacking = [(s, m, t) for s in wanted for m, t in self._terms() if self._alone(m, t, s) is None]
+        num_bytes = sum(shaded_bytes(material.num_samples) for _, material, _ in lacking)
+        if not lacking or num_bytes > cache.budget_bytes - cache.used_bytes:
             return None
-        material, image = min(lacking, key=lambda item: item[0].num_samples)
+        source, material, image = min(lacking, key=lambda item: (item[0] != wanted[0], item[1].num_samples))
         return replace(need_of_image(self._images, material, image, source), refines=True)
 
     def step(self) -> None:

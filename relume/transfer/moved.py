@@ -19,7 +19,7 @@ from relume.trace.local_shadows import arriving
 from relume.trace.rough_light import RoughLight
 from relume.transfer.compose import add_even
 from relume.transfer.contraction import contract
-from relume.transfer.light import Light, Source
+from relume.transfer.light import Light, Source, straight_from
 from relume.transfer.local import Points
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.ray_projector import RayProjector
@@ -59,15 +59,15 @@ class MovedLights:
         gone = tuple(source for source in before.local if source not in after.local)
         come = [source for source in after.local if source not in before.local]
         if gone:
-            out -= self._before(material, image, _alone(before, gone))
+            out -= self._before(material, image, straight_from(before, gone))
         if come:
             self._add_now(material, image, come, out)
 
     def _before(self, material: MaterialImage, image: TermImage, light: Light) -> F32:
         """What comes straight from lights that stood still, as exact as in the picture that was shaded; the same in
-        every frame, and so kept."""
+        every frame, and so kept. Where a hand took its time it was made before (`Mixer.held_need`)."""
         images = self._images
-        key = (*images.key_of_image(material, image, light), "straight")
+        key = images.key_of_image(material, image, light)
 
         def shaded() -> Shaded:
             rays, factor = images.local_rays(material.index, light), _even_factor(image)
@@ -142,9 +142,3 @@ def _even_factor(image: TermImage) -> NDArray[np.float64] | None:
         return None
     upright = image.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))
     return np.asarray(contraction.constant * upright, np.float64)
-
-
-def _alone(light: Light, local: tuple[Source, ...]) -> Light:
-    """Some local lights, as they come straight."""
-    dark = light._replace(environment_gain=(0.0, 0.0, 0.0), reflectances=(), local=local)
-    return dark._replace(paths=light.paths.without_reflections())

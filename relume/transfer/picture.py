@@ -74,7 +74,7 @@ class Picture:
         before, images = self._images.light, self._images
         is_shown = any(t.effective is not None or t.is_glimpse for m in images.by_name.values() for t in m.terms)
         images.set_look(look)
-        self._light_mode.follow_look(before, was_shown=is_shown)
+        self._light_mode.follow_look(before, look, was_shown=is_shown)
         if (images.light.environment, images.light.local) != (before.environment, before.local):
             self._touched = None  # the hand has moved on to a light
         self._moved = moved_parameter(self._look, look)

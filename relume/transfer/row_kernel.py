@@ -165,12 +165,14 @@ def add_shared(first, among, weight, alone, start, stop, image):  # type: ignore
         image: (tiles, 3, samples) float32
     """
     samples = image.shape[2]
-    total = np.empty(4, np.float32)
     for s in range(start, stop):
-        total[:] = 0
+        red = green = blue = np.float32(0)
         for k in range(first[s], first[s + 1]):
-            for channel in range(4):  # of one line of the cache
-                total[channel] += weight[k] * alone[among[k], channel]
+            w, beside = weight[k], np.uint32(among[k])
+            red += w * alone[beside, 0]
+            green += w * alone[beside, 1]
+            blue += w * alone[beside, 2]
         tile, offset = s // samples, s % samples
-        for channel in range(3):
-            image[tile, channel, offset] += total[channel]
+        image[tile, 0, offset] += red
+        image[tile, 1, offset] += green
+        image[tile, 2, offset] += blue

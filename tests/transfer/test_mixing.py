@@ -121,6 +121,16 @@ def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
     np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=3e-3, atol=1e-4)
 
 
+def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
+    lit.touch("/lights/Panel")
+    settle(lit).set_look(look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0])))
+    settle(lit)
+    look = look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0], scale=0.3))
+    lit.set_look(look)
+    assert lit.advance(None).exact
+    np.testing.assert_allclose(lit.image(), render_image(transfer, "front", look), rtol=3e-3, atol=1e-4)
+
+
 def test_nothing_is_made_ahead_where_the_cache_would_drop_something_for_it(transfer):
     picture = Picture(transfer, "front", FrozenCache(BUDGET))
     picture.set_look(look_with(transfer, ALL))
