@@ -1,4 +1,4 @@
-"""gather.SCENE_rmse: reflected light of the scenes made by code, each a whole picture.
+"""gather.rmse_SCENE: reflected light of the scenes made by code, each a whole picture.
 
 As gather.rmse_diffuse, but with the highlights that the camera sees. We have twice the width and height,
 averaged over 2 × 2 pixels as Mitsuba's box filter averages over one of its own. Mitsuba's side has no textures, and of
@@ -50,7 +50,7 @@ class Pair(NamedTuple):
 
 def measure(tiny: bool) -> list[Figure]:
     """A bake and a render of each."""
-    names = tuple(f"gather.{name}_rmse" for name in SIZES)
+    names = tuple(f"gather.rmse_{name}" for name in SIZES)
     if (why := missing()) is not None:
         return skipped(names, _UNIT, why)
     figures = []

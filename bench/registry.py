@@ -85,7 +85,7 @@ GROUPS = (
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group(
         "bench.gather_scenes",
-        ("gather.cornell_box_rmse", "gather.tableau_rmse", "gather.still_life_rmse", "gather.interior_rmse"),
+        ("gather.rmse_cornell_box", "gather.rmse_tableau", "gather.rmse_still_life", "gather.rmse_interior"),
     ),
     Group(
         "bench.estimators",
