@@ -95,7 +95,9 @@ class Follower:
         """The next rows to be made, those of few samples first; None where there are all, or none are wanted."""
         if not self._is_wanted or self._reflected is None:
             return None
-        lacking = [(m, t) for m, t in self._terms() if self._rows(m, t) is None]
+        # a term whose own curve moves would want other rows after every edit, and could not add them to anything
+        able = ((m, t) for m, t in self._terms() if t.effective is not None or t.can_follow())
+        lacking = [(m, t) for m, t in able if self._rows(m, t) is None]
         return self._need(*min(lacking, key=lambda item: item[0].num_samples)) if lacking else None
 
     def step(self) -> None:

@@ -216,3 +216,12 @@ def test_a_direct_bake_has_nothing_to_follow(corner, tmp_path):
     picture.set_look(colored(direct, [0.1, 0.1, 0.8], bounces=2))
     assert picture.advance(32).exact
     assert picture.waiting() is None
+
+
+def test_rows_of_a_term_whose_own_curve_moves_are_not_made_at_every_edit(gathered, prepared):
+    def draw(document):
+        document["materials"]["Blue"]["terms"][0]["params"]["sigma"] = 0.9
+
+    prepared.set_look(look_of(gathered, draw))
+    prepared.advance(32)
+    assert not isinstance(prepared.waiting(), RowsNeed)
