@@ -22,8 +22,8 @@ LOCK_TOOLS := build/lock-tools
 CHROMIUM := $(firstword $(foreach name,chromium chromium-browser google-chrome,$(shell command -v $(name) 2>/dev/null)))
 MARKERS := not slow$(if $(CHROMIUM),, and not e2e)
 
-# Tests are shared out to processes; those of a group (tests/conftest.py) go to the same one.
-SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadgroup --no-loadscope-reorder
+# Tests are shared out to processes; which of them stay together, tests/conftest.py says.
+SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadscope --no-loadscope-reorder
 
 .PHONY: help setup demo test test-slow bench lint lock clean client-check
 

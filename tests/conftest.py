@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 TOGETHER = ("e2e",)  # folders whose tests share what is dear to start: a server, its bake, a browser
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one.
+class _Sharing(LoadScopeScheduling):
+    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one."""
 
-    Such folders begin, as they take longest.
-    """
-    for item in items:
-        folder = item.path.parent.name
-        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.path.stem))
+    def _split_scope(self, nodeid: str) -> str:
+        path = Path(nodeid.partition("::")[0])
+        return path.parent.name if path.parent.name in TOGETHER else str(path)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Sharing:
+    """Called by xdist; its own groups, which are marks, are lost on the way with this pytest."""
+    return _Sharing(config, log)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What goes together takes longest and begins, so that no process is left alone with it at the end."""
     items.sort(key=lambda item: item.path.parent.name not in TOGETHER)
 
 

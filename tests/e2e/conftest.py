@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from editor_page import Editor
+from editor_page import WAIT_MS, Editor
 from editor_server import SIZE, Server
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, expect, sync_playwright
 from tiny_scenes import still_life
 
 from worker.database import open_database
@@ -63,6 +63,7 @@ def browser() -> Iterator[Browser]:
         pytest.skip("there is no chromium on this machine")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        expect.set_options(timeout=WAIT_MS)  # of a busy machine; five seconds are its default
         yield browser
         browser.close()
 

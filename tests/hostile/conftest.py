@@ -1,5 +1,5 @@
 """The server's fixtures, for its hostile clients."""
 
-from server_fixtures import baked, client, control, settings
+from server_fixtures import ack_seconds, baked, client, control, settings
 
-__all__ = ["baked", "client", "control", "settings"]
+__all__ = ["ack_seconds", "baked", "client", "control", "settings"]

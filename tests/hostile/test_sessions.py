@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from problems import problem_of
 from server_fakes import Control
+from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, Session, open_session
 from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
@@ -165,6 +166,7 @@ def test_impossible_wish_is_a_problem(client: TestClient, baked: Baked, message:
         assert is_alive(session, 1)
 
 
+@impatient
 def test_flood_of_edits_and_brushes_keeps_one_of_each(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.frame()

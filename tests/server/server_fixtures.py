@@ -1,5 +1,6 @@
 """An app over a fake library and real bakes of a fake method, all in a folder of the test."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from server.settings import Settings
 from worker.scenes import register_scene
 from worker.service import BakeService
 
+impatient = pytest.mark.parametrize("ack_seconds", [1.5])  # for tests of what happens then
+
 
 @pytest.fixture
 def control() -> Control:
@@ -21,7 +24,13 @@ def control() -> Control:
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def ack_seconds() -> float:
+    """How long a client may leave frames unread: longer than any test; `impatient` shortens it."""
+    return 600.0
+
+
+@pytest.fixture
+def settings(tmp_path: Path, ack_seconds: float) -> Settings:
     return Settings(
         data=tmp_path / "data",
         client=tmp_path / "dist",
@@ -29,7 +38,7 @@ def settings(tmp_path: Path) -> Settings:
         max_body_bytes=2 * 1024**2,
         max_upload_bytes=4 * 1024**2,
         max_sessions=3,
-        ack_seconds=1.0,
+        ack_seconds=ack_seconds,
     )
 
 
@@ -38,7 +47,8 @@ def open_fake_bakes(settings: Settings) -> BakeService:
 
 
 @pytest.fixture
-def client(settings: Settings, control: Control) -> Iterator[TestClient]:
+def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    monkeypatch.setattr("server.live.window.SLOW_S", math.inf)  # a busy machine is no slow link
     app = create_app(settings, open_library=control.open_library, open_bakes=open_fake_bakes)
     with TestClient(app, raise_server_exceptions=False) as client:
         yield client

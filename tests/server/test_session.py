@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import SIZE, Control
+from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
 from server.live.window import Window
@@ -79,6 +80,7 @@ def test_edits_without_acknowledgement_are_merged_into_the_newest(
         assert control.num_looks == num_looks + 1
 
 
+@impatient
 def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.text("hello")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import Control
+from server_fixtures import impatient
 from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, Session, open_session
 
 
@@ -35,6 +36,7 @@ def test_every_edit_changes_all_views_the_focused_one_first(client: TestClient, 
                 assert np.frombuffer(frame.payload, "<u4")[0] == 700 + 100 * revision
 
 
+@impatient
 def test_client_that_does_not_acknowledge_gets_one_frame_of_the_focus_and_one_of_the_rest(
     client: TestClient, baked: Baked
 ) -> None:

@@ -203,7 +203,7 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
 
     def cancelled():
         first_runs.set()
-        go_on.wait(5)
+        go_on.wait(60)
         raise CancelledError("cancelled")
 
     def make():
@@ -221,12 +221,12 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
 
     first, second, third = (threading.Thread(target=target) for target in (give_up, want, want))
     first.start()
-    assert first_runs.wait(5)
+    assert first_runs.wait(60)
     second.start()
     time.sleep(0.05)  # until it waits
     go_on.set()
     first.join()
-    assert second_runs.wait(5)
+    assert second_runs.wait(60)
     third.start()
     second.join()
     third.join()

@@ -236,17 +236,18 @@ def test_published_store_of_a_killed_service_is_taken_as_it_is(tmp_path: Path) -
 def test_closing_ends_every_subscription(tmp_path: Path) -> None:
     service = open_service(tmp_path)
     identity = service.submit(SCENE.id, RECIPE)
-    ended = threading.Event()
+    listens, ended = threading.Event(), threading.Event()
 
     def listen() -> None:
-        list(service.subscribe(identity))
+        for _ in service.subscribe(identity):
+            listens.set()
         ended.set()
 
     thread = threading.Thread(target=listen)
     thread.start()
-    time.sleep(0.1)
+    assert listens.wait(60)
     service.close()
-    thread.join(10)
+    thread.join(60)
     assert ended.is_set()
 
 
