@@ -1,8 +1,8 @@
 """View samples: the points of a view whose radiance makes its pixels.
 
 One sample a pixel, more where material, normal or depth change across it (docs/method.md, "View samples"): eight
-positions are traced in such a pixel and those that see the same thing are merged: a silhouette has eight levels of
-coverage for two or three samples.
+positions are traced in such a pixel and those that see the same thing are merged into the most central of them: a
+silhouette has eight levels of coverage for two or three samples.
 """
 
 from __future__ import annotations
@@ -94,9 +94,25 @@ def _merge(
         same = (group < 0) & (mesh == mesh[:, candidate : candidate + 1]) & ((cosine > _COS_EDGE) | (mesh < 0))
         same &= (group[:, candidate] < 0)[:, None]
         group[same] = candidate
-    pixel, leader = np.nonzero(group == np.arange(positions_a_pixel))
-    size = (group[pixel] == leader[:, None]).sum(axis=1)
-    return pixel * positions_a_pixel + leader, pixel, (size / positions_a_pixel).astype(np.float32)
+    pixel, first = np.nonzero(group == np.arange(positions_a_pixel))
+    is_in = group[pixel] == first[:, None]
+    size = is_in.sum(axis=1)
+    return (
+        pixel * positions_a_pixel + _most_central(is_in, size),
+        pixel,
+        (size / positions_a_pixel).astype(np.float32),
+    )
+
+
+def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Of each group the position next to their mean: any other would shift what the group shows to one side.
+
+    Args:
+        is_in: which positions are of a group. (groups, 8). size: how many those are. (groups,)
+    """
+    mean = is_in @ _POSITIONS / size[:, None]
+    away = np.sum((_POSITIONS - mean[:, None]) ** 2, axis=-1)
+    return np.asarray(np.where(is_in, away, np.inf).argmin(axis=1), np.int64)
 
 
 def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int]) -> ViewSamples:

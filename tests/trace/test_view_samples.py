@@ -76,13 +76,17 @@ def disc_coverage(radius, size, yfov, distance, fine=32):
     return inside.reshape(height, fine, width, fine).mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize("radius", [0.31, 0.5, 0.731])
-def test_silhouette_of_a_disc_covers_what_it_should(radius):
+def disc_samples(radius):
+    """Samples of a disc that faces the camera, 2 m away."""
     turns = np.linspace(0, 2 * np.pi, 256, endpoint=False)
     rim = np.column_stack([radius * np.cos(turns), radius * np.sin(turns), 0 * turns])
     faces = [[0, k + 1, (k + 1) % 256 + 1] for k in range(256)]
-    scene = scene_of(mesh("disc", [[0, 0, 0], *rim], faces, 0), camera=looking("c", [0, 0, 2], [0, 0, 0], 0.8))
-    samples = sampled(scene)
+    return sampled(scene_of(mesh("disc", [[0, 0, 0], *rim], faces, 0), camera=looking("c", [0, 0, 2], [0, 0, 0], 0.8)))
+
+
+@pytest.mark.parametrize("radius", [0.31, 0.5, 0.731])
+def test_silhouette_of_a_disc_covers_what_it_should(radius):
+    samples = disc_samples(radius)
     covered = weight_by_pixel(samples, samples.material == 0).reshape(SIZE[1], SIZE[0])
     exact = disc_coverage(radius, SIZE, 0.8, 2.0)
     error = covered - exact
@@ -92,6 +96,23 @@ def test_silhouette_of_a_disc_covers_what_it_should(radius):
     assert (np.abs(error[rim_pixels]) <= 1 / 8).mean() > 0.95
     assert np.sqrt(np.mean(error[rim_pixels] ** 2)) < 0.07
     assert abs(error.sum()) < 0.01 * exact.sum()
+
+
+def test_what_stands_for_a_part_of_a_pixel_lies_in_its_middle():
+    """A sample to one side of its part would shift what is seen along silhouettes."""
+    samples, fine = disc_samples(0.731), 32
+    rim = np.nonzero((samples.material == 0) & (samples.weight < 1))[0]
+    pixel_size = 2 * np.tan(0.4) * 2.0 / SIZE[1]
+    corner = np.stack(np.divmod(samples.pixel[rim], SIZE[0])[::-1], axis=1)  # x, y
+    within = samples.surface.position[rim, :2] / pixel_size * (1, -1) + np.array(SIZE) / 2 - corner
+    steps = (np.arange(fine) + 0.5) / fine
+    at = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    centred = (corner[:, None] + at - np.array(SIZE) / 2) * pixel_size
+    inside = (np.sum(centred**2, axis=-1) < 0.731**2)[..., None]
+    middle = np.sum(inside * at, axis=1) / inside.sum(axis=1)
+    assert len(rim) > 50
+    assert np.abs(np.mean(within - middle, axis=0)).max() < 0.04
+    assert np.abs(within - middle).mean() < 0.15
 
 
 def test_position_lies_just_off_the_surface_on_the_viewers_side():
