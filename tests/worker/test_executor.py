@@ -3,12 +3,19 @@
 import asyncio
 import concurrent.futures
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
 from worker.dask_executor import DaskExecutor
 from worker.executor import Executors
+
+
+def run(work: Coroutine[Any, Any, None]) -> None:
+    """Run it in a thread of its own: the browser tests leave a loop running in this one."""
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, work).result()
 
 
 class FakeTask:
@@ -34,7 +41,7 @@ class FakeClient:
         return FakeTask(fn(*args))
 
     def add_callback(self, follow: Callable[..., Coroutine[Any, Any, None]], *args: object) -> None:
-        asyncio.run(follow(*args))
+        run(follow(*args))
 
     def close(self, timeout: float) -> None:
         raise TimeoutError
@@ -48,7 +55,7 @@ class FakeCluster:
         self.workers = {0: FakeNanny(self.log), 1: FakeNanny(self.log)}
 
     def sync(self, work: Callable[..., Coroutine[Any, Any, None]], *args: object, callback_timeout: float) -> None:
-        asyncio.run(asyncio.wait_for(work(*args), callback_timeout))
+        run(work(*args))
 
     def close(self, timeout: float) -> None:
         self.log.append("close")
