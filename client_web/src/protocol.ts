@@ -6,6 +6,7 @@ export type {
   BakeMessage,
   BakeRequest,
   ClientMessage,
+  CurveBody,
   CurveMessage,
   DryRunBody,
   EnvironmentBody,
@@ -13,6 +14,8 @@ export type {
   HelloMessage,
   LookEntry,
   MaterialMapBody,
+  ModelBody,
+  ParameterBody,
   PlanBody,
   ProbeAnswer,
   Problem,
@@ -87,35 +90,3 @@ export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 
 /** A scene, its default terms in look-document form. */
 export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[] }[] };
-
-/** One entry of `GET /api/models`. */
-export interface ParameterInfo {
-  name: string;
-  label: string;
-  minimum: number;
-  maximum: number;
-  default: number;
-  unit: string;
-  scale: "linear" | "log";
-  help: string;
-  /** Has one value for all channels, and a change of it takes as long as a freeze. */
-  fixed: boolean;
-}
-export interface CurveInfo {
-  name: string;
-  label: string;
-  angle: string;
-  parameters: string[];
-  bands: number;
-  outgoing: boolean;
-}
-export interface ModelInfo {
-  model: string;
-  label: string;
-  help: string;
-  source: string;
-  texture: string | null;
-  needs_data: boolean;
-  parameters: ParameterInfo[];
-  curves: CurveInfo[];
-}

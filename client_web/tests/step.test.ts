@@ -1,9 +1,9 @@
 import { expect, test } from "vitest";
-import type { Look, ModelInfo } from "../src/protocol";
+import type { Look, ModelBody } from "../src/protocol";
 import { stepName } from "../src/state/step";
 import { LOOK } from "./look";
 
-const models = [{ model: "ward", curves: [{ name: "h", label: "half angle θh" }] }] as unknown as ModelInfo[];
+const models = [{ model: "ward", curves: [{ name: "h", label: "half angle θh" }] }] as unknown as ModelBody[];
 const shiny = {
   ...LOOK,
   materials: { "Tea/pot": { terms: [{ model: "ward", color: [1, 1, 1] }] } },

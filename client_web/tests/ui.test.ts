@@ -2,7 +2,7 @@ import { describe, expect, test } from "vitest";
 import { fromHex, strength, toHex } from "../src/inspector/color";
 import { defaultTerm, modelsFor, withModel } from "../src/inspector/terms";
 import { freeName } from "../src/looks/names";
-import type { ModelInfo, Rgb } from "../src/protocol";
+import type { ModelBody, Rgb } from "../src/protocol";
 import { sortFiles, stem } from "../src/start/files";
 import { gauge } from "../src/state/metrics";
 import { placeFromUrl, placeToUrl } from "../src/state/url";
@@ -81,7 +81,7 @@ describe("colours", () => {
 });
 
 describe("terms", () => {
-  const model = (name: string, parameters: string[]): ModelInfo => ({
+  const model = (name: string, parameters: string[]): ModelBody => ({
     model: name,
     label: name,
     help: "",
@@ -105,7 +105,7 @@ describe("terms", () => {
 
   test("a new model keeps colour, texture and parameters of the same name", () => {
     const term = {
-      ...defaultTerm(models[0] as ModelInfo),
+      ...defaultTerm(models[0] as ModelBody),
       color: [1, 2, 3] as Rgb,
       params: { roughness: 0.1, f0: 0.9 },
       curves: { theta_h: {} },

@@ -1,6 +1,6 @@
 /** The curve editor: a term's one-dimensional factor, under the hand. */
 import { useEffect, useMemo, useState } from "preact/hooks";
-import type { CurveEdits, CurveInfo } from "../protocol";
+import type { CurveEdits, CurveBody } from "../protocol";
 import { holdCurve } from "../state/live";
 import { curvePath, curveShape, probe } from "../state/store";
 import { clearBrush } from "./brush";
@@ -39,7 +39,7 @@ function contributionsTo(path: string): Contributions | null {
 }
 
 /** `edits` is what the look says of this curve, undefined where the model's parameters make it. */
-export function CurveEditor({ info, edits }: { info: CurveInfo; edits: CurveEdits | undefined }) {
+export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdits | undefined }) {
   const [measure, width] = useWidth();
   const path = curvePath.value ?? "";
   const shape = curveShape.value;

@@ -1,5 +1,5 @@
 /** The open curve as the editor shows it: the look's points, the server's bands, and how to change them. */
-import type { CurveEdits, CurveInfo, CurveMessage, Point } from "../protocol";
+import type { CurveEdits, CurveBody, CurveMessage, Point } from "../protocol";
 import { edit } from "../state/edit";
 import { niceTop, type Axes } from "./axes";
 import { joined, readChannels, writeChannels, type Channels } from "./channels";
@@ -8,7 +8,7 @@ import { pchip } from "./pchip";
 
 export interface CurveModel {
   path: string;
-  info: CurveInfo;
+  info: CurveBody;
   channels: Channels;
   /** Curves to draw: samples per channel. */
   lines: Point[][];
@@ -36,7 +36,7 @@ function same(a: readonly number[] | undefined, b: readonly number[] | undefined
 /** What the look and the server say about a curve. Points that were just moved are drawn before the server answers. */
 export function curveModel(
   path: string,
-  info: CurveInfo,
+  info: CurveBody,
   edits: CurveEdits | undefined,
   shape: CurveMessage | null,
 ): CurveModel {

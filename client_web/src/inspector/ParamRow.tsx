@@ -1,5 +1,5 @@
 /** One parameter: a slider, or three where red, green and blue were parted. */
-import type { ParameterInfo, ParamValue, Rgb } from "../protocol";
+import type { ParameterBody, ParamValue, Rgb } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { Slider } from "../ui/Slider";
 
@@ -10,7 +10,7 @@ const CHANNELS = [
 ] as const;
 
 interface Props {
-  info: ParameterInfo;
+  info: ParameterBody;
   value: ParamValue;
   initial: ParamValue;
   onChange(value: ParamValue): void;

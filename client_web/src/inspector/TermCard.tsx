@@ -1,7 +1,7 @@
 /** One term of the selected material: model, colour, parameters, and its curves; the open curve unfolds in place. */
 import { useMemo } from "preact/hooks";
 import { CurveEditor } from "../curve/CurveEditor";
-import type { ModelInfo, Rgb, Term } from "../protocol";
+import type { ModelBody, Rgb, Term } from "../protocol";
 import { edit } from "../state/edit";
 import { hold } from "../state/live";
 import { pointer } from "../state/pointer";
@@ -25,7 +25,7 @@ function symbol(label: string): string {
   return label.split(" ").at(-1) ?? label;
 }
 
-function Curves({ model, term, index }: { model: ModelInfo; term: Term; index: number }) {
+function Curves({ model, term, index }: { model: ModelBody; term: Term; index: number }) {
   const open = selectedTerm.value === index ? selectedCurve.value : null;
   const info = model.curves.find((curve) => curve.name === open);
   const edits = info && term.curves?.[info.name];

@@ -1,5 +1,5 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
-import type { ModelInfo, Term } from "../protocol";
+import type { ModelBody, Term } from "../protocol";
 import { scene } from "../state/store";
 
 /** The images that a material may have, in words. */
@@ -11,7 +11,7 @@ export function texturesOf(material: string): string[] {
   return Object.keys(TEXTURES).filter((channel) => own.some((term) => term.texture === channel));
 }
 
-export function defaultTerm(model: ModelInfo): Term {
+export function defaultTerm(model: ModelBody): Term {
   return {
     model: model.model,
     color: model.texture === "diffuse" ? [0.2, 0.2, 0.2] : [0.5, 0.5, 0.5],
@@ -22,13 +22,13 @@ export function defaultTerm(model: ModelInfo): Term {
 }
 
 /** The models that a term can take: those that are measured only where it names a measured material. */
-export function modelsFor(term: Term | null, models: readonly ModelInfo[]): readonly ModelInfo[] {
+export function modelsFor(term: Term | null, models: readonly ModelBody[]): readonly ModelBody[] {
   return models.filter((model) => !model.needs_data || term?.data !== undefined);
 }
 
 /** The term under another model: colour and texture stay, and parameters of the same name. Drawn curves belong to
  * the old model's angles and go; a measured material stays where the new model is measured too. */
-export function withModel(term: Term, name: string, models: readonly ModelInfo[]): Term {
+export function withModel(term: Term, name: string, models: readonly ModelBody[]): Term {
   const model = models.find((m) => m.model === name);
   if (model === undefined) return term;
   const params = Object.fromEntries(

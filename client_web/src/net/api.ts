@@ -7,7 +7,7 @@ import type {
   MaterialBody,
   MaterialMapBody,
   MeasuredBody,
-  ModelInfo,
+  ModelBody,
   Problem,
   RenderBody,
   RenderRequest,
@@ -64,7 +64,7 @@ async function get<T>(path: string): Promise<T> {
 
 export const listScenes = () => get<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
-export const listModels = () => get<ModelInfo[]>("/api/models");
+export const listModels = () => get<ModelBody[]>("/api/models");
 export const listMaterials = () => get<MaterialBody[]>("/api/materials");
 export const listMeasured = () => get<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => get<MaterialMapBody>("/api/materials/map");

@@ -1,9 +1,9 @@
 /** What a step of the history is called: what was changed, then what was done to it. */
-import type { Look, ModelInfo } from "../protocol";
+import type { Look, ModelBody } from "../protocol";
 import { tokens } from "./pointer";
 
 /** "Teapot · half angle θh · move point": material, curve and deed of an edit at a pointer of the look. */
-export function stepName(path: string, deed: string, look: Look, models: readonly ModelInfo[]): string {
+export function stepName(path: string, deed: string, look: Look, models: readonly ModelBody[]): string {
   const [table, named, , index, kind, name] = tokens(path);
   if (table === "lights" && named !== undefined) return `${named} · ${deed}`;
   if (table !== "materials" || named === undefined) return deed;

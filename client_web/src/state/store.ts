@@ -2,12 +2,12 @@
 import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
 import type { Transform } from "../picture/transform";
-import type { BakeBody, CurveMessage, HelloMessage, Look, ModelInfo, ProbeAnswer, SceneBody, Term } from "../protocol";
+import type { BakeBody, CurveMessage, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term } from "../protocol";
 import { History } from "./history";
 import { pointer } from "./pointer";
 
 export const page = signal<"start" | "editor">("start");
-export const models = signal<ModelInfo[]>([]);
+export const models = signal<ModelBody[]>([]);
 export const scene = signal<SceneBody | null>(null);
 
 /** The bake that the picture shows, and which light it has; and one that is on its way. */
@@ -93,7 +93,7 @@ export const drawn = signal(0);
 
 export const helpOpen = signal(false);
 
-export function modelOf(term: Term): ModelInfo | undefined {
+export function modelOf(term: Term): ModelBody | undefined {
   return models.value.find((model) => model.model === term.model);
 }
 
