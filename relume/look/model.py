@@ -186,6 +186,10 @@ class Paths(NamedTuple):
         """The straight ones of them."""
         return Paths(self.direct, 1, 0)
 
+    def without_straight(self) -> Paths:
+        """The others."""
+        return self._replace(direct=False)
+
 
 class TransportLook(_Frozen):
     """Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any,

@@ -2,8 +2,8 @@
 
 Where a hand drags a diffuse colour or the number of bounces, all that changes of light is what gather cells send out;
 where it moves a local light, what comes straight from that light as well. The rows of all terms are made when such a
-thing is touched or first edited; from then on each frame shows the image that was shaded last and what has changed.
-It is never called exact: at rest all is shaded.
+thing is touched, once the picture is exact, or first edited; from then on each frame shows the image that was shaded
+last and what has changed. It is never called exact: at rest all is shaded that has changed.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Follower:
     def __init__(self, images: ViewImages) -> None:
         self._images, self._moved = images, MovedLights(images)
         self._reflected = images.transfer.reflected
-        self._is_wanted = False
+        self._is_wanted = self._is_awaited = False
 
     def prepare(self) -> None:
         """A hand is on something that changes local lights, or what surfaces reflect onto each other."""
@@ -81,10 +81,17 @@ class Follower:
 
     def follow_look(self, before: Light) -> None:
         """The look has changed, and with it perhaps the light, which was this before."""
-        self._is_wanted, after = False, self._images.light
+        self._is_wanted = self._is_awaited = False
+        after = self._images.light
         is_followed = is_same_environment(before, after) and is_moved_by_hand(before, after)
         if before != after and is_followed and not is_same_but_for_gains(before, after):
             self.prepare()
+            self._is_awaited = self._is_wanted
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether light has changed that only rows can follow; else what they are for has only been touched."""
+        return self._is_awaited
 
     def follows_all(self) -> bool:
         """Whether every term shows its look already, or will, roughly, as soon as there are rows."""

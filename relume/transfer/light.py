@@ -54,6 +54,22 @@ def straight_from(light: Light, local: tuple[Source, ...]) -> Light:
     return dark._replace(paths=light.paths.without_reflections())
 
 
+def parts_of(light: Light) -> dict[Light, Rgb]:
+    """How much of each part is in a light: straight from the environment, straight from local lights, from surfaces.
+
+    An edit seldom changes more than one of them.
+    """
+    one, parts = (1.0, 1.0, 1.0), {}
+    if light.paths.direct and light.is_environment_lit:
+        straight = light._replace(paths=light.paths.without_reflections(), reflectances=())
+        parts[of_source(straight, None)] = light.environment_gain
+    if light.paths.direct and light.local:
+        parts[straight_from(light, light.local)] = one
+    if light.paths.reflect:
+        parts[light._replace(paths=light.paths.without_straight())] = one
+    return parts
+
+
 def gains_of(light: Light) -> dict[Light, Rgb]:
     """The gain of each source of a light by the light of that source alone, its gain 1."""
     alone: dict[Light, Rgb] = {}

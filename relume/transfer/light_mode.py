@@ -53,7 +53,7 @@ class LightMode:
 
     def next_need(self) -> RowsNeed | Glimpse | Need | None:
         """What must be made next for light to be followed or glimpsed."""
-        rows = self._follower.next_need()
+        rows = self._follower.next_need() if self._follower.is_awaited else None
         if rows is not None:
             return rows
         images = self._images
@@ -61,9 +61,9 @@ class LightMode:
             return Glimpse.of(images)
         return self._mixer.next_need()
 
-    def held_need(self) -> Need | None:
+    def held_need(self) -> RowsNeed | Need | None:
         """What can be made ahead for what a hand is on, when nothing else is lacking."""
-        return self._mixer.held_need()
+        return self._follower.next_need() or self._mixer.held_need()
 
     def adopt(self, need: RowsNeed | Glimpse, made: Any) -> None:
         """Show what a need has made."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
+from relume.light.triangles import TriangleLights
+from relume.look.model import Rgb
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.contraction import contract
 from relume.transfer.frozen import Frozen, frozen_bytes
-from relume.transfer.light import Light
+from relume.transfer.light import Light, parts_of
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade, shaded_bytes
@@ -36,6 +39,14 @@ class Candidate(NamedTuple):
         return frozen_bytes(self.material.num_samples, self.along.num_columns)
 
 
+class Part(NamedTuple):
+    """Of a light. key: name in the cache of the image in it alone. gain: how much of it there is, of each channel."""
+
+    key: tuple[Hashable, ...]
+    light: Light
+    gain: Rgb
+
+
 @dataclass(frozen=True, eq=False)
 class Need:
     """An operator along `active`, or an image where that is None.
@@ -45,7 +56,7 @@ class Need:
     Attributes:
         what: in words. key: its name in the cache; equal keys are the same need.
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
-        light: what arrives at it.
+        light: what arrives at it. parts: that it is the sum of, where there are several.
         is_default: the term is one of the scene's own look, whose images stay beside the store.
         refines: the picture is near its look without it, or shows a glimpse; it can wait until the hand rests.
     """
@@ -61,6 +72,7 @@ class Need:
     active: Along | None
     num_bytes: int
     light: Light
+    parts: Sequence[Part]
     is_default: bool
     refines: bool
 
@@ -78,26 +90,42 @@ class Need:
             CancelledError: `cancelled` said so.
         """
         images, active = self.images, self.active
-        lights = images.transfer.lights_of(self.light)
-
-        def receivers() -> Receivers:
-            reflected = images.transfer.reflected_in(self.light)
-            local = images.local_rays(self.material.index, self.light)
-            return images.view.receivers(self.material.index, reflected, local, is_lit=lights.num_lights > 0)
 
         def frozen(along: Along) -> Frozen:
-            return along.freeze(self.term, self.bands, lights, receivers(), progress, cancelled)
-
-        def shaded() -> Shaded:
-            return shade(self.term, self.bands, lights, receivers(), progress, cancelled)
+            lights, receivers = self._arriving(self.light)
+            return along.freeze(self.term, self.bands, lights, receivers, progress, cancelled)
 
         def shaded_once() -> Shaded:
             kept = images.transfer.derived if self.is_default else images.transfer.edited
-            return kept.get(self.key[1:], self.image.image.shape, shaded)
+            return kept.get(self.key[1:], self.image.image.shape, lambda: self._summed(progress, cancelled))
 
         if active is None:
             return images.cache.get(self.key, Shaded, self.num_bytes, shaded_once)
         return images.cache.get(self.key, Frozen, self.num_bytes, lambda: frozen(active))
+
+    def _summed(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Shaded:
+        """Shade the parts of the light that no other image has had, and sum all."""
+
+        def shaded(light: Light, done: int) -> Shaded:
+            def tell(share: float) -> None:
+                progress((done + share) / max(1, len(self.parts)))
+
+            return shade(self.term, self.bands, *self._arriving(light), tell, cancelled)
+
+        if len(self.parts) < 2:
+            return shaded(self.light, 0)
+        total = np.zeros_like(self.image.image)
+        for done, (key, light, gain) in enumerate(self.parts):
+            part = self.images.cache.get(key, Shaded, self.num_bytes, partial(shaded, light, done))
+            total += np.array(gain, np.float32)[:, None] * part.image
+        return Shaded(total)
+
+    def _arriving(self, light: Light) -> tuple[TriangleLights, Receivers]:
+        """What arrives at the samples of the material in a light."""
+        images, index = self.images, self.material.index
+        lights, reflected = images.transfer.lights_of(light), images.transfer.reflected_in(light)
+        local = images.local_rays(index, light)
+        return lights, images.view.receivers(index, reflected, local, is_lit=lights.num_lights > 0)
 
 
 class Hand(NamedTuple):
@@ -195,35 +223,36 @@ def _cost(candidate: Candidate, touched: Candidate | None) -> tuple[bool, bool, 
     return touched is None or material is not touched.material, not is_flat, material.num_samples
 
 
-def _need(images: ViewImages, candidate: Candidate, *, refines: bool) -> Need:
+def _need(images: ViewImages, candidate: Candidate, *, refines: bool, light: Light | None = None) -> Need:
+    """Of a candidate in some light, the picture's where none is given."""
     material, image, along = candidate
-    name = images.transfer.material_names[material.index]
+    name, light = images.transfer.material_names[material.index], light or images.light
+    parts = parts_of(light).items() if along is None else ()
+    if along is None:
+        what, key = image.term.label, images.key_of_image(material, image, light)
+    else:
+        what, key = along.label, images.key(material, image, along, of_target=True)
     return Need(
-        what=f"{name}, {image.term.label if along is None else along.label}",
-        key=images.key(material, image, along, of_target=True),
+        what=f"{name}, {what}",
+        key=key,
         images=images,
         material=material,
         image=image,
         term=image.term,
-        kind=image.kind,
+        kind=(image.model, light),
         bands=image.target,
         active=along,
         num_bytes=candidate.num_bytes,
-        light=images.light,
-        is_default=_is_default(images, material, image, images.light),
+        light=light,
+        parts=[Part(images.key_of_image(material, image, part), part, gain) for part, gain in parts],
+        is_default=_is_default(images, material, image, light),
         refines=refines,
     )
 
 
 def need_of_image(images: ViewImages, material: MaterialImage, image: TermImage, light: Light) -> Need:
     """The image of a term's target in another light than the picture's."""
-    return replace(
-        _need(images, Candidate(material, image, None), refines=image.is_glimpse),
-        key=images.key_of_image(material, image, light),
-        kind=(image.model, light),
-        light=light,
-        is_default=_is_default(images, material, image, light),
-    )
+    return _need(images, Candidate(material, image, None), refines=image.is_glimpse, light=light)
 
 
 def _is_default(images: ViewImages, material: MaterialImage, image: TermImage, light: Light) -> bool:

@@ -42,8 +42,13 @@ class Reflected:
     def under(self, light: Light) -> F32:
         """What exact pictures show."""
         with self._lock:  # all who want the same wait for one
-            return self._exactly(light)
+            return self._exactly(_between_surfaces(light))
 
     def roughly_under(self, light: Light) -> F32:
         """What pictures follow while a hand moves; waits for nobody."""
-        return self._roughly(light)
+        return self._roughly(_between_surfaces(light))
+
+
+def _between_surfaces(light: Light) -> Light:
+    """All of a light that cells depend on."""
+    return light._replace(paths=light.paths.without_straight())

@@ -12,6 +12,7 @@ from relume.transfer.glimpse import Glimpse
 from relume.transfer.need import Need
 from relume.transfer.picture import Picture
 from relume.transfer.render import render_image
+from relume.transfer.shade import shade
 
 RED = "/materials/Red/terms/0/color"
 
@@ -225,3 +226,44 @@ def test_rows_of_a_term_whose_own_curve_moves_are_not_made_at_every_edit(gathere
     prepared.set_look(look_of(gathered, draw))
     prepared.advance(32)
     assert not isinstance(prepared.waiting(), RowsNeed)
+
+
+def test_a_lamp_just_added_is_exact_before_anything_is_made_for_moving_it(gathered):
+    picture = settle(Picture(gathered, "front", FrozenCache(BUDGET)))
+    picture.set_look(lamp_at(gathered, 0.4))
+    picture.advance(32)
+    picture.touch("/lights/Lamp")
+    made = []
+    while not picture.advance(None).exact:
+        made.append(make(picture))
+    assert made
+    assert not any(isinstance(need, RowsNeed) for need in made)
+    assert isinstance(picture.waiting(), RowsNeed)
+
+
+def test_only_the_part_of_light_that_an_edit_changes_is_shaded(gathered, monkeypatch):
+    def shown(x=0.43, **transport):  # no other test has shown it: images of looks stay beside a bake
+        lamp = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0]}
+        return look_of(gathered, lambda d: (d["lights"].update(Lamp=lamp), d["transport"].update(transport)))
+
+    def shaded(look):
+        """What has been shaded when the picture rests in a look: whether of the environment, and kinds of rays."""
+        calls.clear()
+        picture.set_look(look)
+        settle(picture)
+        return {(lights.num_lights > 0, *(type(r).__name__ for r in receivers.rays)) for lights, receivers in calls}
+
+    def recorded(term, bands, lights, receivers, progress, cancelled):
+        calls.append((lights, receivers))
+        return shade(term, bands, lights, receivers, progress, cancelled)
+
+    calls = []
+    monkeypatch.setattr("relume.transfer.need.shade", recorded)
+    picture = Picture(gathered, "front", FrozenCache(BUDGET))
+    environment, local, reflected = (True,), (False, "LocalRays"), (False, "GatherRays")
+    assert shaded(shown()) == {environment, local, reflected}
+    assert shaded(shown(show="direct")) == set()
+    assert shaded(shown(show="first_bounce")) == {reflected}
+    assert shaded(shown(bounces=1)) == set()
+    assert shaded(shown(bounces=3)) == {reflected}
+    assert shaded(shown(0.13, bounces=3)) == {local, reflected}
