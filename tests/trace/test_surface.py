@@ -1,0 +1,46 @@
+"""Points on surfaces: where they lie when a ray hits the very edge of a triangle."""
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, mesh, quad, scene_of
+
+from relume.trace.geometry import merge
+from relume.trace.primary import Hits
+from relume.trace.surface import surface_at
+
+INWARD = np.array([[-1.0, 0.0, 0.0]], np.float32)  # along the ray that hits the wall
+
+
+def on_wall(uv, corners=((0, 0, 0), (0, 0, 2), (0, 2, 2), (0, 2, 0))):
+    """The point of a wall in x = 0 that a ray hits at barycentric coordinates of its first triangle."""
+    floor = quad("floor", [[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2]], 0)
+    geometry = merge(scene_of(quad("wall", corners, 0), floor, camera=looking("c", [1, 1, 1], [0, 1, 1], 1.0)))
+    hits = Hits(np.zeros(1, np.int32), np.array([uv], np.float32), np.ones(1, np.float32))
+    return surface_at(geometry, hits, INWARD).position[0].astype(float), geometry.epsilon
+
+
+@pytest.mark.parametrize("uv", [(0.4, 0.0), (0.0, 0.0), (1.0, 0.0)], ids=["edge", "corner", "other corner"])
+def test_point_on_an_edge_is_moved_off_the_surface_beside_it(uv):
+    """There it would see through the floor, in whose plane it lies."""
+    position, epsilon = on_wall(uv)
+    assert 0.1 * epsilon < position[1] < epsilon
+    assert position[0] == pytest.approx(epsilon, rel=0.01)
+
+
+def test_other_points_stay():
+    position, epsilon = on_wall((0.3, 0.3))
+    np.testing.assert_allclose(position, [epsilon, 0.6, 1.2], rtol=1e-5)
+
+
+def test_point_of_a_sliver_stays_in_it():
+    """A triangle narrower than the distance to keep has a tenth of its height instead."""
+    thin = 1e-6
+    geometry = merge(
+        scene_of(
+            mesh("sliver", [[0, 0, 0], [0, 0, 2], [0, thin, 1]], [[0, 1, 2]], 0),
+            camera=looking("c", [1, 1, 1], [0, 1, 1], 1.0),
+        )
+    )
+    hits = Hits(np.zeros(1, np.int32), np.array([[0.5, 0.0]], np.float32), np.ones(1, np.float32))
+    height = surface_at(geometry, hits, INWARD).position[0, 1]
+    assert 0 < height < thin
