@@ -2,7 +2,10 @@
 
 A point light and a rectangle of 0.5 × 0.5 m under the ceiling are moved, and the rectangle is dimmed, held by the hand;
 from the look to the encoded bytes, medians. What holding it makes is made before. A frame of a moved lamp may be
-near the look: at rest it is shaded exactly.
+near the look: at rest it is shaded exactly, and `error_before_rest` is how far from that the last frame was.
+
+`over_embreex` is the time of a frame ÷ what `EmbreeScene.run` takes, in one thread, for a shadow ray from each view
+sample to the middle of the lamp: the least that a frame of new shadows could cost.
 """
 
 from __future__ import annotations
@@ -13,15 +16,19 @@ import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bench.figure import Figure
 from bench.gather import bake, recipe_of, settle
-from bench.timing import seconds
+from bench.rays import embreex_scene
+from bench.timing import in_turn, seconds
 from relume.look import validate
 from relume.scene.cornell import cornell_box
+from relume.scene.model import Scene
+from relume.trace.geometry import merge
+from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.transfer.cache import FrozenCache
 from relume.transfer.opened import Transfer, open_transfer
 from relume.transfer.picture import Picture
@@ -45,22 +52,30 @@ def measure(tiny: bool) -> list[Figure]:
             [_PANEL | place for place in places],
             [_PANEL | scale for scale in scales],
         ]
-        found = [_frames_s(transfer, Picture(transfer, "front", FrozenCache(4 << 30)), drag) for drag in drags]
+        found = [_dragged(transfer, Picture(transfer, "front", FrozenCache(4 << 30)), drag) for drag in drags]
+        embreex_s = _embreex_s(scene, recipe.size, places[-1]["position"])
     return [
-        Figure(name, 1 / float(np.median(taken)), _SPEED, {
-            "ms_p50": 1e3 * float(np.median(taken)), "ms_max": 1e3 * max(taken), "prepared_once_s": prepared_s,
-            "size": list(recipe.size),
+        Figure(name, 1 / float(np.median(drag.frames_s)), _SPEED, {
+            "ms_p50": 1e3 * float(np.median(drag.frames_s)), "ms_max": 1e3 * max(drag.frames_s),
+            "over_embreex": float(np.median(drag.frames_s)) / embreex_s, "error_before_rest": drag.error,
+            "prepared_once_s": drag.prepared_s, "size": list(recipe.size),
         })
-        for name, (taken, prepared_s) in zip(_NAMES, found, strict=True)
+        for name, drag in zip(_NAMES, found, strict=True)
     ]  # fmt: skip
 
 
-def _frames_s(transfer: Transfer, picture: Picture, lamps: Sequence[dict[str, Any]]) -> tuple[list[float], float]:
-    """Seconds of each frame of a drag, and of what is made once for it: rows on touch, the lamp's image when dimmed.
+class _Drag(NamedTuple):
+    """frames_s: seconds of each frame. prepared_s: of what is made once for it: rows on touch, the lamp's image when
+    dimmed. error: of the last frame, relative RMSE against the exact picture."""
 
-    The first two frames are left out: one is at rest, the other asks for that image, and compiles.
-    """
-    taken, prepared_s = [], 0.0
+    frames_s: list[float]
+    prepared_s: float
+    error: float
+
+
+def _dragged(transfer: Transfer, picture: Picture, lamps: Sequence[dict[str, Any]]) -> _Drag:
+    """The first two frames are left out: one is at rest, the other asks for that image, and compiles."""
+    frames_s, prepared_s = [], 0.0
     for k, lamp in enumerate(lamps):
         document = copy.deepcopy(transfer.default_look)
         document["lights"]["Lamp"] = lamp
@@ -68,10 +83,24 @@ def _frames_s(transfer: Transfer, picture: Picture, lamps: Sequence[dict[str, An
         began = time.perf_counter()
         picture.set_look(look)
         picture.encode(picture.advance(None).tiles, "rgb9e5")
-        taken.append(time.perf_counter() - began)
+        frames_s.append(time.perf_counter() - began)
         if k == 0:
             settle(picture)
             picture.touch("/lights/Lamp")
         if k <= 1:
             prepared_s += seconds(partial(settle, picture))
-    return taken[2:], prepared_s
+    followed = picture.image().astype(np.float64)
+    settle(picture)
+    exact = picture.image().astype(np.float64)
+    error = float(np.sqrt(np.mean((followed - exact) ** 2) / np.mean(exact**2)))
+    return _Drag(frames_s[2:], prepared_s, error)
+
+
+def _embreex_s(scene: Scene, size: tuple[int, int], position: Sequence[float]) -> float:
+    """Of a shadow ray from each view sample, in the order in which they are stored; the best of five."""
+    geometry = merge(scene)
+    samples = sample_view(scene, geometry, "front", size)
+    origins = np.ascontiguousarray(samples.surface.position[samples.material != BACKGROUND])
+    directions = (np.array(position, np.float32) - origins).astype(np.float32)
+    peer = embreex_scene(geometry)
+    return min(in_turn([lambda: peer.run(origins, directions, query="OCCLUDED")], 5)[0])

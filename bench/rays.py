@@ -38,7 +38,7 @@ def measure(tiny: bool) -> list[Figure]:
     directions = subdivide(scene.environment.radiance, num_lights).direction
     point, light = _active_rays(normals, directions)
     ray_origins, ray_directions = np.ascontiguousarray(origins[point]), np.ascontiguousarray(directions[light])
-    peer, hits = _embreex_scene(geometry), np.empty(len(point), np.int32)
+    peer, hits = embreex_scene(geometry), np.empty(len(point), np.int32)
 
     def piece(a: int, b: int) -> None:
         hits[a:b] = peer.run(ray_origins[a:b], ray_directions[a:b], query="OCCLUDED")
@@ -72,7 +72,8 @@ def _active_rays(normals: F32, directions: F32) -> tuple[NDArray[np.intp], NDArr
     return np.concatenate(points), np.concatenate(lights)
 
 
-def _embreex_scene(geometry: Geometry) -> Any:
+def embreex_scene(geometry: Geometry) -> Any:
+    """The same triangles for embreex."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
