@@ -164,8 +164,11 @@ def test_a_saved_look_survives_a_reload(editor: Editor) -> None:
 def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: Editor) -> None:
     editor.choose("Ball", 1)
     first = editor.slider(SIGMA).get_attribute("aria-valuenow")
+    pictures = editor.page.locator(".tile.step img")  # taken when the hand has rested a while
+    expect(pictures).to_have_count(1)
     editor.slider(SIGMA).press("End")
     editor.page.keyboard.press("+")
+    expect(pictures).to_have_count(2)
     section = editor.page.get_by_role("button", name="Environment", exact=True)
     section.click()
     url, pixels = editor.page.url, editor.pixels()
@@ -176,7 +179,7 @@ def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: E
     expect(editor.page.locator("[role=option][aria-selected=true]")).to_have_text("Ball")
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
     expect(section).to_have_attribute("aria-expanded", "false")
-    expect(editor.page.locator(".tile.step img")).to_have_count(2)
+    expect(pictures).to_have_count(2)
     editor.page.keyboard.press("Control+z")
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == first
     editor.page.keyboard.press("Control+Shift+z")
