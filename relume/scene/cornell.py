@@ -78,9 +78,13 @@ def _camera() -> Camera:
     return look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
 
 
-def sunny_sky(sun: F64 = SUN) -> Environment:
-    """A sun, soft as through haze, in a blue sky; nothing from below. sun: towards it. (3,)"""
-    towards = texel_directions(256, 512).astype(np.float64)
+def sunny_sky(sun: F64 = SUN, rows: int = 256) -> Environment:
+    """A sun, soft as through haze, in a blue sky; nothing from below.
+
+    Args:
+        sun: towards it. (3,). rows: of the map, which is twice as wide.
+    """
+    towards = texel_directions(rows, 2 * rows).astype(np.float64)
     cosine = towards @ (sun / np.linalg.norm(sun))
     edge = np.clip((cosine - np.cos(1.2 * SUN_RADIUS)) / (np.cos(0.8 * SUN_RADIUS) - np.cos(1.2 * SUN_RADIUS)), 0, 1)
     height = towards[..., 1:2]
