@@ -21,6 +21,14 @@ _NEAR, _DIRECTION, _FAR, _MASK = 3, 4, 8, 9
 _POINTS_A_RANGE = 4096
 
 
+@nb.njit(nogil=True, cache=True, inline="always")
+def shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface):  # type: ignore[no-untyped-def]
+    """Direction and end of the ray to a sample of a light (see `light_sample`), off whose surface it ends."""
+    # not normalised, but where it never ends: it ends at one
+    length, far = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
+    return length * dx + off_surface * nx, length * dy + off_surface * ny, length * dz + off_surface * nz, far
+
+
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
     occluded, scene, arguments, light, pattern, off_surface, points, normals, numbers, start, stop, bits
@@ -45,12 +53,11 @@ def _trace(  # type: ignore[no-untyped-def]
                 is_asked = k < width and above and weight > 0
                 valid[k] = -1 if is_asked else 0
                 active += 1 if is_asked else 0
-                # not normalised, but where it never ends: it ends at one
-                length, far = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
+                along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
                 ray[k], ray[16 + k], ray[32 + k] = x, y, z
-                ray[_DIRECTION * 16 + k] = length * dx + off_surface * nx
-                ray[(_DIRECTION + 1) * 16 + k] = length * dy + off_surface * ny
-                ray[(_DIRECTION + 2) * 16 + k] = length * dz + off_surface * nz
+                ray[_DIRECTION * 16 + k] = along_x
+                ray[(_DIRECTION + 1) * 16 + k] = along_y
+                ray[(_DIRECTION + 2) * 16 + k] = along_z
                 ray[_NEAR * 16 + k] = 0
                 ray[_FAR * 16 + k] = far
             if active == 0:

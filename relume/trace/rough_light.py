@@ -18,6 +18,7 @@ from relume.light.local import LocalLight, light_sample
 from relume.parallel import for_shares
 from relume.trace.embree import EmbreeScene, aligned, occluded16, packet_arguments
 from relume.trace.gather_rays import Pattern, shift_of
+from relume.trace.local_shadows import shadow_ray
 
 F32 = NDArray[np.float32]
 
@@ -106,12 +107,7 @@ def _aim(light, pattern, off_surface, points, normals, numbers, first, width, ra
             r = sample * BLOCK + k
             dx, dy, dz, distance, weight, nx, ny, nz = light_sample(light, pattern, sample, shift_u, shift_v, x, y, z)
             given[r] = weight * (dx * normals[p, 0] + dy * normals[p, 1] + dz * normals[p, 2])
-            # not normalised, but where it never ends: it ends at one
-            length, far = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
-            rays[r, 0] = length * dx + off_surface * nx
-            rays[r, 1] = length * dy + off_surface * ny
-            rays[r, 2] = length * dz + off_surface * nz
-            rays[r, 3] = far
+            rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3] = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
 
 
 @nb.njit(nogil=True, cache=True)
