@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { isFound } from "../src/library/library";
 import { placeOf, pointOf, rangeOf } from "../src/library/map";
 
 const POINTS = [
@@ -26,5 +27,14 @@ describe("the map of materials", () => {
   it("keeps places outside on the edge", () => {
     expect(pointOf({ x: -3, y: 0 }, RANGE).f0).toBeCloseTo(0.04);
     expect(pointOf({ x: 0, y: 9 }, RANGE).sigma).toBeCloseTo(0.5);
+  });
+});
+
+describe("the search in the library", () => {
+  const brass = { name: "alum-bronze", about: "alum-bronze. Cook–Torrance, Ngan 2005" };
+
+  it("finds by any part of the words, in any order, with a blank for a hyphen", () => {
+    for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(isFound(brass, typed)).toBe(true);
+    for (const typed of ["brass", "bronze 2006"]) expect(isFound(brass, typed)).toBe(false);
   });
 });

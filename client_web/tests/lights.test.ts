@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
 import { cameraOf, project, pushed, slid } from "../src/lights/camera";
 import { anglesOf, numbersOf } from "../src/lights/fields";
-import { completedLight, freeLightName, lightFor, withKind } from "../src/lights/kinds";
-import { acrossOf, aimed, anchorsOf, moved, outlineOf } from "../src/lights/shape";
+import { beside, completedLight, freeLightName, lightFor, withKind } from "../src/lights/kinds";
+import { acrossOf, aimed, anchorsOf, moved, outlineOf, placed } from "../src/lights/shape";
 import { add, cross, dot, length, subtract, unit } from "../src/lights/vector";
 import type { Light, Triple } from "../src/protocol";
 import { ENVIRONMENT, withAllLights, withOneLight } from "../src/state/solo";
@@ -42,17 +42,24 @@ describe("a point in the picture", () => {
 describe("handles", () => {
   test("a spot moves without turning, and turns without moving", () => {
     expect(anchorsOf(spot, camera)).toEqual({ at: [0, 2, 0], target: [0, 0, 0] });
-    expect(moved(spot, [1, 2.00001, 0], camera)).toEqual({ field: "position", value: [1, 2, 0] });
-    expect(aimed(spot, [1, 0, 0])).toEqual({ field: "direction", value: [1, -2, 0] });
+    expect(moved(spot, [1, 2.00001, 0], camera, false)).toEqual({ position: [1, 2, 0] });
+    expect(aimed(spot, [1, 0, 0])).toEqual({ direction: [1, -2, 0] });
     expect(aimed(spot, [0, 2, 0])).toBeNull();
+  });
+
+  test("a spot whose aim is locked goes on aiming at the same point", () => {
+    expect(moved(spot, [1, 1, 0], camera, true)).toEqual({ position: [1, 1, 0], direction: [-1, -1, 0] });
+    expect(placed(spot, [3, 0, 4], true)).toEqual({ position: [3, 0, 4], direction: [-3, 0, -4] });
+    expect(placed(spot, [0, 0, 0], true)).toBeNull(); // there it would aim nowhere
+    expect(placed({ ...spot, kind: "point" } as Light, [0, 0, 0], true)).toEqual({ position: [0, 0, 0] });
   });
 
   test("a sun's handle stands where its light comes from", () => {
     const at = anchorsOf(sun, camera);
     close(unit(subtract(at?.at as Triple, at?.target as Triple)), [0, 1, 0]);
     const to = add(at?.target as Triple, [3, 0, 0]);
-    expect(moved(sun, to, camera)).toEqual({ field: "direction", value: [-1, 0, 0] });
-    expect(moved(sun, at?.target as Triple, camera)).toBeNull();
+    expect(moved(sun, to, camera, true)).toEqual({ direction: [-1, 0, 0] });
+    expect(moved(sun, at?.target as Triple, camera, true)).toBeNull();
   });
 
   test("a rectangle's height lies in the plane of its direction and up, turned by its rotation", () => {
@@ -93,7 +100,15 @@ describe("a new light", () => {
   });
 
   test("has a name of its own", () => {
-    expect(freeLightName("spot", ["Spot", "Spot 2"])).toBe("Spot 3");
+    expect(freeLightName("Spot", [])).toBe("Spot");
+    expect(freeLightName("Spot", ["Spot", "Spot 2"])).toBe("Spot 3");
+    expect(freeLightName("Key 2", ["Key 2"])).toBe("Key 3");
+    expect(freeLightName("Key 2", ["Key", "Key 2", "Key 3"])).toBe("Key 4");
+  });
+
+  test("that is a copy stands beside what it copies and is the same otherwise", () => {
+    expect(beside(spot)).toEqual({ ...spot, position: [0.5, 2, 0] });
+    expect(beside(sun)).toEqual(sun);
   });
 
   test("keeps as another kind what both have", () => {

@@ -49,9 +49,14 @@ def ball_image(documents: Sequence[Mapping[str, Any]], size: int) -> F32:
     return np.asarray(picture.reshape(size, _FINER, size, _FINER, 3).mean(axis=(1, 3)), np.float32)
 
 
+def ball_pixels(documents: Sequence[Mapping[str, Any]]) -> NDArray[np.uint8]:
+    """A ball as displayed. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
+    return to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE), _EXPOSURE, "agx"))
+
+
 def ball_png(documents: Sequence[Mapping[str, Any]]) -> bytes:
-    """A tone-mapped PNG of a ball, 64 × 64."""
-    return png_bytes(to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE), _EXPOSURE, "agx")))
+    """The same as a PNG."""
+    return png_bytes(ball_pixels(documents))
 
 
 def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from functools import lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
@@ -11,7 +10,6 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.look.library import navigation_map, presets
-from relume.look.terms import complete_term
 from server.bodies import MapPoint, MaterialBody, MaterialMapBody
 from server.png import A_DAY, PngResponse
 
@@ -53,11 +51,10 @@ async def thumbnail(table: Part, material: Part) -> PngResponse:
     return PngResponse(png, headers=A_DAY)
 
 
-@lru_cache(maxsize=1024)
 def _thumbnail(identity: str) -> bytes:
-    from relume.transfer.ball import ball_png  # loads compiled kernels
+    from relume.transfer.balls import library_ball  # loads compiled kernels
 
-    preset = next((preset for preset in presets() if preset.id == identity), None)
-    if preset is None:
+    png = library_ball(identity)
+    if png is None:
         raise NotFoundError(f"the library has no material {identity[:80]!r}; GET /api/materials lists them")
-    return ball_png([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])
+    return png

@@ -167,3 +167,39 @@ def test_numbers_place_a_light_and_escape_leaves_them(editor: Editor) -> None:
 def test_every_control_of_a_light_has_a_name(editor: Editor) -> None:
     add_by_click(editor, "Panel")
     assert editor.page.evaluate(NAMELESS) == []
+
+
+def test_a_light_has_a_temperature_a_power_a_name_a_copy_and_an_aim_that_stays(editor: Editor) -> None:
+    page = editor.page
+    add_by_click(editor, "Spot")
+    white = editor.pixels()
+    temperature = editor.slider("Temperature")
+    temperature.press("Home")
+    warm = editor.pixels()
+    lit = np.abs(white - warm).max(axis=2) > 2
+    assert lit.mean() > 0.01
+    red, _, blue = (warm - white)[lit].mean(axis=0)
+    assert red > blue + 10
+
+    lumens, watts = (page.get_by_role("textbox", name=f"Power, {unit}", exact=True) for unit in ("lm", "W"))
+    before = float(lumens.input_value())
+    lumens.fill(str(before / 2))
+    lumens.press("Enter")
+    np.testing.assert_allclose(float(watts.input_value()) * 683, before / 2, rtol=5e-3)  # shown with three digits
+    assert editor.pixels()[lit].mean() < warm[lit].mean()
+
+    page.get_by_role("button", name="Spot: rename").click()
+    name = page.get_by_role("textbox", name="New name of Spot")
+    name.fill("Key")
+    name.press("Enter")
+    expect(page.locator(".light .name")).to_have_text("Key")
+    page.get_by_role("button", name="Duplicate this light").click()
+    expect(page.locator(".light .name")).to_have_text(["Key", "Key 2"])
+
+    page.get_by_role("checkbox", name="Keep the aim when it moves").check()
+    target = np.add(numbers(editor, "Position"), numbers(editor, "Direction"))
+    pull(editor, page.get_by_role("button", name=re.compile("^Key 2, at")), 40, -10)
+    np.testing.assert_allclose(np.add(numbers(editor, "Position"), numbers(editor, "Direction")), target, atol=2e-3)
+    for _ in range(3):  # the move, the copy, the name
+        page.keyboard.press("Control+z")
+    expect(page.locator(".light .name")).to_have_text("Spot")

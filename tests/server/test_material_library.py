@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from relume.look.library import presets
+from relume.transfer.balls import library_ball, render
 
 
 def test_thumbnail_shows_a_ball(client: TestClient) -> None:
@@ -18,6 +19,17 @@ def test_thumbnail_shows_a_ball(client: TestClient) -> None:
     assert ball.shape == (64, 64, 3)
     assert ball[16:48, 16:48].std() > 3 * max(1, ball[:3].std())
     assert client.get("/api/materials/low_cooktorrance_E2/nothing/thumbnail.png").status_code == 404
+
+
+def test_thumbnails_made_ahead_are_those_of_the_materials_as_they_are_rendered_now() -> None:
+    """Of the first material of each model and of the last: fits or lighting that change make all of them due again."""
+    by_model = {preset.model: preset for preset in reversed(presets())}
+    for preset in (*by_model.values(), presets()[-1]):
+        png = library_ball(preset.id)
+        assert png is not None
+        ahead = np.asarray(Image.open(io.BytesIO(png)), int)
+        difference = np.abs(ahead - render(preset).astype(int))
+        assert difference.mean() < 2, preset.id  # what lossy packing changes, of 255
 
 
 def test_point_of_the_map_between_materials_is_a_material(client: TestClient) -> None:

@@ -13,6 +13,7 @@ import {
   MEASURED,
   model,
   putOnSelected,
+  query,
   sending,
   shown,
 } from "./library";
@@ -78,9 +79,24 @@ export function LibraryPanel() {
           : `A click puts it on ${selectedMaterial.value}; drag onto any object.`}
       </p>
       <NavigationMap />
+      <input
+        class="library-search"
+        type="search"
+        placeholder="Search"
+        aria-label="Search the library"
+        maxLength={80}
+        value={query.value}
+        onInput={(event) => (query.value = event.currentTarget.value)}
+        onKeyDown={(event) => event.stopPropagation()}
+      />
       <Filters />
       <ImportMeasured />
-      {shown.value.length === 0 && model.value === MEASURED && (
+      {shown.value.length === 0 && query.value !== "" && (
+        <p class="library-help" role="status">
+          Nothing here is called “{query.value}”.
+        </p>
+      )}
+      {shown.value.length === 0 && query.value === "" && model.value === MEASURED && (
         <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>
       )}
       <ul class="library-balls">

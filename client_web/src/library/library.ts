@@ -29,6 +29,8 @@ interface Entry {
 export const libraryOpen = signal(false);
 export const library = signal<MaterialBody[]>([]);
 const measured = signal<MeasuredBody[]>([]);
+/** What was typed to find a material: all of its words are in what an entry is called, or in where it is from. */
+export const query = signal("");
 export const group = signal("all");
 export const model = signal("cook_torrance");
 /** Share of a measurement that has been sent; null while none is on its way. */
@@ -50,11 +52,15 @@ function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): Entry {
 const entries = computed<Entry[]>(() => [...library.value.map(fittedEntry), ...measured.value.map(measuredEntry)]);
 
 /** One entry a material and source, of the model and group that are chosen. */
-export const shown = computed<Entry[]>(() =>
-  entries.value.filter(
-    (entry) => entry.model === model.value && (model.value === MEASURED || group.value === "all" || entry.group === group.value),
-  ),
-);
+export const shown = computed<Entry[]>(() => {
+  const isOfGroup = (entry: Entry) => model.value === MEASURED || group.value === "all" || entry.group === group.value;
+  return entries.value.filter((entry) => entry.model === model.value && isOfGroup(entry) && isFound(entry, query.value));
+});
+
+export function isFound({ name, about }: Pick<Entry, "name" | "about">, typed: string): boolean {
+  const text = `${name} ${about}`.toLowerCase().replaceAll("-", " ");
+  return typed.toLowerCase().replaceAll("-", " ").split(/\s+/).every((word) => text.includes(word));
+}
 
 export async function openLibrary(): Promise<void> {
   libraryOpen.value = !libraryOpen.value;

@@ -7,10 +7,11 @@ import { shownWidth, toScreen } from "../picture/transform";
 import type { Light, Rgb, Triple } from "../protocol";
 import { hold } from "../state/live";
 import { selectLight } from "../state/select";
+import { aimLocked } from "../state/panels";
 import { drawn, handlesOpen, selectedLight, views } from "../state/store";
 import { formatNumber } from "../ui/scale";
 import { cameraOf, project, pushed, slid, type Camera } from "./camera";
-import { editLight, lightPath, lights, removeLight } from "./lights";
+import { changeLight, lightPath, lights, removeLight } from "./lights";
 import { aimed, anchorsOf, moved, outlineOf, type Change } from "./shape";
 
 /** How a point of the world lies on a canvas, and how the canvas pulls at it. */
@@ -70,7 +71,7 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
   if (place === null) return null;
   const go = (to: Triple) => {
     const found = change(to);
-    if (found !== null) editLight(deed, name, found.field, found.value);
+    if (found !== null) changeLight(deed, name, found);
   };
   const take = () => {
     selectLight(name);
@@ -147,7 +148,7 @@ export function LightHandles({ screen }: { screen: Screen }) {
         if (anchors === null) return null;
         const common = { ground, name, light };
         return [
-          <Handle key={name} {...common} at={anchors.at} deed="Move" change={(to) => moved(light, to, camera)} />,
+          <Handle key={name} {...common} at={anchors.at} deed="Move" change={(to) => moved(light, to, camera, aimLocked.value)} />,
           name === selected && anchors.target !== null && light.kind !== "directional" && (
             <Handle
               key={`aim ${name}`}

@@ -1,15 +1,18 @@
 /** The selected light: its kind, how strong it is, and where it is. */
-import { ColorField } from "../inspector/ColorField";
-import type { Light } from "../protocol";
+import type { Light, Triple } from "../protocol";
 import { edit } from "../state/edit";
 import { hold } from "../state/live";
+import { aimLocked } from "../state/panels";
 import { defaultLook } from "../state/store";
 import { IconButton } from "../ui/Button";
+import { EditableName } from "../ui/EditableName";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { NumberField } from "../ui/NumberField";
+import { Emission } from "./Emission";
 import { anglesOf, numbersOf, type AngleField, type NumbersField } from "./fields";
-import { completedLight, KINDS, labelOf, UNITS, withKind, type AddedKind } from "./kinds";
-import { editLight, isAdded, lightPath, removeLight } from "./lights";
+import { completedLight, KINDS, labelOf, MAX_LIGHT_NAME, withKind, type AddedKind } from "./kinds";
+import { changeLight, duplicateLight, editLight, isAdded, lightPath, removeLight, renameLight } from "./lights";
+import { placed } from "./shape";
 
 interface Shown {
   name: string;
@@ -20,7 +23,10 @@ function Numbers({ name, light, of }: Shown & { of: NumbersField }) {
   const { field, label, unit } = of;
   const values = (light as Partial<Record<NumbersField["field"], number[]>>)[field] ?? [];
   const put = (next: number[]) => {
-    if (of.allows?.(next) ?? true) editLight(of.deed, name, field, next);
+    if (field === "position") {
+      const change = placed(light, next as Triple, aimLocked.value);
+      if (change !== null) changeLight(of.deed, name, change);
+    } else if (of.allows?.(next) ?? true) editLight(of.deed, name, field, next);
   };
   return (
     <div class="numbers" role="group" aria-label={label} style={{ "--count": of.names.length }}>
@@ -81,12 +87,40 @@ function Kind({ name, light }: Shown) {
   );
 }
 
+function AimLock() {
+  return (
+    <label class="aim-lock" title="While it is moved, it goes on aiming at the same point">
+      <input
+        type="checkbox"
+        checked={aimLocked.value}
+        onChange={(event) => (aimLocked.value = event.currentTarget.checked)}
+      />
+      Keep the aim when it moves
+    </label>
+  );
+}
+
 export function LightInspector({ name, light }: Shown) {
   const initial = defaultLook.value?.lights[name];
   return (
     <aside class="panel inspector" aria-label="Inspector">
       <header class="panel-head">
-        <h2 class="spacer">{name}</h2>
+        <h2 class="spacer">
+          {isAdded(name) ? (
+            <EditableName
+              key={name}
+              class="light-name"
+              name={name}
+              maximum={MAX_LIGHT_NAME}
+              onRename={(next) => renameLight(name, next)}
+            />
+          ) : (
+            name
+          )}
+        </h2>
+        {light.kind !== "mesh" && (
+          <IconButton icon="copy" label="Duplicate this light" onClick={() => duplicateLight(name)} />
+        )}
         {isAdded(name) ? (
           <IconButton icon="trash" label="Remove this light" keys="Delete" onClick={() => removeLight(name)} />
         ) : (
@@ -100,16 +134,8 @@ export function LightInspector({ name, light }: Shown) {
       </header>
       <section class="card light-card" aria-label={labelOf(light.kind)}>
         <Kind name={name} light={light} />
-        <span class="param-label">
-          Emission <small>{UNITS[light.kind]}</small>
-        </span>
-        <ColorField
-          label="Emission"
-          quantity
-          value={light.emission}
-          initial={initial?.emission ?? null}
-          onChange={(value) => editLight("Emission", name, "emission", value)}
-        />
+        <Emission name={name} light={light} />
+        {"position" in light && "direction" in light && <AimLock />}
         {numbersOf(light).map((of) => (
           <Numbers key={of.label} name={name} light={light} of={of} />
         ))}

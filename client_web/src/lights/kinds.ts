@@ -1,6 +1,6 @@
 /** The kinds of light: their words, and a new light of each. */
 import type { Light, LightKind, Rgb, Triple } from "../protocol";
-import { add, scaled, subtract, tidy } from "./vector";
+import { add, length, scaled, subtract, tidy } from "./vector";
 
 export const MAX_LIGHTS = 64;
 
@@ -76,13 +76,24 @@ export function lightFor(kind: AddedKind, { position, normal, distance, radiance
   }
 }
 
-/** The first of "Spot", "Spot 2", … that is free. */
-export function freeLightName(kind: AddedKind, taken: readonly string[]): string {
-  const label = labelOf(kind);
-  if (!taken.includes(label)) return label;
+export const MAX_LIGHT_NAME = 80;
+
+/** The first of "Spot", "Spot 2", … that is free; after "Key 2" comes "Key 3". */
+export function freeLightName(like: string, taken: readonly string[]): string {
+  if (!taken.includes(like)) return like;
+  const stem = like.replace(/ \d+$/, "").slice(0, MAX_LIGHT_NAME - 4);
   let n = 2;
-  while (taken.includes(`${label} ${n}`)) n += 1;
-  return `${label} ${n}`;
+  while (taken.includes(`${stem} ${n}`)) n += 1;
+  return `${stem} ${n}`;
+}
+
+const BESIDE = 0.25;
+
+/** A copy of a light, beside it where it has a place, so that their handles can be told apart. */
+export function beside(light: Light): Light {
+  if (!("position" in light)) return { ...light };
+  const reach = "direction" in light ? length(light.direction) : 1;
+  return { ...light, position: tidy(add(light.position, [BESIDE * Math.max(reach, 0.1), 0, 0])) };
 }
 
 const DEFAULTS: { [K in LightKind]: Partial<Extract<Light, { kind: K }>> } = {

@@ -1,9 +1,12 @@
 /** The lights of the look: which is selected, and changing, adding and removing them. */
 import { batch, computed } from "@preact/signals";
-import type { Light } from "../protocol";
-import { edit } from "../state/edit";
+import type { Light, Look, Triple } from "../protocol";
+import { commit, edit } from "../state/edit";
 import { pointer } from "../state/pointer";
-import { defaultLook, look, selectedLight } from "../state/store";
+import { defaultLook, look, selectedLight, soloLight } from "../state/store";
+import { note } from "../ui/toasts";
+import { beside, freeLightName, MAX_LIGHTS } from "./kinds";
+import type { Change } from "./shape";
 
 export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
 export const lightNames = computed(() => Object.keys(lights.value));
@@ -29,6 +32,36 @@ export function addLight(name: string, light: Light): void {
   batch(() => {
     edit("Add", lightPath(name), light);
     selectedLight.value = name;
+  });
+}
+
+/** Change fields of a light that belong together. */
+export function changeLight(deed: string, name: string, change: Change): void {
+  const light = lights.peek()[name];
+  const fields = Object.entries(change);
+  if (light === undefined || fields.length === 0) return;
+  if (fields.length === 1) editLight(deed, name, ...(fields[0] as [string, Triple]));
+  else edit(deed, lightPath(name), { ...light, ...change });
+}
+
+/** Another light like this one, beside it. */
+export function duplicateLight(name: string): void {
+  const light = lights.peek()[name];
+  if (light === undefined || light.kind === "mesh") return;
+  if (lightNames.peek().length >= MAX_LIGHTS) note(`A scene has at most ${MAX_LIGHTS} lights; remove one first.`);
+  else addLight(freeLightName(name, lightNames.peek()), beside(light));
+}
+
+/** Give a light that was added here another name; it stays where it is in the list. */
+export function renameLight(name: string, to: string): void {
+  const current = look.peek();
+  if (current === null || !isAdded(name) || to === name) return;
+  if (current.lights[to] !== undefined) return note(`There is a light “${to}” already; take another name.`);
+  const renamed = Object.entries(current.lights).map(([each, light]) => [each === name ? to : each, light]);
+  batch(() => {
+    commit(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
+    if (selectedLight.peek() === name) selectedLight.value = to;
+    if (soloLight.peek() === name) soloLight.value = to;
   });
 }
 

@@ -8,7 +8,7 @@ import { askProbe } from "../state/live";
 import { views } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { cameraOf } from "./camera";
-import { freeLightName, lightFor, MAX_LIGHTS, type AddedKind } from "./kinds";
+import { freeLightName, labelOf, lightFor, MAX_LIGHTS, type AddedKind } from "./kinds";
 import { addLight, lightNames } from "./lights";
 import { length, subtract } from "./vector";
 
@@ -43,7 +43,7 @@ function put(kind: AddedKind, view: string, found: ProbeAnswer): void {
   const distance = length(subtract(position, cameraOf(info).eye));
   const radiance = meanRadiance(stage.of(view));
   stopAdding();
-  addLight(freeLightName(kind, lightNames.peek()), lightFor(kind, { position, normal, distance, radiance }));
+  addLight(freeLightName(labelOf(kind), lightNames.peek()), lightFor(kind, { position, normal, distance, radiance }));
 }
 
 /** Put the light where this pixel of a view is. */

@@ -35,24 +35,34 @@ export function anchorsOf(light: Light, camera: Camera): Anchors | null {
   }
 }
 
+/** Fields of a light that change together. */
 export interface Change {
-  field: "position" | "direction";
-  value: Triple;
+  position?: Triple;
+  direction?: Triple;
 }
 
-/** What moving a light to a point changes; null where that would leave it without a direction. */
-export function moved(light: Light, to: Triple, camera: Camera): Change | null {
-  if (light.kind === "mesh") return null;
-  if (light.kind !== "directional") return { field: "position", value: tidy(to) };
+/** What moving a light to a place changes: where it is, and with a locked aim the way it points, so that it goes on
+ * aiming at the same point. Null where that would leave it without a direction. */
+export function placed(light: Light, to: Triple, aimLocked: boolean): Change | null {
+  if (light.kind === "mesh" || light.kind === "directional") return null;
+  const position = tidy(to);
+  if (light.kind === "point" || !aimLocked) return { position };
+  const direction = subtract(add(light.position, light.direction), position);
+  return length(direction) < SHORTEST ? null : { position, direction: tidy(direction) };
+}
+
+/** What pulling a light's handle to a point changes. */
+export function moved(light: Light, to: Triple, camera: Camera, aimLocked: boolean): Change | null {
+  if (light.kind !== "directional") return placed(light, to, aimLocked);
   const direction = subtract(pivotOf(camera).middle, to);
-  return length(direction) < SHORTEST ? null : { field: "direction", value: tidy(unit(direction)) };
+  return length(direction) < SHORTEST ? null : { direction: tidy(unit(direction)) };
 }
 
 /** What aiming a light at a point changes. */
 export function aimed(light: Light, target: Triple): Change | null {
   if (light.kind !== "spot" && light.kind !== "rectangle") return null;
   const direction = subtract(target, light.position);
-  return length(direction) < SHORTEST ? null : { field: "direction", value: tidy(direction) };
+  return length(direction) < SHORTEST ? null : { direction: tidy(direction) };
 }
 
 /** Two unit vectors across a direction: the first along a rectangle's width, the second along its height. */

@@ -1,12 +1,13 @@
 /** Saved looks, and the steps of this visit: click one to return to it. */
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
 import { defaultLook, history, look, scene } from "../state/store";
 import { goTo } from "../state/undo";
 import { IconButton } from "../ui/Button";
+import { EditableName } from "../ui/EditableName";
 import { Icon } from "../ui/Icon";
-import { completed, markLook, saveLook, sideA } from "./compare";
+import { completed, justSaved, markLook, saveLook, sideA } from "./compare";
 import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
 import { historyThumbnail, thumbnailsMade } from "./strip";
 
@@ -14,33 +15,16 @@ const MAX_STEPS = 40;
 const MAX_NAME = 80;
 
 function Name({ saved }: { saved: SavedLook }) {
-  const [editing, setEditing] = useState(false);
-  if (!editing) {
-    return (
-      <button class="tile-name" title="Rename" onClick={() => setEditing(true)}>
-        {saved.name}
-      </button>
-    );
-  }
-  const take = (text: string) => {
-    setEditing(false);
-    const name = text.trim().replace(/[/\\]/g, "-").slice(0, MAX_NAME);
-    if (name !== "" && name !== saved.name) void renameLook(saved, name);
-  };
+  const isNew = justSaved.value === saved.name;
   return (
-    <input
+    <EditableName
+      key={saved.name}
       class="tile-name"
-      aria-label={`New name of ${saved.name}`}
-      maxLength={MAX_NAME}
-      defaultValue={saved.name}
-      ref={(input) => input?.focus()}
-      onFocus={(event) => event.currentTarget.select()}
-      onBlur={(event) => take(event.currentTarget.value)}
-      onKeyDown={(event) => {
-        event.stopPropagation();
-        if (event.key === "Enter") event.currentTarget.blur();
-        if (event.key === "Escape") setEditing(false);
-      }}
+      name={saved.name}
+      maximum={MAX_NAME}
+      editing={isNew}
+      onRename={(name) => void renameLook(saved, name.replace(/[/\\]/g, "-"))}
+      onDone={() => isNew && (justSaved.value = null)}
     />
   );
 }

@@ -5,6 +5,7 @@ import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
 import { commit } from "../state/edit";
 import { withPicturesOf } from "../state/live";
+import { filmstripOpen } from "../state/panels";
 import { connection, defaultLook, exact, held, look, scene, showBefore, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
@@ -13,6 +14,9 @@ import { addLook, keepThumbnail, shelf } from "./shelf";
 
 /** The look whose picture is kept as A, and what it is called. */
 export const sideA = signal<{ look: Look; label: string } | null>(null);
+
+/** The look that was saved last, while its name waits to be typed over. */
+export const justSaved = signal<string | null>(null);
 
 /** Missing parts of a saved look are the scene's own. */
 export function completed(partial: Partial<Look>): Look {
@@ -64,6 +68,8 @@ export async function saveLook(): Promise<void> {
   if (current === null) return;
   const name = freeName(shelf.value.map((entry) => entry.name));
   keepThumbnail(name, thumbnail(stage.active.pixels, current.display));
+  filmstripOpen.value = true;
+  justSaved.value = name;
   await addLook(name, current);
 }
 

@@ -6,6 +6,8 @@ export const inspectorOpen = signal(true);
 export const filmstripOpen = signal(true);
 export const inspectorWidth = signal(320);
 export const histogramOpen = signal(false);
+/** Spots and panels go on aiming at the same point while they are moved. */
+export const aimLocked = signal(false);
 /** Titles of the outline's sections that are folded away. */
 export const folded = signal<readonly string[]>([]);
 
@@ -20,6 +22,7 @@ const KEPT: Record<string, Signal<unknown>> = {
   filmstripOpen,
   inspectorWidth,
   histogramOpen,
+  aimLocked,
   folded,
 };
 const KEY = "relume.panels";

@@ -1,0 +1,72 @@
+import { describe, expect, test } from "vitest";
+import { emissionOf, LUMENS_A_WATT, measureOf, wattsOf } from "../src/lights/power";
+import { atKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/lights/temperature";
+import { luminance } from "../src/picture/tonemap";
+import type { Light } from "../src/protocol";
+
+const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] } as const;
+const light = (fields: object) => ({ ...common, ...fields }) as unknown as Light;
+
+/** Power of a spot by adding up directions, with the falloff that pictures have. */
+function addedUp([full, edge]: [number, number], steps = 20_000): number {
+  const [cosFull, cosEdge] = [full, edge].map((angle) => Math.cos((angle * Math.PI) / 180)) as [number, number];
+  let sum = 0;
+  for (let k = 0; k < steps; k += 1) {
+    const cos = -1 + (2 * (k + 0.5)) / steps;
+    const ramp = Math.min(1, Math.max(0, (cos - cosEdge) / (cosFull - cosEdge)));
+    sum += ramp * ramp;
+  }
+  return (4 * Math.PI * sum) / steps;
+}
+
+describe("the power of a light", () => {
+  test("is what it sends into all directions", () => {
+    expect(wattsOf(light({ kind: "point" }))).toBeCloseTo(4 * Math.PI, 6);
+    expect(wattsOf(light({ kind: "rectangle", size: [2, 0.5] }))).toBeCloseTo(Math.PI, 6);
+    for (const cone of [[20, 30], [0, 90], [5, 60]] as [number, number][])
+      expect(wattsOf(light({ kind: "spot", cone }))).toBeCloseTo(addedUp(cone), 2);
+  });
+
+  test("counts intensity and tint, and luminance alone", () => {
+    expect(wattsOf(light({ kind: "directional", scale: 3, color: [0, 1, 0] }))).toBeCloseTo(3 * luminance([0, 1, 0]), 9);
+    expect(measureOf(light({ kind: "directional" })).lumens).toBe("lx");
+  });
+
+  test("a bulb of 806 lumens has them after they were typed", () => {
+    const bulb = light({ kind: "point", emission: [3, 2, 1], scale: 0.5 });
+    const emission = emissionOf(bulb, 806 / LUMENS_A_WATT);
+    expect(LUMENS_A_WATT * wattsOf({ ...bulb, emission } as Light)).toBeCloseTo(806, 2);
+    expect((emission?.[0] ?? 0) / (emission?.[2] ?? 1)).toBeCloseTo(3, 4); // the same colour
+  });
+
+  test("a dark light becomes white, one that is turned down to nothing stays as it is", () => {
+    expect(emissionOf(light({ kind: "directional", emission: [0, 0, 0] }), 2)).toEqual([2, 2, 2]);
+    expect(emissionOf(light({ kind: "point", scale: 0 }), 2)).toBeNull();
+  });
+});
+
+describe("the temperature of a light", () => {
+  test("has the chromaticities of the tables", () => {
+    // illuminant A, and the black body at 6,500 K
+    for (const [kelvin, x, y] of [[2856, 0.4476, 0.4074], [6500, 0.3135, 0.3237]] as const) {
+      const [u, v] = planckian(kelvin);
+      const scale = 2 * u - 8 * v + 4;
+      expect((3 * u) / scale).toBeCloseTo(x, 3);
+      expect((2 * v) / scale).toBeCloseTo(y, 3);
+    }
+  });
+
+  test("of white is that of daylight, and of a glowing body its own", () => {
+    expect(Math.abs(kelvinOf([1, 1, 1]).kelvin - 6500)).toBeLessThan(60);
+    for (const kelvin of [2000, 2700, 4000, 6500, 10_000, 14_000])
+      expect(Math.abs(kelvinOf(rgbOfKelvin(kelvin)).kelvin / kelvin - 1)).toBeLessThan(0.01);
+    expect(kelvinOf(rgbOfKelvin(3000)).coloured).toBe(false);
+    expect(kelvinOf([0, 1, 0]).coloured).toBe(true);
+  });
+
+  test("changes the colour of a light, not how bright it is", () => {
+    const warm = atKelvin([5, 5, 5], 2700);
+    expect(luminance(warm)).toBeCloseTo(5, 4);
+    expect(warm[0]).toBeGreaterThan(2 * warm[2]);
+  });
+});
