@@ -1,6 +1,6 @@
 """Principal components of the curves that one parameter generates: a few vectors in the place of all bands.
 
-Nguyen, Kyung and Yoon 2010, section 4:
+Nguyen, Kyung, Lee and Nam 2010, section 4:
 
     f(γ; p) ≈ b_0(γ) + Σ_k c_k(p) b_k(γ)    (10)
 

@@ -107,8 +107,6 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
 def test_failure_is_one_line_on_stderr(
     data: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
 ) -> None:
-    if arguments[0] == "reference":
-        pytest.importorskip("relume.reference", reason="relume.reference is not there yet")
     assert main(arguments) != 0
     out, err = capsys.readouterr()
     assert out == ""
@@ -155,7 +153,6 @@ def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.Captur
 def test_look_that_is_no_object_is_refused(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
 ) -> None:
-    pytest.importorskip("relume.transfer.render", reason="relume.transfer.render is not there yet")
     (tmp_path / "look.json").write_text(text)
     output = tmp_path / "x.png"
     assert main(["render", "quad", "--look", str(tmp_path / "look.json"), "--output", str(output)]) == 1
@@ -164,7 +161,6 @@ def test_look_that_is_no_object_is_refused(
 
 
 def test_render_writes_the_picture_that_the_light_says(data: Path, tmp_path: Path) -> None:
-    pytest.importorskip("relume.transfer.render", reason="relume.transfer.render is not there yet")
     import OpenImageIO
 
     assert main(["bake", "quad", "--view", "front", *TINY]) == 0
