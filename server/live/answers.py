@@ -27,6 +27,10 @@ class Answers:
         self.touched: str | None = None
         self._curve_sent_for: dict[str, Any] | None = None
 
+    def touch(self, pointer: str) -> None:
+        """Take note of the curve that the user has opened. It is sent anew: who closes a curve forgets it."""
+        self.touched, self._curve_sent_for = pointer, None
+
     async def send_curve(self, target: Target) -> None:
         """The touched curve in this look, where its term has changed since it was last sent."""
         if self.touched is None:

@@ -137,7 +137,7 @@ class FrameLoop:
     async def _touch(self, pointer: str) -> None:
         """Prepare the curve that the user opened, in the newest look there is."""
         target = self._wishes.target
-        self._answers.touched = pointer
+        self._answers.touch(pointer)
         await self._answers.send_curve(target)
         if self._answers.touched is not None and not await self._prepare(pointer):
             self._answers.touched = None

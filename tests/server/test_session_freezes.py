@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import Control
-from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, open_session
+from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, open_session
 
 
 def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
@@ -42,6 +42,22 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
             pass
         session.edit(1, SIGMA, 0.4)
         assert session.text("curve")["curve"] == THETA_H
+
+
+def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: Baked, control: Control) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        control.may_freeze.set()
+        session.send(type="touch", curve=THETA_H)
+        first = session.text("curve")
+        session.send(type="touch", parameter=IOR)
+        session.send(type="touch", curve=THETA_H)
+        session.edit(1, "/environment/scale", 2.0)
+        got = []
+        while not isinstance(message := session.receive(), Frame) or message.header["revision"] < 1:
+            got.append(message)
+        (second,) = [each for each in got if isinstance(each, dict) and each["type"] == "curve"]
+        assert second["bands"] == first["bands"]
 
 
 def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control: Control) -> None:
