@@ -1,6 +1,7 @@
 /** Pointer and keys in the plot: where they are, what they take hold of, which gesture is under way. */
 import { useRef, useState } from "preact/hooks";
 import { history } from "../state/store";
+import { useDrag } from "../ui/drag";
 import { niceTop, type Axes } from "./axes";
 import { brush, clearBrush } from "./brush";
 import { channelsOf } from "./channels";
@@ -53,7 +54,7 @@ export function stretchKey(event: KeyboardEvent, hand: Hand): void {
   event.stopPropagation();
 }
 
-function begin(hand: Hand, frame: Frame, spot: Spot): Gesture {
+function gestureAt(hand: Hand, frame: Frame, spot: Spot): Gesture {
   if (tool.value === "draw") return drawGesture(hand, spot);
   if (tool.value === "stretch") return stretchGesture(hand, spot);
   return pointsGesture(hand, spot, hitPoint(frame, hand, spot));
@@ -73,32 +74,32 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
   const hand: Hand = { model, axes, channels: channelsOf(active.value) };
   const pointsBlocked = tool.value === "points" && active.value === "rgb" && !model.together;
 
-  const down = (event: PointerEvent) => {
-    if (event.button !== 0 || !ready || pointsBlocked) return;
+  const begin = (event: PointerEvent) => {
+    if (event.button !== 0 || !ready || pointsBlocked) return false;
     const svg = event.currentTarget as SVGSVGElement;
-    svg.setPointerCapture(event.pointerId);
     clearBrush();
     history.seal();
     setHeld(axes);
-    gesture.current = begin(hand, frame, spotOf(frame, svg, event));
+    gesture.current = gestureAt(hand, frame, spotOf(frame, svg, event));
     event.preventDefault();
+    return true;
   };
   const move = (event: PointerEvent) => {
     const svg = event.currentTarget as SVGSVGElement;
-    const here = spotOf(frame, svg, event);
+    setSpot(spotOf(frame, svg, event));
+    const events = tool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
+    for (const each of events?.length ? events : [event]) gesture.current?.move(spotOf(frame, svg, each));
+  };
+  const hover = (event: PointerEvent) => {
+    const here = spotOf(frame, event.currentTarget as SVGSVGElement, event);
     setSpot(here);
-    if (gesture.current !== null) {
-      const events = tool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
-      for (const each of events?.length ? events : [event]) gesture.current.move(spotOf(frame, svg, each));
-      return;
-    }
     const half = Math.max(MIN_BRUSH_DEGREES, 90 / model.info.bands, here.degrees * 0.06);
     const chosen = tool.value === "stretch" ? selection.value : null;
     brush(...(chosen ?? [here.degrees - half, here.degrees + half]));
   };
-  const up = (event: PointerEvent) => {
+  const end = (event: PointerEvent, released: boolean) => {
     const svg = event.currentTarget as SVGSVGElement;
-    gesture.current?.up(spotOf(frame, svg, event));
+    if (released) gesture.current?.up(spotOf(frame, svg, event));
     gesture.current = null;
     setHeld(null);
     // the keys go on where the hand let go
@@ -116,6 +117,6 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
     spot,
     pointsBlocked,
     dragging: gesture.current !== null,
-    handlers: { onPointerDown: down, onPointerMove: move, onPointerUp: up, onPointerCancel: up, onPointerLeave: leave },
+    handlers: { ...useDrag({ begin, move, hover, end }), onPointerLeave: leave },
   };
 }

@@ -5,6 +5,7 @@ import type { MaterialMapBody } from "../protocol";
 import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
 import { selectedMaterial } from "../state/store";
+import { useDrag } from "../ui/drag";
 import { attempt, note } from "../ui/toasts";
 import { library } from "./library";
 import { placeOf, pointOf, rangeOf, type Place } from "./map";
@@ -55,7 +56,6 @@ function Plane({ map, range }: { map: MaterialMapBody; range: ReturnType<typeof 
 export function NavigationMap() {
   const [map, setMap] = useState<MaterialMapBody | null>(null);
   const [place, setPlace] = useState<Place>({ x: 0.5, y: 0.5 });
-  const isDown = useRef(false);
   useEffect(() => void attempt(async () => setMap(await getMaterialMap())), []);
   const range = map === null ? null : rangeOf(map.points);
   const choose = useChoice(range);
@@ -64,10 +64,18 @@ export function NavigationMap() {
     setPlace(next);
     void choose(next);
   };
-  const point = (event: PointerEvent) => {
-    const box = (event.currentTarget as Element).getBoundingClientRect();
+  const point = (event: PointerEvent & { currentTarget: Element }) => {
+    const box = event.currentTarget.getBoundingClientRect();
     go((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
   };
+  const hand = useDrag({
+    begin(event) {
+      if (event.button !== 0) return false;
+      point(event);
+      return true;
+    },
+    move: point,
+  });
   const key = (event: KeyboardEvent) => {
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (step === undefined) return;
@@ -87,13 +95,7 @@ export function NavigationMap() {
         role="application"
         aria-label={`Map of materials; arrow keys move the point. Now ${words}`}
         onKeyDown={key}
-        onPointerDown={(event) => {
-          event.currentTarget.setPointerCapture(event.pointerId);
-          isDown.current = true;
-          point(event);
-        }}
-        onPointerMove={(event) => isDown.current && point(event)}
-        onPointerUp={() => (isDown.current = false)}
+        {...hand}
       >
         <Plane map={map} range={range} />
         <circle class="here" cx={place.x * WIDTH} cy={place.y * HEIGHT} r={6} />

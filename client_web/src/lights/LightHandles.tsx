@@ -9,6 +9,7 @@ import { hold } from "../state/live";
 import { selectLight } from "../state/select";
 import { aimLocked } from "../state/panels";
 import { drawn, handlesOpen, selectedLight, views } from "../state/store";
+import { useDrag } from "../ui/drag";
 import { formatNumber } from "../ui/scale";
 import { cameraOf, project, pushed, slid, type Camera } from "./camera";
 import { changeLight, lightPath, lights, removeLight } from "./lights";
@@ -67,8 +68,6 @@ interface HandleProps {
 
 function Handle({ ground, name, light, at, deed, change }: HandleProps) {
   const drag = useRef({ x: 0, y: 0, at });
-  const place = ground.place(at);
-  if (place === null) return null;
   const go = (to: Triple) => {
     const found = change(to);
     if (found !== null) changeLight(deed, name, found);
@@ -77,19 +76,20 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
     selectLight(name);
     hold(lightPath(name));
   };
-  const down = (event: PointerEvent) => {
-    if (event.button !== 0) return;
-    (event.currentTarget as HTMLElement).setPointerCapture(event.pointerId);
-    drag.current = { x: event.clientX, y: event.clientY, at };
-    take();
-  };
-  const move = (event: PointerEvent) => {
-    if (!(event.currentTarget as HTMLElement).hasPointerCapture(event.pointerId)) return;
-    const { x, y, at: from } = drag.current;
-    const to = ground.pulled(from, event.clientX - x, event.clientY - y, event.shiftKey);
-    drag.current = { x: event.clientX, y: event.clientY, at: to };
-    go(to);
-  };
+  const hand = useDrag({
+    begin(event) {
+      if (event.button !== 0) return false;
+      drag.current = { x: event.clientX, y: event.clientY, at };
+      take();
+      return true;
+    },
+    move(event) {
+      const { x, y, at: from } = drag.current;
+      const to = ground.pulled(from, event.clientX - x, event.clientY - y, event.shiftKey);
+      drag.current = { x: event.clientX, y: event.clientY, at: to };
+      go(to);
+    },
+  });
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -99,6 +99,8 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
     event.preventDefault();
     event.stopPropagation();
   };
+  const place = ground.place(at);
+  if (place === null) return null;
   const lit = light.emission.map((value, channel) => value * (light.color[channel] as number)) as Rgb;
   const where = at.map(formatNumber).join(", ");
   return (
@@ -108,8 +110,7 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
       title={deed === "Move" ? name : `What ${name} aims at`}
       aria-roledescription="handle"
       aria-label={`${name}, ${deed === "Move" ? "at" : "aims at"} ${where}. Arrow keys move it, with Shift away and near.`}
-      onPointerDown={down}
-      onPointerMove={move}
+      {...hand}
       onFocus={take}
       onKeyDown={key}
     >

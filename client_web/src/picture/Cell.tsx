@@ -6,6 +6,7 @@ import { placeAt, placing } from "../lights/place";
 import { hoveredMaterial, pointedView, scene, sideBySide, viewName, wipe } from "../state/store";
 import { select } from "../state/select";
 import { showAlone, workIn } from "../state/views";
+import { useDrag } from "../ui/drag";
 import { showError } from "../ui/toasts";
 import { hitAt } from "./hit";
 import { leavePicture, probeAt } from "./probe";
@@ -81,30 +82,29 @@ function useScreen(view: string) {
 }
 
 function usePointer(screen: Screen | null, view: string) {
-  const drag = useRef({ x: 0, y: 0, moved: false, active: false });
-  const down = (event: PointerEvent) => {
-    if (event.button > 1) return;
-    (event.currentTarget as HTMLElement).setPointerCapture(event.pointerId);
-    drag.current = { x: event.clientX, y: event.clientY, moved: false, active: true };
+  const drag = useRef({ x: 0, y: 0, moved: false });
+  const begin = (event: PointerEvent) => {
+    drag.current = { x: event.clientX, y: event.clientY, moved: false };
+    return event.button <= 1;
   };
   const move = (event: PointerEvent) => {
     if (screen === null) return;
+    pointedView.value = view;
+    const { x, y, moved } = drag.current;
+    const [dx, dy] = [event.clientX - x, event.clientY - y];
+    if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
+    drag.current = { x: event.clientX, y: event.clientY, moved: true };
+    panBy(screen, dx, dy);
+  };
+  const hover = (event: PointerEvent) => {
+    if (screen === null) return;
     pointedView.value = view; // not when it enters: the view under a resting pointer may become another
-    const at = drag.current;
-    if (at.active) {
-      const [dx, dy] = [event.clientX - at.x, event.clientY - at.y];
-      if (!at.moved && Math.hypot(dx, dy) < CLICK_PX) return;
-      drag.current = { x: event.clientX, y: event.clientY, moved: true, active: true };
-      return panBy(screen, dx, dy);
-    }
     const { px, py, material } = hitAt(screen, event);
     probeAt(screen.picture, px, py);
     hoveredMaterial.value = material;
   };
-  const up = (event: PointerEvent) => {
-    const { moved, active } = drag.current;
-    drag.current.active = false;
-    if (screen === null || !active || moved || event.button !== 0) return;
+  const end = (event: PointerEvent, released: boolean) => {
+    if (screen === null || !released || drag.current.moved || event.button !== 0) return;
     const { px, py, material } = hitAt(screen, event);
     if (placing.peek() !== null) void placeAt(view, px, py);
     else if (material !== null) select(material);
@@ -113,7 +113,7 @@ function usePointer(screen: Screen | null, view: string) {
     pointedView.value = hoveredMaterial.value = null;
     leavePicture();
   };
-  return { onPointerDown: down, onPointerMove: move, onPointerUp: up, onPointerLeave: leave };
+  return { ...useDrag({ begin, move, hover, end }), onPointerLeave: leave };
 }
 
 function onKey(screen: Screen, event: KeyboardEvent): void {

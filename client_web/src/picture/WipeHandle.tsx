@@ -1,5 +1,7 @@
-/** The line between A (left) and the live picture (right): drag it, or move it by keys. */
+/** The line between A (left) and B, the live picture (right): drag it, or move it by keys. */
+import { useRef } from "preact/hooks";
 import { drawn, wipe } from "../state/store";
+import { useDrag } from "../ui/drag";
 import type { Screen } from "./screen";
 import { shownWidth, toScreen } from "./transform";
 import { transformOf } from "./places";
@@ -16,11 +18,18 @@ export function WipeHandle({ screen }: { screen: Screen }) {
   const { at } = wipe.value;
   const transform = transformOf(screen.picture.view);
   const [x] = toScreen(transform, size, at, 0);
-  const move = (event: PointerEvent) => {
-    const element = event.currentTarget as HTMLElement;
-    if (!element.hasPointerCapture(event.pointerId)) return;
-    moveTo(wipe.peek().at + event.movementX / shownWidth(transform, size));
-  };
+  const before = useRef(0);
+  const hand = useDrag({
+    begin(event) {
+      before.current = event.clientX;
+      return event.button === 0;
+    },
+    move(event) {
+      const dx = event.clientX - before.current;
+      before.current = event.clientX;
+      moveTo(wipe.peek().at + dx / shownWidth(transform, size));
+    },
+  });
   const key = (event: KeyboardEvent) => {
     const step = STEP * (event.shiftKey ? 0.1 : 1);
     const next = { ArrowLeft: at - step, ArrowRight: at + step, Home: 0, End: 1 }[event.key];
@@ -34,13 +43,12 @@ export function WipeHandle({ screen }: { screen: Screen }) {
       class="wipe"
       role="slider"
       tabIndex={0}
-      aria-label="Wipe between A and the live picture"
+      aria-label="Wipe between A and B, the live picture"
       aria-valuemin={0}
       aria-valuemax={100}
       aria-valuenow={Math.round(at * 100)}
       style={{ left: `${x}px` }}
-      onPointerDown={(event) => event.currentTarget.setPointerCapture(event.pointerId)}
-      onPointerMove={move}
+      {...hand}
       onKeyDown={key}
     >
       <span class="side a">A</span>
