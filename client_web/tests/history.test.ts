@@ -40,6 +40,33 @@ describe("History", () => {
     expect([history.canUndo, history.canRedo]).toEqual([true, true]);
   });
 
+  test("undone steps can be kept: nothing that comes takes them away", async () => {
+    [1, 2, 3].forEach((v) => change(v));
+    const saved = { name: "Look 1", look: LOOK };
+    history.record({ of: "shelf", label: "Save Look 1", before: null, after: saved });
+    await goTo(1);
+    expect(history.keepUndone()).toBe(true);
+    expect(history.canRedo).toBe(false);
+    change(7);
+    expect(history.keepUndone()).toBe(false);
+    expect(history.steps.value.map((step) => step.label)).toEqual([
+      "to 1",
+      "to 2",
+      "to 3",
+      "Save Look 1",
+      "Back to “to 1”",
+      "Back to “to 1”",
+      "to 7",
+    ]);
+    expect(history.steps.value[4]).toMatchObject({ of: "shelf", before: saved, after: null });
+    await undo();
+    expect(value).toBe(1);
+    await undo();
+    expect(value).toBe(3);
+    await goTo(7);
+    expect(value).toBe(7);
+  });
+
   test("a drag is one step, back to where it began", async () => {
     change(1);
     for (let v = 10; v < 60; v++) change(v, "/sigma");

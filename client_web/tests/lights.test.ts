@@ -5,8 +5,9 @@ import { beside, completedLight, freeLightName, lightFor, withKind } from "../sr
 import { acrossOf, aimed, anchorsOf, moved, outlineOf, placed } from "../src/lights/shape";
 import { add, cross, dot, length, subtract, unit } from "../src/lights/vector";
 import type { Light, Triple } from "../src/protocol";
-import { ENVIRONMENT, withAllLights, withOneLight } from "../src/state/solo";
+import { ENVIRONMENT, seenOf, wholeOf } from "../src/state/solo";
 import { stepName } from "../src/state/step";
+import { seenPaths, soloLight } from "../src/state/store";
 import { LOOK } from "./look";
 
 // at (0, 1, 5), looking along −Z, 90° high, twice as wide as high
@@ -147,15 +148,28 @@ describe("one light alone", () => {
   const lit = { ...LOOK, lights: { Spot: { ...spot, on: false }, Sun: sun } };
 
   test("shines, the others and the environment do not", () => {
-    const alone = withOneLight(lit, "Spot");
+    soloLight.value = "Spot";
+    const alone = seenOf(lit);
     expect([alone.lights["Spot"]?.on, alone.lights["Sun"]?.on, alone.environment.scale]).toEqual([true, false, 0]);
-    expect(withOneLight(lit, ENVIRONMENT).environment).toBe(lit.environment);
-    expect(withAllLights(alone)).toBe(lit);
+    expect(wholeOf(alone)).toBe(lit);
+    soloLight.value = ENVIRONMENT;
+    expect(seenOf(lit).environment).toBe(lit.environment);
   });
 
   test("is no other look where there is no such light", () => {
-    expect(withOneLight(lit, "gone")).toBe(lit);
-    expect(withOneLight(lit, null)).toBe(lit);
+    soloLight.value = "gone";
+    expect(seenOf(lit)).toBe(lit);
+    soloLight.value = null;
+    expect(seenOf(lit)).toBe(lit);
+  });
+
+  test("is seen by some light paths, which the look does not take up", () => {
+    seenPaths.value = { show: "direct", bounces: 3 };
+    const seen = seenOf(lit);
+    expect(seen.transport).toEqual({ show: "direct", bounces: 3 });
+    expect(seen.lights).toBe(lit.lights);
+    expect(wholeOf(seen)).toBe(lit);
+    seenPaths.value = null;
   });
 });
 

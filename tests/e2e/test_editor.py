@@ -189,14 +189,20 @@ def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: E
 def test_a_lost_server_is_said_and_edits_catch_up(editor: Editor, server: Server) -> None:
     editor.choose("Ball", 1)
     before = editor.pixels()
+    pictures = editor.page.locator(".tile.step img")
+    expect(pictures).to_have_count(1)
     server.kill()
     status = editor.page.locator(".status .state")
     expect(status).to_contain_text("Connection lost", timeout=WAIT_MS)
     editor.slider(SIGMA).press("End")  # kept until there is somebody to tell
     assert editor.page.locator(".exactness").inner_text() == ""
+    editor.page.wait_for_timeout(1500)  # longer than a hand has to rest for a picture
+    expect(pictures).to_have_count(1)  # what is shown is still the step before
     server.start()
     expect(status).to_contain_text("Connected", timeout=2 * WAIT_MS)  # by itself, after its backoff
     assert changed(before, editor.pixels()) > 0.01
+    expect(pictures).to_have_count(2)
+    assert pictures.first.get_attribute("src") != pictures.last.get_attribute("src")
 
 
 def test_export_downloads_the_picture(editor: Editor, tmp_path: Path) -> None:

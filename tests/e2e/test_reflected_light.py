@@ -45,6 +45,10 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     editor.wait_until_exact()
     expect(page.get_by_role("button", name="reflected ▾")).to_be_visible()
 
+    steps = page.locator(".tile.step")
+    editor.choose("Ball", 1)
+    editor.slider("Roughness σ").press("PageUp")
+    expect(steps).to_have_count(2)
     everything = editor.pixels()
     paths = page.get_by_role("radiogroup", name="Light paths")
     paths.get_by_role("radio", name="First bounce").click()
@@ -53,6 +57,14 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
     direct_alone = editor.pixels()
     assert direct_alone.mean() < everything.mean()
+    expect(steps).to_have_count(2)  # a way of looking, no edit
+    page.reload()
+    assert changed(direct_alone, editor.pixels()) == 0
+    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    expect(steps).to_have_count(2)
+    page.keyboard.press("Control+z")
+    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    page.keyboard.press("Control+Shift+z")
     page.get_by_role("button", name="Only direct light").click()
     assert changed(everything, editor.pixels()) == 0
 

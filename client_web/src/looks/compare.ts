@@ -3,10 +3,11 @@ import { effect, signal } from "@preact/signals";
 import { completedLight } from "../lights/kinds";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
+import { diffLooks } from "../state/diff";
 import { commit } from "../state/edit";
 import { withPicturesOf } from "../state/live";
 import { filmstripOpen } from "../state/panels";
-import { connection, defaultLook, exact, held, look, scene, showBefore, wipe } from "../state/store";
+import { connection, defaultLook, exact, held, history, look, scene, showBefore, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
 import { freeName } from "./names";
@@ -39,7 +40,7 @@ export function markA(): void {
   if (look.value === null || !stage.active.isThere) return;
   sideA.value = { look: look.value, label: "kept" };
   stage.keepReference();
-  note("This picture is A now. W wipes between A and the live picture.");
+  note("This picture is A now. W wipes between A and B, the live picture; C shows A while it is held.");
 }
 
 /** Keep the picture of another look as A; it is fetched from the server. */
@@ -50,12 +51,14 @@ export async function markLook(of: Look, label: string): Promise<void> {
   });
 }
 
-/** The live look becomes A, and A becomes live. */
+/** The live look becomes A, and A becomes live. It is a way to compare, so it takes no undone steps away. */
 export function swapA(): void {
   const [a, live] = [sideA.value, look.value];
   if (a === null || live === null) return;
   stage.keepReference();
-  commit("Swap A and live", a.look);
+  if (diffLooks(live, a.look).length > 0 && history.keepUndone())
+    note("What you had undone is kept in the history, before the swap.");
+  commit("Swap A and B", a.look);
   sideA.value = { look: live, label: "swapped" };
 }
 

@@ -5,8 +5,8 @@ import { lightLimits, lightLimitWords } from "../picture/limits";
 import { stage } from "../picture/stage";
 import type { RenderBody } from "../protocol";
 import { whenExact } from "../state/live";
-import { withOneLight } from "../state/solo";
-import { bake, look, scene, soloLight, viewName } from "../state/store";
+import { seenOf } from "../state/solo";
+import { bake, look, scene, viewName } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { pngBlob } from "./image";
 
@@ -50,7 +50,7 @@ export async function exportExr(): Promise<void> {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return;
   await attempt(async () => {
-    const [name, shown] = [fileName("exr"), withOneLight(current, soloLight.value)];
+    const [name, shown] = [fileName("exr"), seenOf(current)];
     note(`Rendering the EXR on the server${lightLimitWords()}…`);
     const render = await finished(
       await startRender({ bake: id, view: viewName.value, looks: [{ ...shown }], format: "exr" }),

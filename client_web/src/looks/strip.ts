@@ -2,7 +2,8 @@
 import { effect, signal } from "@preact/signals";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
-import { drawn, exact, held, look, soloLight } from "../state/store";
+import { isDrawn } from "../state/live";
+import { connection, drawn, exact, held, look, seenPaths, soloLight } from "../state/store";
 import { completed } from "./compare";
 import { thumbnail } from "./image";
 import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
@@ -45,8 +46,11 @@ effect(() => {
 });
 
 function take(current: Look): void {
-  // one light alone is no picture of the look
-  if (look.peek() !== current || held.peek() || soloLight.peek() !== null || !stage.active.isThere) return;
+  // one light alone is no picture of the look, nor are some of its paths
+  const partly = soloLight.peek() !== null || seenPaths.peek() !== null;
+  if (look.peek() !== current || held.peek() || partly || !stage.active.isThere) return;
+  // while there is no connection, what is shown is of the step before
+  if (connection.peek() !== "open" || !isDrawn()) return;
   const image = thumbnail(stage.active.pixels, current.display);
   images.set(current, image);
   if (exact.peek()) {

@@ -59,6 +59,11 @@ export class Session {
     return this.queue.revision;
   }
 
+  /** Whether the server has yet to hear of the newest edit. */
+  get pending(): boolean {
+    return this.queue.pending;
+  }
+
   connect(): void {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);

@@ -1,18 +1,15 @@
 /** Which light paths are shown, of a bake that has light between surfaces. */
-import { edit } from "../state/edit";
-import { defaultLook, look, method } from "../state/store";
+import { seePaths, shownPaths } from "../state/paths";
+import { defaultLook, method } from "../state/store";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { onRadioKey } from "../ui/radio";
 import { Section } from "../ui/Section";
 import { MAX_BOUNCES, PATHS, type Show } from "./paths";
 
-function choose(show: Show): void {
-  edit("Light paths", "/transport/show", show);
-}
-
 export function TransportPanel() {
-  const transport = look.value?.transport;
-  if (transport === undefined || method.value !== "gather") return null;
+  const transport = shownPaths.value;
+  if (transport === null || method.value !== "gather") return null;
+  const choose = (show: Show) => seePaths({ ...transport, show });
   const chosen = PATHS.findIndex(({ show }) => show === transport.show);
   return (
     <Section title="Light paths">
@@ -44,7 +41,7 @@ export function TransportPanel() {
         maximum={MAX_BOUNCES}
         step={1}
         scale="linear"
-        onChange={(bounces) => edit("Bounces", "/transport/bounces", bounces)}
+        onChange={(bounces) => seePaths({ ...transport, bounces })}
       />
     </Section>
   );

@@ -1,7 +1,7 @@
 /** What the picture leaves out, in words, each with a way back to the whole. */
 import { computed } from "@preact/signals";
 import { limitWords } from "../outline/paths";
-import { edit } from "../state/edit";
+import { seePaths, shownPaths } from "../state/paths";
 import { hasSource } from "../state/solo";
 import { defaultLook, look, solo, soloLight } from "../state/store";
 
@@ -14,14 +14,14 @@ export interface Limit {
 
 function showAllPaths(): void {
   const initial = defaultLook.peek()?.transport;
-  if (initial !== undefined) edit("All light", "/transport", initial);
+  if (initial !== undefined) seePaths(initial);
 }
 
 /** Of light: what is missing in the pictures of the server, so in exported ones too. */
 export const lightLimits = computed<Limit[]>(() => {
   const found: Limit[] = [];
-  if (look.value === null) return found;
-  const paths = limitWords(look.value.transport);
+  if (look.value === null || shownPaths.value === null) return found;
+  const paths = limitWords(shownPaths.value);
   if (paths !== null) found.push({ words: paths, title: "Show all light again", lift: showAllPaths });
   const source = soloLight.value;
   if (source !== null && hasSource(look.value, source)) {

@@ -1,6 +1,7 @@
 /** The one way to change the look: an undoable operation, and the newest look to the server. */
 import type { Look } from "../protocol";
-import { getAt, setAt } from "./pointer";
+import { diffLooks } from "./diff";
+import { setAt } from "./pointer";
 import { stepName } from "./step";
 import { history, look, models } from "./store";
 
@@ -26,13 +27,13 @@ export function showLook(next: Look): void {
 /** Replace the whole look as one step of the history. */
 export function commit(label: string, next: Look, key?: string): void {
   const before = look.value;
-  if (before === null || next === before) return;
+  if (before === null || diffLooks(before, next).length === 0) return;
   showLook(next);
   history.record({ of: "look", label, ...(key === undefined ? {} : { key }), before, after: next });
 }
 
 /** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */
 export function edit(deed: string, path: string, value: unknown): void {
-  if (look.value === null || getAt(look.value, path) === value) return;
+  if (look.value === null) return;
   commit(stepName(path, deed, look.value, models.value), setAt(look.value, path, value), path);
 }

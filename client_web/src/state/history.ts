@@ -34,6 +34,16 @@ export type Perform = (step: Step, back: boolean) => void | Promise<void>;
 const MAX_STEPS = 200;
 const IDLE_MS = 800;
 
+/** Steps that lead from the end of some steps to their beginning; the looks are gone back over in one. */
+function wayBack(steps: readonly Step[], label: string): Step[] {
+  const looks = steps.filter((step) => step.of === "look");
+  const shelf = steps.filter((step) => step.of === "shelf").reverse();
+  const back: Step[] = shelf.map(({ before, after }) => ({ of: "shelf", label, before: after, after: before }));
+  const [first, last] = [looks[0], looks.at(-1)];
+  if (first !== undefined && last !== undefined) back.push({ of: "look", label, before: last.after, after: first.before });
+  return back;
+}
+
 export class History {
   readonly steps = signal<readonly Step[]>([]);
   /** Number of steps that are done; the ones after it can be redone. */
@@ -94,6 +104,19 @@ export class History {
     } finally {
       this.busy = false;
     }
+  }
+
+  /** Make what was undone part of what was done, with the way back as its last step, so that the next step discards
+   * nothing. Whether there was anything. */
+  keepUndone(): boolean {
+    const undone = this.steps.value.slice(this.cursor.value);
+    if (undone.length === 0) return false;
+    const last = this.steps.value[this.cursor.value - 1];
+    const label = last === undefined ? "Back to the start" : `Back to “${last.label}”`;
+    this.steps.value = [...this.steps.value, ...wayBack(undone, label)].slice(-MAX_STEPS);
+    this.cursor.value = this.steps.value.length;
+    this.sealed = true;
+    return true;
   }
 
   /** The last step turned out impossible: forget it. */

@@ -10,7 +10,7 @@ import type { ClientMessage, HelloMessage, Look, ProbeAnswer } from "../protocol
 import { attempt, note, showError } from "../ui/toasts";
 import { onLook } from "./edit";
 import { forgetShape, showShape } from "./shape";
-import { withAllLights, withOneLight } from "./solo";
+import { seenOf, wholeOf } from "./solo";
 import * as store from "./store";
 import { editSent, forgetDrawn, forgetWaiting } from "./stats";
 import { availableOf } from "./views";
@@ -23,7 +23,7 @@ const exactWaiters: (() => void)[] = [];
 
 /** Ask for the picture of the look as it is now, or of what shall be seen of it. */
 function want(of: Session | null, look: Look, inputTime: number): void {
-  of?.want(withOneLight(look, store.soloLight.peek()), inputTime);
+  of?.want(seenOf(look), inputTime);
 }
 
 function wantNow(look: Look, inputTime: number): void {
@@ -195,7 +195,7 @@ function handlersOf(self: () => Session): SessionHandlers {
       if (!current() || message.revision === null) return;
       store.history.drop();
       if (lastGood !== null) {
-        store.look.value = withAllLights(lastGood);
+        store.look.value = wholeOf(lastGood);
         want(self(), store.look.value, performance.now());
       }
     },
@@ -251,6 +251,11 @@ export function askProbe(view: string, x: number, y: number): Promise<ProbeAnswe
   });
 }
 
+/** Whether the active view has a picture of the newest look, be it a first one. */
+export function isDrawn(): boolean {
+  return session !== null && !session.pending && stage.active.revision >= session.revision;
+}
+
 /** Resolves when the picture is exact for everything that was sent. */
 export function whenExact(): Promise<void> {
   if (store.exact.peek()) return Promise.resolve();
@@ -263,7 +268,7 @@ export async function withPicturesOf(of: Look, take: () => void): Promise<void> 
   const back = store.look.peek() as Look;
   store.held.value = true;
   try {
-    session?.want(of, performance.now());
+    want(session, of, performance.now());
     await new Promise((done) => requestAnimationFrame(done));
     await whenExact();
     take();
@@ -291,6 +296,7 @@ effect(() => {
 
 effect(() => {
   store.soloLight.value;
+  store.seenPaths.value;
   const look = store.look.peek();
   if (look !== null) wantNow(look, performance.now());
 });

@@ -45,7 +45,7 @@ function reset(scene: SceneBody): void {
   store.look.value = store.defaultLook.value = null;
   store.bake.value = store.coming.value = store.method.value = null;
   store.selectedMaterial.value = store.selectedCurve.value = null;
-  store.selectedLight.value = store.solo.value = store.soloLight.value = null;
+  store.selectedLight.value = store.solo.value = store.soloLight.value = store.seenPaths.value = null;
   store.alonePlaces.value = store.besidePlaces.value = new Map();
   store.pointedView.value = null;
   store.connection.value = "connecting";
@@ -60,6 +60,7 @@ function restorePlace(scene: SceneBody, place: Place): void {
     recallHistory(scene.id, kept.look);
     store.solo.value = kept.solo ?? null;
     store.soloLight.value = kept.soloLight ?? null;
+    store.seenPaths.value = kept.paths ?? null;
     store.alonePlaces.value = new Map(kept.alone);
     store.besidePlaces.value = new Map(kept.beside);
   }

@@ -3,7 +3,7 @@
 import { effect } from "@preact/signals";
 import { giveThumbnail, historyThumbnail } from "../looks/strip";
 import type { Transform } from "../picture/transform";
-import type { Look } from "../protocol";
+import type { Look, Transport } from "../protocol";
 import { fromText, toText } from "./journal";
 import * as store from "./store";
 import { placeToUrl } from "./url";
@@ -13,9 +13,10 @@ interface Kept {
   /** Where each view's picture lies, alone and beside others. */
   alone: [view: string, transform: Transform][];
   beside: [view: string, transform: Transform][];
-  /** The material and the source of light that are shown alone. */
+  /** The material and the source of light that are shown alone, and the light paths that are looked at. */
   solo?: string | null;
   soloLight?: string | null;
+  paths?: Transport | null;
 }
 
 const keptKey = (scene: string) => `relume.scene.${scene}`;
@@ -61,6 +62,7 @@ export function remember(): void {
     beside: [...store.besidePlaces.value],
     solo: store.solo.value,
     soloLight: store.soloLight.value,
+    paths: store.seenPaths.value,
   };
   const story = { steps: store.history.steps.value, cursor: store.history.cursor.value };
   try {

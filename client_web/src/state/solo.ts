@@ -1,6 +1,6 @@
 /** Solo: one material as it is, the others in dim grey; one light alone, the others dark. What is seen, no edit. */
 import type { Light, Look } from "../protocol";
-import { selectedLight, selectedMaterial, solo, soloLight } from "./store";
+import { seenPaths, selectedLight, selectedMaterial, solo, soloLight } from "./store";
 
 /** What is alone after the switch was pressed with `selected` selected. */
 export function nextSolo(current: string | null, selected: string | null): string | null {
@@ -31,18 +31,26 @@ export function hasSource(look: Look, source: string): boolean {
 
 const whole = new WeakMap<Look, Look>();
 
-/** What the server shall show of a look while one source of light is alone; without one, the look itself. */
-export function withOneLight(look: Look, source: string | null): Look {
-  if (source === null || !hasSource(look, source)) return look;
+function withOneLight(look: Look, source: string): Look {
   const off = ([name, light]: [string, Light]) => [name, name === source ? { ...light, on: true } : { ...light, on: false }];
   const lights = Object.fromEntries(Object.entries(look.lights).map(off)) as Look["lights"];
   const environment = source === ENVIRONMENT ? look.environment : { ...look.environment, scale: 0 };
-  const alone = { ...look, environment, lights };
-  whole.set(alone, look);
-  return alone;
+  return { ...look, environment, lights };
 }
 
-/** The look that a look with one light was made of; any other is itself. */
-export function withAllLights(look: Look): Look {
+/** What the server shall show of a look: while one source of light is alone, that one; while some light paths are
+ * looked at, those; otherwise the look itself. */
+export function seenOf(look: Look): Look {
+  const [source, paths] = [soloLight.peek(), seenPaths.peek()];
+  const isAlone = source !== null && hasSource(look, source);
+  if (!isAlone && paths === null) return look;
+  const lit = isAlone ? withOneLight(look, source) : look;
+  const seen = paths === null ? lit : { ...lit, transport: paths };
+  whole.set(seen, look);
+  return seen;
+}
+
+/** The look that something seen was made of; any other is itself. */
+export function wholeOf(look: Look): Look {
   return whole.get(look) ?? look;
 }

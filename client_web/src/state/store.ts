@@ -2,7 +2,7 @@
 import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
 import type { Transform } from "../picture/transform";
-import type { BakeBody, CurveMessage, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term } from "../protocol";
+import type { BakeBody, CurveMessage, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term, Transport } from "../protocol";
 import { History } from "./history";
 import { pointer } from "./pointer";
 
@@ -71,6 +71,8 @@ export const falseColour = signal(false);
 export const solo = signal<string | null>(null);
 /** The source of light that is seen alone, see `solo.ts`; no edit either. */
 export const soloLight = signal<string | null>(null);
+/** The light paths that are seen in place of the look's own, see `paths.ts`; no edit either. */
+export const seenPaths = signal<Transport | null>(null);
 /** Whether lights have handles in the picture. */
 export const handlesOpen = signal(true);
 export const wipe = signal<{ on: boolean; at: number }>({ on: false, at: 0.5 });

@@ -2,18 +2,21 @@
 import { signal } from "@preact/signals";
 import { deleteTruth, getTruth, startTruth } from "../net/api";
 import type { TruthBody } from "../protocol";
-import { bake, look, viewName } from "../state/store";
+import { truthOpen } from "../state/panels";
+import { togglePanel } from "../state/room";
+import { seenOf } from "../state/solo";
+import { bake, look, seenPaths, soloLight, viewName } from "../state/store";
 import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;
 
-export const truthOpen = signal(false);
 /** The comparison, and the look that it judges. */
 export const truth = signal<{ body: TruthBody; look: string } | null>(null);
 
 /** What the comparison depends on of the look: the display does not matter. */
 export function judged(): string {
-  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: viewName.value });
+  const seen = [seenPaths.value, soloLight.value];
+  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: viewName.value, seen });
 }
 
 function isGoingOn(body: TruthBody): boolean {
@@ -35,7 +38,7 @@ export async function askTruth(): Promise<void> {
   if (id === null || current === null) return;
   await forgetTruth();
   await attempt(async () => {
-    const body = await startTruth({ bake: id, view: viewName.value, look: { ...current } });
+    const body = await startTruth({ bake: id, view: viewName.value, look: { ...seenOf(current) } });
     truth.value = { body, look: judged() };
     await follow(body.id);
   });
@@ -49,6 +52,7 @@ async function forgetTruth(): Promise<void> {
 }
 
 export function toggleTruth(): void {
-  truthOpen.value = !truthOpen.value;
-  void (truthOpen.value ? askTruth() : forgetTruth());
+  const before = truthOpen.value;
+  togglePanel("truth");
+  if (truthOpen.value !== before) void (truthOpen.value ? askTruth() : forgetTruth());
 }

@@ -7,13 +7,15 @@ interface IconButtonProps {
   label: string;
   keys?: string;
   pressed?: boolean;
+  /** Of what opens something: whether it is open. */
+  expanded?: boolean;
   disabled?: boolean;
   onClick(): void;
   children?: ComponentChildren;
 }
 
 /** A small button with an icon and, where there are children, words beside it. */
-export function IconButton({ icon, label, keys, pressed, disabled, onClick, children }: IconButtonProps) {
+export function IconButton({ icon, label, keys, pressed, expanded, disabled, onClick, children }: IconButtonProps) {
   return (
     <button
       type="button"
@@ -21,6 +23,7 @@ export function IconButton({ icon, label, keys, pressed, disabled, onClick, chil
       title={keys === undefined ? label : `${label} (${keys})`}
       aria-label={children === undefined ? label : undefined}
       aria-pressed={pressed}
+      aria-expanded={expanded}
       disabled={disabled}
       onClick={onClick}
     >

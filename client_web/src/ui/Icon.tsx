@@ -28,6 +28,7 @@ const PATHS = {
   table: "M2.5 3.5h11v9h-11zM2.5 6.5h11M2.5 9.5h11M8 3.5v9",
   back: "M10 3L5 8l5 5",
   save: "M3 3h8l2 2v8H3zM5.5 3v3.5h4V3M5.5 13V9.5h5V13",
+  more: "M3.5 8h.01M8 8h.01M12.5 8h.01",
   help: "M6 6a2 2 0 1 1 2.6 1.9c-.4.2-.6.5-.6 1v.6M8 12v.1",
 } as const;
 

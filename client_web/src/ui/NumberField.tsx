@@ -1,5 +1,6 @@
 /** A number that is typed: Enter or leaving takes it, Escape leaves it as it was, arrows step it. */
 import { useEffect, useRef, useState } from "preact/hooks";
+import { history } from "../state/store";
 import { formatNumber, parseNumber } from "./scale";
 
 interface Props {
@@ -9,23 +10,33 @@ interface Props {
   maximum: number;
   step: number;
   autoFocus?: boolean;
+  /** What has been typed already, before the field was there. */
+  begun?: string;
   onChange(value: number): void;
   onDone?(): void;
 }
 
-export function NumberField({ value, label, minimum, maximum, step, autoFocus, onChange, onDone }: Props) {
+export function NumberField({ value, label, minimum, maximum, step, autoFocus, begun, onChange, onDone }: Props) {
   const input = useRef<HTMLInputElement>(null);
-  const [draft, setDraft] = useState<string | null>(null);
+  const [draft, setDraft] = useState<string | null>(begun ?? null);
   const refused = useRef(false);
   const wrong = draft !== null && parseNumber(draft) === null;
   useEffect(() => {
-    if (autoFocus) input.current?.select();
+    if (!autoFocus) return;
+    input.current?.focus();
+    if (begun === undefined) input.current?.select();
   }, [autoFocus]);
 
   const put = (next: number) => onChange(Math.min(maximum, Math.max(minimum, next)));
   const take = () => {
-    const next = draft === null || refused.current ? null : parseNumber(draft);
-    if (next !== null) put(next);
+    const typed = draft !== null && draft !== formatNumber(value) && !refused.current;
+    const next = typed ? parseNumber(draft) : null;
+    if (next !== null) {
+      // a number that was typed is a step by itself
+      history.seal();
+      put(next);
+      history.seal();
+    }
     refused.current = false;
     setDraft(null);
   };
@@ -53,7 +64,7 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, o
       aria-invalid={wrong}
       title={wrong ? `A number from ${minimum} to ${maximum}` : undefined}
       value={draft ?? formatNumber(value)}
-      onFocus={(event) => event.currentTarget.select()}
+      onFocus={(event) => draft === null && event.currentTarget.select()}
       onInput={(event) => setDraft(event.currentTarget.value)}
       onBlur={() => {
         take();

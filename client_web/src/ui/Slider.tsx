@@ -1,6 +1,7 @@
 /** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
- * Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
+ * Digits type a number at once. Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
 import { useRef, useState } from "preact/hooks";
+import { useDrag } from "./drag";
 import { NumberField } from "./NumberField";
 import { formatNumber, fromFraction, keyStep, snap, toFraction, type Range } from "./scale";
 
@@ -25,42 +26,49 @@ const STEPS: Record<string, number> = {
   PageUp: 10,
 };
 
+/** Whether a key begins a number, which is typed in place of the slider's. */
+function isNumberKey(event: KeyboardEvent, minimum: number): boolean {
+  if (event.ctrlKey || event.metaKey || event.altKey) return false;
+  return /^[0-9.,]$/.test(event.key) || (event.key === "-" && minimum < 0);
+}
+
 export function Slider(props: SliderProps) {
   const { label, value, unit = "", initial, tint, onChange } = props;
-  const track = useRef<HTMLDivElement>(null);
-  const drag = useRef({ x: 0, at: 0, width: 1, before: value });
-  const [typing, setTyping] = useState(false);
+  const drag = useRef({ x: 0, at: 0, width: 1 });
+  const [typing, setTyping] = useState<{ begun?: string } | null>(null);
   const at = toFraction(props, value);
 
   const set = (fraction: number) => {
     drag.current.at = Math.min(1, Math.max(0, fraction));
     onChange(fromFraction(props, fraction));
   };
-  const down = (event: PointerEvent) => {
-    const element = track.current as HTMLDivElement;
-    if (event.button !== 0) return;
-    props.onHold?.();
-    if ((event.ctrlKey || event.altKey || event.metaKey) && initial !== undefined) return onChange(initial);
-    element.setPointerCapture(event.pointerId);
-    const box = element.getBoundingClientRect();
-    const clicked = (event.clientX - box.left) / box.width;
-    const before = event.detail < 2 ? value : drag.current.before;
-    drag.current = { x: event.clientX, at, width: box.width, before };
-    if (Math.abs(clicked - at) * box.width > 7) set(clicked);
-  };
-  const move = (event: PointerEvent) => {
-    const element = track.current as HTMLDivElement;
-    if (!element.hasPointerCapture(event.pointerId)) return;
-    const dx = (event.clientX - drag.current.x) / drag.current.width;
-    drag.current.x = event.clientX;
-    if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
-  };
+  const hand = useDrag({
+    begin(event) {
+      if (event.button !== 0) return false;
+      props.onHold?.();
+      if ((event.ctrlKey || event.altKey || event.metaKey) && initial !== undefined) {
+        onChange(initial);
+        return false;
+      }
+      const box = event.currentTarget.getBoundingClientRect();
+      const clicked = (event.clientX - box.left) / box.width;
+      drag.current = { x: event.clientX, at, width: box.width };
+      if (Math.abs(clicked - at) * box.width > 7) set(clicked);
+      return true;
+    },
+    move(event) {
+      const dx = (event.clientX - drag.current.x) / drag.current.width;
+      drag.current.x = event.clientX;
+      if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
+    },
+  });
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
     if (step !== undefined) set(at + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
-    else if (event.key === "Enter") setTyping(true);
+    else if (event.key === "Enter") setTyping({});
+    else if (isNumberKey(event, props.minimum)) setTyping({ begun: event.key });
     else if ((event.key === "Delete" || event.key === "Backspace") && initial !== undefined) onChange(initial);
     else return;
     event.preventDefault();
@@ -70,7 +78,6 @@ export function Slider(props: SliderProps) {
   return (
     <div class="slider">
       <div
-        ref={track}
         class="track"
         role="slider"
         tabIndex={0}
@@ -81,13 +88,9 @@ export function Slider(props: SliderProps) {
         aria-valuetext={shown}
         style={tint === undefined ? undefined : { "--tint": tint }}
         onFocus={props.onHold}
-        onPointerDown={down}
-        onPointerMove={move}
+        {...hand}
         onKeyDown={key}
-        onDblClick={() => {
-          onChange(drag.current.before);
-          setTyping(true);
-        }}
+        onDblClick={() => setTyping({})}
       >
         <span class="fill" style={{ transform: `scaleX(${at.toFixed(4)})` }} />
         <span class="way" style={{ transform: `translateX(${(100 * at).toFixed(2)}%)` }}>
@@ -95,7 +98,7 @@ export function Slider(props: SliderProps) {
         </span>
         {initial !== undefined && <span class="initial" style={{ left: `${toFraction(props, initial) * 100}%` }} />}
       </div>
-      {typing ? (
+      {typing !== null ? (
         <NumberField
           value={value}
           label={`${label}, as a number`}
@@ -103,15 +106,16 @@ export function Slider(props: SliderProps) {
           maximum={props.maximum}
           step={props.step ?? (props.maximum - props.minimum) / 100}
           autoFocus
+          {...typing}
           onChange={(next) => onChange(snap(props, next))}
-          onDone={() => setTyping(false)}
+          onDone={() => setTyping(null)}
         />
       ) : (
         <button
           class="value"
           title="Type a number"
           aria-label={`${label}: ${shown}; type a number`}
-          onClick={() => setTyping(true)}
+          onClick={() => setTyping({})}
         >
           {shown}
         </button>

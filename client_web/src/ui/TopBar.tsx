@@ -5,12 +5,15 @@ import { lightLimitWords } from "../picture/limits";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
 import { leave } from "../state/open";
-import { filmstripOpen, inspectorOpen, outlineOpen } from "../state/panels";
+import { filmstripOpen } from "../state/panels";
+import { shownPanels, togglePanel, type SidePanel } from "../state/room";
 import { helpOpen, history, look, scene, showBefore, sideBySide, viewName, views, wipe } from "../state/store";
 import { redo, undo } from "../state/undo";
 import { showAlone, toggleSideBySide } from "../state/views";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
+import { useDrag } from "./drag";
+import { Overflow } from "./Overflow";
 import { Slider } from "./Slider";
 import { Switch } from "./Switch";
 
@@ -46,6 +49,10 @@ function whichView(): string {
 
 function Compare() {
   const none = sideA.value === null;
+  const hand = useDrag({
+    begin: (event) => (showBefore.value = event.button === 0),
+    end: () => (showBefore.value = false),
+  });
   const label = none ? "nothing yet" : (sideA.value?.label ?? "");
   return (
     <div class="group" role="group" aria-label="Compare">
@@ -54,26 +61,24 @@ function Compare() {
       </button>
       <IconButton
         icon="wipe"
-        label="Wipe between A and the live picture"
+        label="Wipe between A and B, the live picture"
         keys="W"
         pressed={wipe.value.on}
         disabled={none}
         onClick={toggleWipe}
       />
       <button
-        title="Show A while held (B)"
+        title="Show A while held (C)"
         aria-pressed={showBefore.value}
         disabled={none}
-        onPointerDown={() => (showBefore.value = true)}
-        onPointerUp={() => (showBefore.value = false)}
-        onPointerLeave={() => (showBefore.value = false)}
+        {...hand}
         onKeyDown={(event) => (event.key === " " || event.key === "Enter") && (showBefore.value = true)}
         onKeyUp={() => (showBefore.value = false)}
         onBlur={() => (showBefore.value = false)}
       >
-        Before
+        Show A
       </button>
-      <button title="Swap A and the live look (X)" disabled={none} onClick={swapA}>
+      <button title="Swap A and B: the live look becomes A, and A becomes live (X)" disabled={none} onClick={swapA}>
         Swap
       </button>
     </div>
@@ -111,15 +116,56 @@ function Display() {
   );
 }
 
-function Panels() {
+function History() {
   return (
-    <div class="group" role="group" aria-label="Panels">
-      <Switch icon="left" label="Scene panel" of={outlineOpen} />
-      <Switch icon="bottom" label="Looks" of={filmstripOpen} />
-      <Switch icon="right" label="Inspector" of={inspectorOpen} />
+    <div class="group" role="group" aria-label="History">
+      <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={undo} />
+      <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={redo} />
     </div>
   );
 }
+
+function Export() {
+  return (
+    <div class="group" role="group" aria-label="Export">
+      <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`} onClick={() => void exportPng()}>
+        PNG
+      </button>
+      <button title={`Export the linear radiance of ${whichView()}${lightLimitWords()}`} onClick={() => void exportExr()}>
+        EXR
+      </button>
+    </div>
+  );
+}
+
+function Share() {
+  return <IconButton icon="share" label="Copy the address" onClick={() => void share()} />;
+}
+
+function Side({ icon, label, panel }: { icon: "left" | "right"; label: string; panel: SidePanel }) {
+  const shown = shownPanels.value.includes(panel);
+  return <IconButton icon={icon} label={label} pressed={shown} onClick={() => togglePanel(panel)} />;
+}
+
+function Panels() {
+  return (
+    <div class="group" role="group" aria-label="Panels">
+      <Side icon="left" label="Scene panel" panel="outline" />
+      <Switch icon="bottom" label="Looks" of={filmstripOpen} />
+      <Side icon="right" label="Inspector" panel="inspector" />
+    </div>
+  );
+}
+
+/** What a narrow window puts into a menu; the lowest rank goes first. */
+const CONTROLS = [
+  { name: "views", rank: 4, Content: Views },
+  { name: "steps", rank: 5, Content: History },
+  { name: "compare", rank: 2, Content: Compare },
+  { name: "display", rank: 3, Content: Display },
+  { name: "export", rank: 1, Content: Export },
+  { name: "share", rank: 0, Content: Share },
+];
 
 export function TopBar() {
   return (
@@ -127,23 +173,7 @@ export function TopBar() {
       <IconButton icon="back" label="All scenes" onClick={leave} />
       <h1 title={scene.value?.name}>{scene.value?.name ?? "…"}</h1>
       <BakeMenu />
-      <Views />
-      <div class="group" role="group" aria-label="History">
-        <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={undo} />
-        <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={redo} />
-      </div>
-      <Compare />
-      <span class="spacer" />
-      <Display />
-      <div class="group" role="group" aria-label="Export">
-        <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`} onClick={() => void exportPng()}>
-          PNG
-        </button>
-        <button title={`Export the linear radiance of ${whichView()}${lightLimitWords()}`} onClick={() => void exportExr()}>
-          EXR
-        </button>
-      </div>
-      <IconButton icon="share" label="Copy the address" onClick={() => void share()} />
+      <Overflow controls={CONTROLS} />
       <Panels />
       <IconButton
         icon="help"

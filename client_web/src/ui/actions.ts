@@ -53,13 +53,13 @@ export const ACTIONS: readonly Action[] = [
   { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
   { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
   { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: markA },
-  { group: "Compare", label: "Swap A and the live look", keys: ["x"], run: swapA },
-  { group: "Compare", label: "Wipe between A and live", keys: ["w"], run: toggleWipe },
+  { group: "Compare", label: "Swap A and B", keys: ["x"], run: swapA },
+  { group: "Compare", label: "Wipe between A and B, the live picture", keys: ["w"], run: toggleWipe },
   { group: "Compare", label: "Move the wipe", keys: ["[", "]"], run: () => undefined },
   {
     group: "Compare",
     label: "Show A while held",
-    keys: ["b"],
+    keys: ["c"],
     run: () => (showBefore.value = true),
     release: () => (showBefore.value = false),
   },
@@ -74,7 +74,7 @@ export const ACTIONS: readonly Action[] = [
 /** Keys of controls that have the focus; listed, handled where they belong. */
 export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Slider: step, large step, ends", "← →  Page  Home End"],
-  ["Slider: fine steps, type, reset", "Shift  Enter  Delete"],
+  ["Slider: fine steps, type, reset", "Shift  Enter or a digit  Delete"],
   ["Curve point: move, fine", "← → ↑ ↓  Shift"],
   ["Curve point: pick up and put down", "Enter, click"],
   ["Curve point: delete, reset", "Delete  R"],
