@@ -4,6 +4,7 @@ import { StartPage } from "./start/StartPage";
 import { openScene } from "./state/open";
 import { followPanels } from "./state/panels";
 import { followPlace } from "./state/place";
+import { followRoom } from "./state/room";
 import { history, page } from "./state/store";
 import { placeFromUrl } from "./state/url";
 import { Toasts } from "./ui/toasts";
@@ -35,6 +36,7 @@ function start(): void {
   if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
   followPanels();
+  followRoom();
   // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());

@@ -25,6 +25,26 @@ FOCUSED = """() => {
 }"""
 
 
+OUTSIDE_LANDMARKS = """() => [...document.querySelectorAll("button, input, select, canvas, [tabindex]")]
+  .filter((e) => e.checkVisibility())
+  .filter((e) => !e.closest(".editor > header, main, nav, aside, footer, section[aria-label], [role=dialog]"))
+  .map((e) => e.outerHTML.slice(0, 200))"""
+# Contrast of text with the panel behind it, as WCAG 2.2 counts it; groups that let the panel through included.
+CONTRAST = """(e) => {
+  const channels = (text) => text.match(/[\\d.]+/g).map(Number);
+  const light = (rgb) => {
+    const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  let opacity = 1;
+  for (let outer = e; outer !== null; outer = outer.parentElement) opacity *= Number(getComputedStyle(outer).opacity);
+  const back = channels(getComputedStyle(e.closest(".filmstrip")).backgroundColor);
+  const front = channels(getComputedStyle(e).color).map((v, c) => opacity * v + (1 - opacity) * back[c]);
+  const [dark, bright] = [light(front), light(back)].sort((a, b) => a - b);
+  return (bright + 0.05) / (dark + 0.05);
+}"""
+
+
 def assert_focus_is_visible(page: Page, num_stops: int) -> None:
     """Tab through the page; every stop shows where it is."""
     stops = []
@@ -41,6 +61,19 @@ def assert_focus_is_visible(page: Page, num_stops: int) -> None:
 def test_every_control_of_the_editor_has_a_name(editor: Editor, term: int) -> None:
     editor.choose("Ball", term)
     assert editor.page.evaluate(NAMELESS) == []
+
+
+def test_every_control_of_the_editor_is_in_a_landmark(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    editor.page.get_by_role("separator").wait_for()
+    assert editor.page.evaluate(OUTSIDE_LANDMARKS) == []
+
+
+def test_what_undone_steps_are_called_can_be_read(editor: Editor) -> None:
+    editor.page.keyboard.press(".")
+    editor.page.keyboard.press("Control+z")
+    caption = editor.page.locator(".tile.step.undone .tile-name")
+    assert caption.evaluate(CONTRAST) >= 4.5
 
 
 def test_focus_is_visible_in_the_editor(editor: Editor) -> None:

@@ -49,6 +49,8 @@ def test_a_chosen_file_lights_the_scene(editor: Editor, dusk_file: Path) -> None
     before = editor.pixels()
     editor.page.get_by_label("Environment file").set_input_files(dusk_file)
     expect(editor.page.get_by_role("radio", name="dusk")).to_be_checked()
+    heads = editor.page.locator(".outline .panel-head h2")  # there is one more button beside the heading now
+    assert heads.evaluate_all("all => all.filter((head) => head.scrollWidth > head.clientWidth).length") == 0
     lit = editor.pixels()
     assert changed(before, lit) > 0.5
     assert lit[..., 0].mean() > 1.3 * lit[..., 2].mean()

@@ -1,9 +1,10 @@
 /** What is selected: a light, or a material with its terms as cards. */
-import { libraryOpen, openLibrary } from "../library/library";
+import { openLibrary } from "../library/library";
 import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lights";
 import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
+import { shownPanels } from "../state/room";
 import {
   defaultLook,
   history,
@@ -59,25 +60,25 @@ function MaterialInspector() {
   const material = selectedMaterial.value;
   if (material === null || terms.value.length === 0) {
     return (
-      <aside class="panel inspector" aria-label="Inspector">
+      <div class="panel inspector">
         <header class="panel-head">
           <h2>Material</h2>
-          <button aria-pressed={libraryOpen.value} onClick={() => void openLibrary()}>
+          <button aria-pressed={shownPanels.value.includes("library")} onClick={() => void openLibrary()}>
             Library
           </button>
         </header>
         <p class="hint">
           Click something in the picture, or choose a material on the left, to change how it reflects light.
         </p>
-      </aside>
+      </div>
     );
   }
   const original = defaultLook.value?.materials[material];
   return (
-    <aside class="panel inspector" aria-label="Inspector">
+    <div class="panel inspector">
       <header class="panel-head">
         <h2 class="spacer">{material}</h2>
-        <button aria-pressed={libraryOpen.value} onClick={() => void openLibrary()}>
+        <button aria-pressed={shownPanels.value.includes("library")} onClick={() => void openLibrary()}>
           Library
         </button>
         <IconButton
@@ -109,6 +110,6 @@ function MaterialInspector() {
         />
       ))}
       <AddTerm material={material} />
-    </aside>
+    </div>
   );
 }

@@ -1,6 +1,7 @@
 /** Materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
 import { useRef } from "preact/hooks";
 import { IconButton } from "../ui/Button";
+import { libraryOpen } from "../state/panels";
 import { models, selectedMaterial } from "../state/store";
 import { NavigationMap } from "./NavigationMap";
 import {
@@ -9,7 +10,6 @@ import {
   group,
   groups,
   importMeasured,
-  libraryOpen,
   MEASURED,
   model,
   putOnSelected,

@@ -5,6 +5,7 @@ import { uploadMeasured } from "../net/upload";
 import type { MaterialBody, MeasuredBody, Term } from "../protocol";
 import { edit } from "../state/edit";
 import { pointer } from "../state/pointer";
+import { togglePanel } from "../state/room";
 import { select } from "../state/select";
 import { selectedMaterial } from "../state/store";
 import { attempt, note } from "../ui/toasts";
@@ -26,7 +27,6 @@ interface Entry {
   group: string | null;
 }
 
-export const libraryOpen = signal(false);
 export const library = signal<MaterialBody[]>([]);
 const measured = signal<MeasuredBody[]>([]);
 /** What was typed to find a material: all of its words are in what an entry is called, or in where it is from. */
@@ -63,7 +63,7 @@ export function isFound({ name, about }: Pick<Entry, "name" | "about">, typed: s
 }
 
 export async function openLibrary(): Promise<void> {
-  libraryOpen.value = !libraryOpen.value;
+  togglePanel("library");
   if (library.value.length > 0) return;
   await attempt(async () => {
     [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);

@@ -103,7 +103,7 @@ function AimLock() {
 export function LightInspector({ name, light }: Shown) {
   const initial = defaultLook.value?.lights[name];
   return (
-    <aside class="panel inspector" aria-label="Inspector">
+    <div class="panel inspector">
       <header class="panel-head">
         <h2 class="spacer">
           {isAdded(name) ? (
@@ -143,6 +143,6 @@ export function LightInspector({ name, light }: Shown) {
           <Angle key={of.label} name={name} light={light} of={of} />
         ))}
       </section>
-    </aside>
+    </div>
   );
 }

@@ -39,9 +39,9 @@ export function PictureView() {
         </div>
         <PlacingBar />
         <Limits />
-        <FalseColourLegend />
         <HistogramView />
       </div>
+      <FalseColourLegend />
       <PictureBar />
     </main>
   );

@@ -1,15 +1,14 @@
 /** The editor's layout: what stands where. Everything but the picture collapses. */
 import { Filmstrip } from "../looks/Filmstrip";
 import { LibraryPanel } from "../library/LibraryPanel";
-import { libraryOpen } from "../library/library";
 import { Inspector } from "../inspector/Inspector";
 import { Outline } from "../outline/Outline";
 import { take } from "../outline/environments";
 import { PictureView } from "../picture/PictureView";
-import { filmstripOpen, inspectorOpen, inspectorWidth, outlineOpen } from "../state/panels";
+import { filmstripOpen } from "../state/panels";
+import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/room";
 import { helpOpen } from "../state/store";
 import { TruthPanel } from "../truth/TruthPanel";
-import { truthOpen } from "../truth/truth";
 import { Help } from "./Help";
 import { Splitter } from "./Splitter";
 import { StatusBar } from "./StatusBar";
@@ -19,17 +18,25 @@ import { useKeyboard } from "./keyboard";
 
 export function Editor() {
   useKeyboard();
+  const { outline, library, truth } = panelWidths.value;
+  const widths = { outline, library, truth, inspector: inspectorShownWidth.value };
+  const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
+  const shown = (name: SidePanel) => shownPanels.value.includes(name);
   const over = useFileDrop((files) => void take(files));
   return (
-    <div class={`editor ${over ? "over" : ""}`} style={{ "--inspector": `${inspectorWidth.value}px` }}>
+    <div class={`editor ${over ? "over" : ""}`} style={style}>
       <TopBar />
       <div class="middle">
-        {outlineOpen.value && <Outline />}
+        {shown("outline") && <Outline />}
         <PictureView />
-        {libraryOpen.value && <LibraryPanel />}
-        {truthOpen.value && <TruthPanel />}
-        {inspectorOpen.value && <Splitter />}
-        {inspectorOpen.value && <Inspector />}
+        {shown("library") && <LibraryPanel />}
+        {shown("truth") && <TruthPanel />}
+        {shown("inspector") && (
+          <aside class="side" aria-label="Inspector">
+            <Splitter />
+            <Inspector />
+          </aside>
+        )}
       </div>
       {filmstripOpen.value && <Filmstrip />}
       <StatusBar />

@@ -4,8 +4,9 @@ import { cancelBake } from "../net/api";
 import { limits } from "../picture/limits";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
+import { shownPanels } from "../state/room";
 import { coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
-import { toggleTruth, truthOpen } from "../truth/truth";
+import { toggleTruth } from "../truth/truth";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
 
@@ -65,7 +66,11 @@ export function StatusBar() {
         edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
       <span class={`exactness ${settled.value ? "is-exact" : ""}`}>{pictureWords()}</span>
-      <button aria-pressed={truthOpen.value} title="Compare this picture with brute force" onClick={toggleTruth}>
+      <button 
+        aria-pressed={shownPanels.value.includes("truth")}
+        title="Compare this picture with brute force"
+        onClick={toggleTruth}
+      >
         How true is this?
       </button>
       {freezing.value !== null && <progress max={1} value={freezing.value.progress} aria-label={pictureWords()} />}
