@@ -28,7 +28,7 @@ class DerivedImages:
 
     def get(self, key: Hashable, shape: tuple[int, ...], make: Callable[[], Shaded]) -> Shaded:
         """The image of a key, from its file where there is a sound one, else from `make`."""
-        path = self._folder / (hashlib.sha256(repr(key).encode()).hexdigest()[:32] + ".npy")
+        path = self._path(key)
         with suppress(OSError, ValueError, EOFError):
             found = np.load(path, mmap_mode="r", allow_pickle=False)
             if found.shape == shape and found.dtype == np.float32:
@@ -38,6 +38,13 @@ class DerivedImages:
         with suppress(OSError):  # a full or read-only disk costs time at the next opening, nothing else
             self._write(path, shaded)
         return shaded
+
+    def has(self, key: Hashable) -> bool:
+        """Whether there is a file of a key; nobody says that it is sound."""
+        return self._path(key).exists()
+
+    def _path(self, key: Hashable) -> Path:
+        return self._folder / (hashlib.sha256(repr(key).encode()).hexdigest()[:32] + ".npy")
 
     def _write(self, path: Path, shaded: Shaded) -> None:
         self._folder.mkdir(exist_ok=True)

@@ -8,7 +8,7 @@ last and what has changed. It is never called exact: at rest all is shaded that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -95,7 +95,7 @@ class Follower:
 
     def follows_all(self) -> bool:
         """Whether every term shows its look already, or will, roughly, as soon as there are rows."""
-        shows = (image.effective is not None or image.can_follow() for _, image in self._terms())
+        shows = (image.effective is not None or image.can_follow() for _, image in self._images.terms())
         return self._is_wanted and all(shows)
 
     def next_need(self) -> RowsNeed | None:
@@ -103,29 +103,35 @@ class Follower:
         if not self._is_wanted or self._reflected is None:
             return None
         # a term whose own curve moves would want other rows after every edit, and could not add them to anything
-        able = ((m, t) for m, t in self._terms() if t.effective is not None or t.can_follow())
+        able = ((m, t) for m, t in self._images.terms() if t.effective is not None or t.can_follow())
         lacking = [(m, t) for m, t in able if self._rows(m, t) is None]
         return self._need(*min(lacking, key=lambda item: item[0].num_samples)) if lacking else None
 
-    def step(self) -> None:
-        """Bring all terms that can be to the light as it is now."""
-        light = self._images.light
+    def follows(self, material: MaterialImage, image: TermImage) -> bool:
+        """Whether a term can be brought to light like that of the look at once."""
+        base = image.base
+        if base is None or not image.can_follow() or not is_same_environment(base.light, self._images.light):
+            return False
+        return self._reflected is None or self._rows(material, image) is not None
+
+    def step(self, light: Light) -> None:
+        """Bring all terms that can be to this light, which is like that of the look."""
         changes: dict[Light, F32] = {}
-        for material, image in self._terms():
+        for material, image in self._images.terms():
             base = image.base
-            if base is None or not image.can_follow() or not is_same_environment(base.light, light):
-                continue
-            rows = self._rows(material, image)
-            if image.is_followed() or (rows is None and self._reflected is not None):
+            is_alike = base is not None and is_same_environment(base.light, light)
+            if base is None or not is_alike or image.followed == light or not self.follows(material, image):
                 continue
             if base.light not in changes:
                 changes[base.light] = self._change(base.light, light)
-            image.follow(partial(self._add_change, material, image, base.light, rows, changes[base.light]))
+            image.follow(light, partial(self._add_change, material, image, (base.light, light), changes[base.light]))
 
     def _add_change(
-        self, material: MaterialImage, image: TermImage, before: Light, rows: Rows | None, change: F32, out: F32
+        self, material: MaterialImage, image: TermImage, lights: tuple[Light, Light], change: F32, out: F32
     ) -> None:
-        self._moved.add_change(material, image, before, self._images.light, out)
+        """Add to an image what has changed. lights: before and after. change: of what cells send out."""
+        self._moved.add_change(material, image, *lights, out)
+        rows = self._rows(material, image)
         if rows is not None:
             rows.add(change, out)
 
@@ -137,15 +143,11 @@ class Follower:
         change = reflected.roughly_under(after) - reflected.roughly_under(before)
         return haar(change[: reflected.num_cells]).astype(np.float32)
 
-    def _terms(self) -> Iterator[tuple[MaterialImage, TermImage]]:
-        materials = self._images.by_name.values()
-        return ((material, image) for material in materials if material.num_samples for image in material.terms)
-
     def _has_room(self) -> bool:
         """Whether the cache has room for all rows, where any are needed, beside other things."""
         if self._reflected is None:
             return True
-        needed = sum(rows_bytes(m.num_samples, num_channels(t.term, t.target)) for m, t in self._terms())
+        needed = sum(rows_bytes(m.num_samples, num_channels(t.term, t.target)) for m, t in self._images.terms())
         return 2 * needed <= self._images.cache.budget_bytes
 
     def _key(self, material: MaterialImage, image: TermImage) -> tuple[Hashable, ...]:

@@ -1,14 +1,14 @@
 """A glimpse of other light: one sample of each small square of pixels is shaded, those between are interpolated.
 
 When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
-counts for nothing at once, and shading all samples takes seconds. A glimpse costs a few thousand samples whatever the
-picture's size, holds no operator, and lets the hand see where the light goes; colours and textures multiply it at full
-size. It is never called exact: at rest all is shaded.
+counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time.
+A glimpse costs a few thousand samples whatever the picture's size, holds no operator, and lets the hand see where the
+light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from relume.brdf.term import Term
+from relume.look.model import Rgb
 from relume.trace.cell_tree import NO_CELL
 from relume.transfer.light import Light
 from relume.transfer.local import Points
@@ -31,6 +32,7 @@ from relume.transfer.view_images import ViewImages
 F32 = NDArray[np.float32]
 
 _MOST_SHADED = 6000  # samples of a view, about
+_FEW_TO_SHADE = 8 * _MOST_SHADED  # samples of terms of a view; they take about as long as choosing some of them
 _NUM_NEIGHBOURS = 3
 _PIXELS_A_TURN = 10.0  # a unit of normals counts as so many squares of pixels
 _SOFT = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
@@ -119,9 +121,15 @@ def can_glimpse(images: ViewImages) -> bool:
     return 2 * sum(_bytes_of(images, k) for k in range(len(images.by_name))) <= images.cache.budget_bytes
 
 
+def helps_to_open(images: ViewImages) -> bool:
+    """Whether a picture that shows nothing yet is seen much sooner so than by making the images that it lacks."""
+    lacking = sum(m.num_samples for m, image in images.terms() if not images.is_at_hand(m, image))
+    return lacking > _FEW_TO_SHADE and can_glimpse(images)
+
+
 def is_prepared(images: ViewImages) -> bool:
     """Whether the samples have been chosen: the first glimpse of a view takes a second more."""
-    seen = [material.index for material in images.by_name.values() if material.num_samples]
+    seen = {material.index for material, _ in images.terms()}
     return all(images.cache.find(_key(images, index), Sparse) is not None for index in seen)
 
 
@@ -137,27 +145,28 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class Glimpse:
-    """A need of images of all terms in one light; made like a `Need`, adopted by the picture."""
+    """A need of images of all terms in one light; made like a `Need`, adopted by the picture.
+
+    Attributes:
+        gain: what multiplies the finished picture in that light.
+    """
 
     key: tuple[Hashable, ...]
     images: ViewImages
     light: Light
+    gain: Rgb
     parts: Sequence[_Part]
+    what: str = "the light"
 
-    what = "the light"
     state: Literal["shading"] = "shading"
     refines = False
 
     @classmethod
-    def of(cls, images: ViewImages) -> Glimpse:
-        """Of the look as it is now."""
-        parts = [
-            _Part(material, image, image.term, image.target)
-            for material in images.by_name.values()
-            for image in material.terms
-            if material.num_samples and not image.is_followed()
-        ]
-        return cls((images.transfer.key, images.view.name, images.light), images, images.light, parts)
+    def of(cls, images: ViewImages, terms: Iterable[tuple[MaterialImage, TermImage]], what: str) -> Glimpse:
+        """Of these terms in the look as it is now. what: in words."""
+        parts = [_Part(material, image, image.term, image.target) for material, image in terms]
+        key = images.transfer.key, images.view.name, images.light
+        return cls(key, images, images.light, images.gain, parts, what)
 
     def make(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> list[F32]:
         """Images of all parts. (tiles, 3, samples) float32 each
@@ -181,9 +190,8 @@ class Glimpse:
     def adopt(self, made: Sequence[F32]) -> None:
         """Show them where there is nothing better, also where the hand has turned the light further meanwhile."""
         for part, image in zip(self.parts, made, strict=True):
-            is_lacking = part.image.effective is None and not part.image.is_followed()
-            if is_lacking and any(part.image is known for known in part.material.terms):
-                part.image.glimpse(image)
+            if part.image.effective is None and any(part.image is known for known in part.material.terms):
+                part.image.glimpse(image, part.bands, self.light)
 
 
 def _spread(shaded: Shaded, weights: Any) -> F32:

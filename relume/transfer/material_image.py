@@ -70,7 +70,7 @@ class MaterialImage:
             return False
         for k, term in enumerate(self.terms):
             color, texture, has_texture = self._factors(term)
-            add_term(term.image, color, texture, term.outgoing, has_texture, self._first, k == 0, radiance)
+            add_term(term.displayed, color, texture, term.outgoing, has_texture, self._first, k == 0, radiance)
             term.is_composed = True
         own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:

@@ -52,8 +52,12 @@ class Mixer:
 
     def mixes_all(self) -> bool:
         """Whether every term that lacks its light can have it at once."""
-        recipes = [self._recipe(*found) for found in self._unlit()]
-        return all(recipe is not None and not recipe.lacking for recipe in recipes)
+        return all(self.mixes(*found) for found in self._unlit())
+
+    def mixes(self, material: MaterialImage, image: TermImage) -> bool:
+        """Whether a term can have the light of the look at once."""
+        recipe = self._recipe(material, image) if image.can_follow() else None
+        return recipe is not None and not recipe.lacking
 
     def next_need(self) -> Need | None:
         """The image of a source that is lacking, of a material with few samples first."""
@@ -75,7 +79,7 @@ class Mixer:
         if self._held is None or not held:
             return None
         wanted = straight_from(light, held), of_source(light, self._held)
-        lacking = [(s, m, t) for s in wanted for m, t in self._terms() if self._alone(m, t, s) is None]
+        lacking = [(s, m, t) for s in wanted for m, t in self._images.terms() if self._alone(m, t, s) is None]
         num_bytes = sum(shaded_bytes(material.num_samples) for _, material, _ in lacking)
         if not lacking or num_bytes > cache.budget_bytes - cache.used_bytes:
             return None
@@ -93,11 +97,7 @@ class Mixer:
 
     def _unlit(self) -> Iterator[tuple[MaterialImage, TermImage]]:
         """Terms that show their curves in another light."""
-        return ((material, image) for material, image in self._terms() if image.can_follow())
-
-    def _terms(self) -> Iterator[tuple[MaterialImage, TermImage]]:
-        materials = self._images.by_name.values()
-        return ((material, image) for material in materials if material.num_samples for image in material.terms)
+        return ((material, image) for material, image in self._images.terms() if image.can_follow())
 
     def _recipe(self, material: MaterialImage, image: TermImage) -> _Recipe | None:
         """How the term's image is mixed; None where other things than gains have changed."""

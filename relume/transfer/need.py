@@ -58,7 +58,7 @@ class Need:
         bands: of the term's curves, (3, J) each. num_bytes: memory to keep it.
         light: what arrives at it. parts: that it is the sum of, where there are several.
         is_default: the term is one of the scene's own look, whose images stay beside the store.
-        refines: the picture is near its look without it, or shows a glimpse; it can wait until the hand rests.
+        refines: the picture is near its look without it, or shows a glimpse of it; it can wait until the hand rests.
     """
 
     what: str
@@ -157,7 +157,7 @@ def next_need(images: ViewImages, hand: Hand) -> Need | None:
     for candidate in lacking:
         images.cache.check(candidate.num_bytes)
     if lacking:
-        return _need(images, lacking[0], refines=lacking[0].image.is_glimpse)
+        return _need(images, lacking[0], refines=lacking[0].image.is_roughly_shown())
     if hand.touched is not None and is_freezable(hand.touched) and _is_awaited(images, hand.touched):
         return _need(images, hand.touched, refines=False)
     for material in images.by_name.values():

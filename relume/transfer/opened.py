@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -61,6 +61,10 @@ class Transfer:
     def edited(self) -> DerivedImages:
         """Those of other looks, the newest of them, for when the same look is opened after a restart."""
         return DerivedImages(Path(self.key) / "edited", _EDITED_BYTES)
+
+    def has_image(self, key: Hashable) -> bool:
+        """Whether the image of a term is beside the store, under the name of a `Need` without the store's own."""
+        return self.derived.has(key) or self.edited.has(key)
 
     @cached_property
     def local(self) -> LocalLights:

@@ -14,9 +14,11 @@ from relume.errors import ParameterError
 from relume.look import EnvironmentKey, Look
 from relume.look.model import Rgb
 from relume.transfer.cache import FrozenCache
+from relume.transfer.changeover import Changeover
+from relume.transfer.fidelity import Fidelity, worst
 from relume.transfer.following import RowsNeed
 from relume.transfer.glimpse import Glimpse
-from relume.transfer.light import Light, gain_of
+from relume.transfer.light import Light
 from relume.transfer.light_mode import LightMode
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
@@ -42,10 +44,13 @@ class Advance:
 
     Attributes:
         tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
+        fidelity: how nearly it shows it. complete: something of every term is shown.
     """
 
     tiles: list[Tile]
     exact: bool
+    fidelity: Fidelity
+    complete: bool
 
     @property
     def changed(self) -> bool:
@@ -54,9 +59,13 @@ class Advance:
 
 
 class Picture:
-    """State of one session's picture; used from one thread at a time, while a `Need` is made in another."""
+    """State of one session's picture; used from one thread at a time, while a `Need` is made in another.
 
-    def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
+    Args:
+        is_watched: somebody looks at it while it opens, and sees a rough picture first where a better one takes long.
+    """
+
+    def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache, *, is_watched: bool = False) -> None:
         self._transfer = transfer
         self._images = ViewImages(transfer, view_name, cache)
         self._view = self._images.view
@@ -67,14 +76,14 @@ class Picture:
         self._unit_background: tuple[EnvironmentKey | None, F32] = None, np.empty((0, 3), np.float32)
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
-        self._light_mode = LightMode(self._images)
+        self._light_mode, self._changeover = LightMode(self._images), Changeover(self._images)
+        self._is_to_open = is_watched
 
     def set_look(self, look: Look) -> None:
         """A new target; nothing is computed yet."""
         before, images = self._images.light, self._images
-        is_shown = any(t.effective is not None or t.is_glimpse for m in images.by_name.values() for t in m.terms)
         images.set_look(look)
-        self._light_mode.follow_look(before, look, was_shown=is_shown)
+        self._light_mode.follow_look(before, look)
         if (images.light.environment, images.light.local) != (before.environment, before.local):
             self._touched = None  # the hand has moved on to a light
         self._moved = moved_parameter(self._look, look)
@@ -103,6 +112,9 @@ class Picture:
         Raises:
             MemoryBudgetError: something that the look lacks is larger than the cache may be.
         """
+        if self._is_to_open:
+            self._is_to_open = False
+            self._light_mode.preview()
         of_light = self._light_mode.next_need()
         of_look = of_light or next_need(self._images, Hand(self._find(self._touched), self._find(self._moved)))
         return of_look or self._light_mode.held_need()
@@ -111,6 +123,7 @@ class Picture:
         """Go on with what a need has made, unless the look has moved on to where it is of no use."""
         if not isinstance(need, Need):
             self._light_mode.adopt(need, made)
+            self._change_over(need)
             return
         image = need.image
         if not any(image is known for known in need.material.terms) or image.kind != need.kind:
@@ -139,27 +152,31 @@ class Picture:
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
         images = self._images
-        self._light_mode.step()
+        self._change_over()
         for material in images.by_name.values():
             for term in material.changed_terms():
                 frozen = images.operator(material, term)
                 if frozen is not None:
                     term.step(frozen, max_coefficients)
         tiles: set[Tile] = set()
-        exact = True
         for index, material in enumerate(images.by_name.values()):
-            if material.num_samples == 0:
-                continue
-            if material.compose(self._radiance):
+            if material.num_samples and material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
-            exact = exact and not any(True for _ in material.changed_terms())
-        light, gain = images.light, gain_of(self._look)
+        light, gain = self._changeover.light, self._changeover.gain
         background = (light.environment, light.environment_gain) if light.paths.direct else None
         if background != self._background or not np.array_equal(self._gain, gain):
             self._gain, self._background = np.array(gain), background
             self._radiance[:, self._view.num_surface_samples :] = self._outside(light).T
             tiles.update(self._view.all_tiles)
-        return Advance(sorted(tiles, key=lambda tile: (tile[1], tile[0])), exact)
+        fidelity = worst(image.fidelity for _, image in images.terms())
+        complete = not any(image.is_blank for _, image in images.terms())
+        in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
+        return Advance(in_order, fidelity == "exact", fidelity, complete)
+
+    def _change_over(self, glimpse: RowsNeed | Glimpse | None = None) -> None:
+        """Show another light where every term can now be shown in it."""
+        self._light_mode.step()
+        self._changeover.step(glimpse if isinstance(glimpse, Glimpse) else None)
 
     def _outside(self, light: Light) -> F32:
         """Radiance of the samples of the background. (n, 3)"""

@@ -19,6 +19,7 @@ from relume.brdf.registry import TERMS
 from relume.errors import EditError
 from relume.look.model import Rgb
 from relume.transfer.along import Along
+from relume.transfer.fidelity import Fidelity, worst
 from relume.transfer.frozen import Frozen, tiles_of
 from relume.transfer.shade import Shaded
 from relume.transfer.stream import columns_of, stream
@@ -41,6 +42,19 @@ class Base:
     is_near: bool
 
 
+@dataclass(frozen=True)
+class Front:
+    """What the picture goes on showing of a term until all terms can be shown in another light.
+
+    Attributes:
+        image, lit: as of `TermImage`. fidelity: how near it was to its look.
+    """
+
+    image: F32
+    lit: Hashable
+    fidelity: Fidelity
+
+
 class TermImage:
     """State of one term.
 
@@ -48,7 +62,9 @@ class TermImage:
         target: bands of each curve in the newest look.
         effective: those that `image` shows; None where it shows nothing.
         is_near: it shows them only as closely as the nodes of a parameter can say them.
-        is_glimpse: `image` is a rough one, of this light or of the one before.
+        lit: light of `image`; None where it shows nothing.
+        front: what the picture shows instead of `image`, where not all terms have their image in one light.
+        is_glimpse: `image` is a rough one. glimpsed: bands of each curve in it, where it is or was the first of all.
         base: the last image that was shaded, where that was in another light. followed: light to which it was brought.
         active: what the operator in use leaves free. shown: its coefficients in `image`, (3, columns).
         term: the declaration of the term's model, fixed parameters put in. model: what tells it from others.
@@ -64,6 +80,9 @@ class TermImage:
         self.effective: dict[str, F64] | None = None
         self.active: Along | None = None
         self.is_near = self.is_glimpse = False
+        self.lit: Hashable = None
+        self.front: Front | None = None
+        self.glimpsed: dict[str, F64] = {}
         self.shown: F64 | None = None
         self.base: Base | None = None
         self.followed: Hashable = None
@@ -79,8 +98,8 @@ class TermImage:
         if model != self.model:
             self.base = None
         if (model, self._light) != self.kind:
-            self.effective = self.active = self.shown = None
-            self.is_near = False
+            self.effective = self.active = self.shown = self.followed = None
+            self.is_near = self.is_glimpse = False
         elif self.active is not None and not self.active.holds_for(document):
             self.active = self.shown = None
         self.model, self.kind = model, (model, self._light)
@@ -91,34 +110,68 @@ class TermImage:
         self.is_composed = False
 
     def set_light(self, light: Hashable) -> None:
-        """Other light: what the image shows counts for nothing, but stands until there is a new one."""
+        """Other light: what the image shows counts for nothing, but the picture goes on showing it (`release`)."""
         if self.effective is not None:
-            self.base = Base(self._light, self.effective, self.image.copy(), self.is_near)
-        self._light = light
+            self.base = Base(self._light, self.effective, self.image, self.is_near)
+        if self.front is None:
+            self.front = Front(self.image, self.lit, worst([self.fidelity, "approximate"]))
+        self.image, self.lit = np.zeros_like(self.image), None
+        self._light, is_composed = light, self.is_composed
         self.set_document(self.document)
+        self.is_composed = is_composed
         base = self.base
         if base is not None and base.light == light:  # as before, after all
             self.show(Shaded(base.image), base.bands)
             self.is_near = base.is_near
 
+    def release(self) -> None:
+        """Every term has its image in one light: the picture shows this one from now on."""
+        if self.front is not None:
+            self.front, self.is_composed = None, False
+
+    @property
+    def displayed(self) -> F32:
+        """What the picture shows of it."""
+        return self.image if self.front is None else self.front.image
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether the picture shows nothing of it, and there is nothing yet that it could."""
+        return self.lit is None and (self.front is None or self.front.lit is None)
+
+    def _show_in(self, light: Hashable) -> None:
+        """`image` is a new one, in this light."""
+        self.lit = light
+        self.is_composed = self.front is not None and self.is_composed
+
     def show(self, shaded: Shaded, bands: Mapping[str, F64]) -> None:
         """Go on from an image of these curves, which may have been the target some time ago."""
         self.image[:] = shaded.image
         self.effective, self.base, self.followed = dict(bands), None, None
-        self.is_near = self.is_glimpse = self.is_composed = False
+        self.is_near = self.is_glimpse = False
+        self._show_in(self._light)
 
-    def glimpse(self, image: F32) -> None:
-        """Show a rough image, of no curves in particular, until there is a better one."""
+    def glimpse(self, image: F32, bands: Mapping[str, F64], light: Hashable) -> None:
+        """Show a rough image of these curves in some light until there is a better one."""
         self.followed = None
         self.image[:] = image
-        self.is_glimpse, self.is_composed = True, False
+        self.is_glimpse, self.glimpsed = True, dict(bands)
+        self._show_in(light)
+
+    def is_roughly_shown(self) -> bool:
+        """Whether its look can be seen, so that the image itself may wait for the hand to rest.
+
+        Where the light has changed every position of the hand brings another glimpse; the first one of all, of a
+        picture that has just been opened, is the only one, and knows nothing of curves that were moved since.
+        """
+        return self.is_glimpse and (self.base is not None or not self._differing(self.glimpsed))
 
     def mix(self, parts: Sequence[tuple[F32, Rgb]], *, from_base: bool) -> None:
         """Show the target in this light: the base or nothing, and images times gains of each channel."""
         base = self.base
         if base is None:
             raise EditError("the term has no image to go on from; shade it first")
-        mixed = base.image if from_base else np.zeros_like(self.image)
+        mixed = base.image.copy() if from_base else np.zeros_like(self.image)
         for image, gain in parts:
             mixed += np.array(gain, np.float32)[:, None] * image
         self.show(Shaded(mixed), self.target)
@@ -129,18 +182,14 @@ class TermImage:
         base = self.base
         return base is not None and self.effective is None and not self._differing(base.bands)
 
-    def is_followed(self) -> bool:
-        """Whether it shows its look but for what rows leave out."""
-        return self.can_follow() and self.followed == self._light
-
-    def follow(self, add_change: Callable[[F32], None]) -> None:
-        """Show the base and what has changed since, which `add_change` adds to an image in place."""
+    def follow(self, light: Hashable, add_change: Callable[[F32], None]) -> None:
+        """Show the base and what has changed since in this light, which `add_change` adds to an image in place."""
         if self.base is None:
             raise EditError("the term has no image to go on from; shade it first")
         self.image[:] = self.base.image
         add_change(self.image)
-        self.followed = self._light
-        self.is_glimpse, self.is_composed = True, False
+        self.followed, self.is_glimpse = light, True
+        self._show_in(light)
 
     def _outgoing(self) -> F32 | None:
         curves = [curve for curve in self.term.curves if curve.outgoing]
@@ -159,6 +208,19 @@ class TermImage:
     def is_exact(self) -> bool:
         """Whether the image shows the target."""
         return self.effective is not None and not self.is_near and not self.differing()
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """How near what the picture shows of it is to its look."""
+        if self.front is not None:
+            return self.front.fidelity
+        if self.lit is None or (self.is_glimpse and self.followed is None):
+            return "preview"
+        if self.is_glimpse:
+            return "followed" if self.followed == self._light else "approximate"
+        if self.differing():
+            return "approximate"
+        return "near" if self.is_near else "exact"
 
     def dormant_key(self, active: Along | None, *, of_target: bool) -> Hashable:
         """What a frozen operator, or an image where nothing is active, depends on besides view and material."""
@@ -212,7 +274,7 @@ class TermImage:
             self.shown = perfect
         self.effective = {**self.effective, **free}
         stream(frozen.transport, columns_of(change), self.image)
-        self.is_composed = False
+        self._show_in(self._light)
         return min(moved, budget)
 
     def _sum(self, frozen: Frozen, active: Along) -> int:
@@ -220,7 +282,7 @@ class TermImage:
         self.shown = active.coefficients(self.target)
         self.image[:] = 0
         stream(frozen.transport, columns_of(self.shown), self.image)
-        self.is_near = not active.is_complete
-        self.is_glimpse = self.is_composed = False
+        self.is_near, self.is_glimpse = not active.is_complete, False
         self.base = self.followed = None
+        self._show_in(self._light)
         return self.shown.size

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,13 @@ from relume.look import LightGeometry, Look, validate
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
-from relume.transfer.light import Light, emission_of, light_of
+from relume.transfer.light import Light, emission_of, gain_of, light_of
 from relume.transfer.local import SAMPLES, Points, Shadows
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.opened import Transfer
 from relume.transfer.pointer import CurvePointer, ParameterPointer
 from relume.transfer.receivers import LocalRays
+from relume.transfer.shade import Shaded
 from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
 
@@ -29,6 +30,7 @@ class ViewImages:
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: what arrives at them. default_light: what does under the scene's own look.
+        gain: what multiplies the finished picture.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache) -> None:
@@ -40,8 +42,12 @@ class ViewImages:
             name: MaterialImage(self.view, index, self.default.materials[name].terms, self.light)
             for index, name in enumerate(transfer.material_names)
         }
-        for name, material in self.by_name.items():
-            material.set_emission(emission_of(self.light, name), self._shines)
+        self.gain = gain_of(self.default)
+
+    def terms(self) -> Iterator[tuple[MaterialImage, TermImage]]:
+        """All that this view sees anything of."""
+        materials = self.by_name.values()
+        return ((material, image) for material in materials if material.num_samples for image in material.terms)
 
     def set_look(self, look: Look) -> None:
         """A new target for every term. Raises what `Transfer.radiance_of` raises; then nothing has changed."""
@@ -53,6 +59,11 @@ class ViewImages:
                 material.set_light(light)
         for name, material in self.by_name.items():
             material.set_documents(look.materials[name].terms)
+        self.gain = gain_of(look)
+
+    def shine_in(self, light: Light) -> None:
+        """Surfaces send out themselves what they do in this light."""
+        for name, material in self.by_name.items():
             material.set_emission(emission_of(light, name), self._shines)
 
     def local_rays(self, material: int, light: Light) -> list[LocalRays]:
@@ -113,6 +124,11 @@ class ViewImages:
     def key_of_image(self, material: MaterialImage, term: TermImage, light: Light) -> tuple[Hashable, ...]:
         """Name of the image of a term's target in some light."""
         return self.transfer.key, self.view.name, material.index, term.key_in(light)
+
+    def is_at_hand(self, material: MaterialImage, term: TermImage) -> bool:
+        """Whether the image of a term's target need not be made: it is in the cache, or was kept with the store."""
+        key = self.key_of_image(material, term, self.light)
+        return self.cache.find(key, Shaded) is not None or self.transfer.has_image(key[1:])
 
     def operator(self, material: MaterialImage, term: TermImage) -> Frozen | None:
         """The operator that the term's image follows now, unless the cache has dropped it."""

@@ -24,7 +24,7 @@ def open_library(cache_bytes: int) -> Library:
     cache = FrozenCache(cache_bytes)
     return Library(
         open_transfer=open_transfer,
-        make_picture=lambda transfer, view: Picture(transfer, view, cache),
+        make_picture=lambda transfer, view: Picture(transfer, view, cache, is_watched=True),
         render=render_image,
         render_small=render_small,
         reference=reference,

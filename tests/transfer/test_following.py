@@ -106,7 +106,7 @@ def test_from_no_bounces_reflected_light_comes_in(gathered):
     assert relative_rmse(picture.image(), exact) < 0.2 * relative_rmse(still, exact)
 
 
-def test_the_first_edit_freezes_rows_and_each_term_follows_with_its_own(gathered):
+def test_the_first_edit_freezes_rows_and_all_terms_follow_together(gathered):
     picture = settle(Picture(gathered, "front", FrozenCache(BUDGET)))
     look = colored(gathered, [0.1, 0.1, 0.8])
     picture.set_look(look)
