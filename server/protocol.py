@@ -264,5 +264,7 @@ class FrameHeader(Message):
     tiles: list[tuple[int, int, int, int]]
     format: Literal["rgb9e5", "jpeg", "f32", "r8"]
     exact: bool
+    fidelity: Literal["preview", "approximate", "followed", "near", "exact"]
+    complete: bool
     kind: Literal["picture", "brush"]
     ms: FrameTimes

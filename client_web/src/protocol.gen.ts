@@ -184,6 +184,8 @@ export interface FrameHeader {
   tiles: [number, number, number, number][];
   format: "rgb9e5" | "jpeg" | "f32" | "r8";
   exact: boolean;
+  fidelity: "preview" | "approximate" | "followed" | "near" | "exact";
+  complete: boolean;
   kind: "picture" | "brush";
   ms: FrameTimes;
 }

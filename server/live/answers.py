@@ -89,7 +89,8 @@ class Answers:
         )
 
     async def _brush(self, viewport: Viewport, brush: BrushMessage, frame: int) -> bytes | None:
-        if viewport.target is None:
+        shown = viewport.advance
+        if viewport.target is None or shown is None:
             return None
         find_curve(brush.curve, viewport.target.document)
         start_s = time.perf_counter()
@@ -106,6 +107,8 @@ class Answers:
             tiles=[(0, 0, width, height)],
             format="r8",
             exact=viewport.is_exact,
+            fidelity=shown.fidelity,
+            complete=shown.complete,
             kind="brush",
             ms=times(0.0, 0.0, (time.perf_counter() - start_s) * 1e3),
         )

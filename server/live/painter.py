@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.imageio import to_bytes, tone_map
-from server.live.ports import Need, Picture, Tile
+from server.live.ports import Advance, Need, Picture, Tile
 from server.protocol import FrameHeader, FrameTimes
 
 Format = Literal["rgb9e5", "jpeg"]
@@ -69,13 +69,12 @@ class Painted:
 
     Attributes:
         need: what must be made before the picture can go on to where it should, or None.
-        tiles: what the step changed.
+        advance: what the step changed, and what the picture shows since.
         message: the packed frame, or None where none is to be sent.
     """
 
     need: Need | None
-    tiles: Sequence[Tile]
-    exact: bool
+    advance: Advance
     message: bytes | None
     update_ms: float
     encode_ms: float = 0.0
@@ -113,7 +112,7 @@ def paint(picture: Picture, order: Order) -> Painted:
     has_news = bool(advance.tiles) or order.is_due
     is_sent = (has_news or not order.is_told) if advance.exact else (has_news and not order.only_exact)
     if not is_sent:
-        return Painted(need, advance.tiles, advance.exact, None, update_ms)
+        return Painted(need, advance, None, update_ms)
     tiles, payload = _payload(picture, order, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
     wait_ms = 0.0 if order.received_s is None else (start_s - order.received_s) * 1e3
@@ -126,10 +125,12 @@ def paint(picture: Picture, order: Order) -> Painted:
         tiles=tiles,
         format=order.form,
         exact=advance.exact,
+        fidelity=advance.fidelity,
+        complete=advance.complete,
         kind="picture",
         ms=times(wait_ms, update_ms, encode_ms),
     )
-    return Painted(need, advance.tiles, advance.exact, pack(header, payload), update_ms, encode_ms)
+    return Painted(need, advance, pack(header, payload), update_ms, encode_ms)
 
 
 def _payload(picture: Picture, order: Order, changed: Sequence[Tile]) -> tuple[list[Tile], bytes]:

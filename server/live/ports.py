@@ -58,6 +58,13 @@ class Advance(Protocol):
     @property
     def exact(self) -> bool: ...
     @property
+    def fidelity(self) -> Literal["preview", "approximate", "followed", "near", "exact"]: ...
+    @property
+    def complete(self) -> bool:
+        """Whether something of every term is shown."""
+        ...
+
+    @property
     def changed(self) -> bool: ...
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from server.live.pace import Pace
 from server.live.painter import Format, Order, Painted, Target
-from server.live.ports import Need, Picture, View
+from server.live.ports import Advance, Need, Picture, View
 from server.live.window import Window
 from server.live.wishes import Wishes
 from server.protocol import BrushMessage
@@ -22,7 +22,7 @@ class Viewport:
         target: the look that it was painted with last.
         need: what the picture waits for.
         is_settled: painting again would show nothing new.
-        is_exact: the client's picture of it is exact.
+        is_exact: the client's picture of it is exact. advance: what the picture shows since it was painted last.
         not_before_s: no refined frame goes out earlier.
         brush: a stretch of a curve whose pixels are to be sent. served_s: when it had its last turn.
     """
@@ -32,6 +32,7 @@ class Viewport:
         self.target: Target | None = None
         self.need: Need | None = None
         self.is_settled = self.is_exact = False
+        self.advance: Advance | None = None
         self.not_before_s = 0.0
         self.brush: BrushMessage | None = None
         self.served_s = 0.0
@@ -91,20 +92,21 @@ class Viewport:
 
     def painted(self, order: Order, painted: Painted, wishes: Wishes) -> None:
         """Remember what the client has when `painted` is sent."""
-        if painted.tiles:
-            self._pace.learn(painted.update_ms, painted.exact)
-        if self.is_behind(order.target) and painted.tiles and order.received_s is not None:
-            self._moving_bytes = 4 * sum(w * h for _, _, w, h in painted.tiles)
-        self.target, self.need = order.target, painted.need
-        is_done = painted.exact or not painted.tiles
+        tiles, exact = painted.advance.tiles, painted.advance.exact
+        if tiles:
+            self._pace.learn(painted.update_ms, exact)
+        if self.is_behind(order.target) and tiles and order.received_s is not None:
+            self._moving_bytes = 4 * sum(w * h for _, _, w, h in tiles)
+        self.target, self.need, self.advance = order.target, painted.need, painted.advance
+        is_done = exact or not tiles
         if painted.message is None:
-            self._lacking = self._lacking.union(painted.tiles)
-            self._has_unsent = self._has_unsent or bool(painted.tiles)
+            self._lacking = self._lacking.union(tiles)
+            self._has_unsent = self._has_unsent or bool(tiles)
             self._wait(is_done, wishes)
             return
         self._lacking = self._all_tiles if order.form == "jpeg" else frozenset()
-        self._has_unsent, self._answered, self.is_exact = False, order.target, painted.exact
-        self._is_blank = self._is_blank and not painted.exact
+        self._has_unsent, self._answered, self.is_exact = False, order.target, exact
+        self._is_blank = self._is_blank and not exact
         self.is_settled = is_done and not self._is_owed(wishes)
         self.not_before_s = 0.0
 

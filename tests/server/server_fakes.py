@@ -115,6 +115,12 @@ class FakeNeed:
         return self.key
 
 
+def advance_of(tiles: list[Any], exact: bool) -> SimpleNamespace:
+    """What a step of a whole picture says."""
+    fidelity = "exact" if exact else "approximate"
+    return SimpleNamespace(tiles=tiles, exact=exact, fidelity=fidelity, complete=True, changed=bool(tiles))
+
+
 @dataclass
 class FakePicture:
     """Radiance = lambert colour + sigma, everywhere; reached in steps. ior needs θd, which is not frozen at first."""
@@ -158,12 +164,12 @@ class FakePicture:
             self.ior, self.spent = ior_of(self.look), 0
         exact = not self._lacks_theta_d()
         if self.spent >= NUM_COEFFICIENTS:
-            return SimpleNamespace(tiles=[], exact=exact, changed=False)
+            return advance_of([], exact)
         budget = NUM_COEFFICIENTS if max_coefficients is None else min(max_coefficients, self.control.max_step)
         self.spent = min(NUM_COEFFICIENTS, self.spent + budget)
         target = colour_and_sigma(self.look) + (self.ior - 1.5)
         self.pixels += (target - self.pixels) * np.float32(self.spent / NUM_COEFFICIENTS)
-        return SimpleNamespace(tiles=self.all_tiles()[:1], exact=exact and self.spent == NUM_COEFFICIENTS, changed=True)
+        return advance_of(self.all_tiles()[:1], exact and self.spent == NUM_COEFFICIENTS)
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:
         width, height = self.view.width, self.view.height
