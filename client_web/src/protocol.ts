@@ -54,6 +54,8 @@ export interface Term {
 export interface MaterialLook {
   terms: Term[];
 }
+export type Fidelity = gen.FrameHeader["fidelity"];
+
 export interface Look {
   materials: Record<string, MaterialLook>;
   /** `map` names an environment of the server, null the scene's own. */

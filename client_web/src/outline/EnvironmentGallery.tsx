@@ -87,7 +87,7 @@ export function EnvironmentGallery() {
       </div>
       <div class="environment-words" role="status">
         {importing.value}
-        {map !== null && <p>Shadows were baked before this light was known: those of small lamps are less exact.</p>}
+        {map !== null && <p>Shadows were baked before this light was known: those of small lamps are approximate.</p>}
       </div>
     </>
   );

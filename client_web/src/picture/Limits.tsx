@@ -1,4 +1,5 @@
-/** In the picture's corner: what it leaves out; a click brings it back. */
+/** In the picture's corner: what it leaves out, which a click brings back, and how near it is to its look. */
+import { marks } from "./fidelity";
 import { limits } from "./limits";
 
 export function Limits() {
@@ -8,6 +9,11 @@ export function Limits() {
         <button key={words} title={title} onClick={lift}>
           {words} <span aria-hidden="true">×</span>
         </button>
+      ))}
+      {marks().map(({ words, title }) => (
+        <p key={words} title={title}>
+          {words}
+        </p>
       ))}
     </div>
   );

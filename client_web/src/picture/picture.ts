@@ -1,7 +1,8 @@
 /** One view's picture: takes the frames of a session, keeps them, and says what lies where. The screen it is on draws
  * it; a picture that is on no screen keeps what it has. */
 import type { Frame } from "../net/frame";
-import type { Rgb } from "../protocol";
+import type { Fidelity, Rgb } from "../protocol";
+import type { Arrival } from "./arrival";
 import { brushed, materialNames } from "../state/store";
 import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
@@ -33,6 +34,7 @@ export class Picture {
   revision = 0;
   /** The revision for which it is exact; −1 while it is not. */
   exactRevision = -1;
+  fidelity: Fidelity = "preview";
   screen: Shows | null = null;
 
   constructor(readonly view: string) {}
@@ -53,6 +55,18 @@ export class Picture {
     }
     this.revision = revision;
     return this.screen?.present();
+  }
+
+  /** Show a picture that has arrived in place of the one that is there. Resolves when it is drawn. */
+  async showArrived({ pixels, jpeg, header }: Arrival): Promise<void> {
+    this.brush = null;
+    this.revision = header.revision;
+    if (pixels !== null) {
+      this.pixels = pixels;
+      this.display = null;
+      this.screen?.renderer.setPicture(pixels);
+    }
+    return jpeg === null ? this.screen?.present() : this.showJpeg(jpeg);
   }
 
   private takeTiles(frame: Frame): void {
@@ -86,9 +100,9 @@ export class Picture {
     return this.pixels.width > 1 || this.display !== null;
   }
 
-  setIds(ids: Ids): void {
+  setIds(ids: Ids | null): void {
     this.ids = ids;
-    this.screen?.renderer.setIds(ids.width, ids.height, ids.values);
+    if (ids !== null) this.screen?.renderer.setIds(ids.width, ids.height, ids.values);
     this.screen?.redraw();
   }
 

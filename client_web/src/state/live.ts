@@ -3,8 +3,9 @@ import { batch, effect } from "@preact/signals";
 import { problemText, request } from "../net/api";
 import type { Frame } from "../net/frame";
 import { Session, type SessionHandlers } from "../net/session";
+import { Arrivals, type Arrival } from "../picture/arrival";
+import { worst } from "../picture/fidelity";
 import { decodeIds } from "../picture/png16";
-import type { Picture } from "../picture/picture";
 import { stage } from "../picture/stage";
 import type { ClientMessage, HelloMessage, Look, ProbeAnswer } from "../protocol";
 import { attempt, note, showError } from "../ui/toasts";
@@ -19,6 +20,8 @@ let session: Session | null = null;
 /** A session on a finer bake, until its first picture is there. */
 let incoming: Session | null = null;
 let onBakeReady: (bake: string) => void = () => undefined;
+/** Of each connection: which views' first pictures are still on their way. */
+const arrivals = new WeakMap<Session, Arrivals>();
 const exactWaiters: (() => void)[] = [];
 
 /** Ask for the picture of the look as it is now, or of what shall be seen of it. */
@@ -80,17 +83,33 @@ export function connect(bake: string): void {
   opened.connect();
 }
 
-async function loadIds(bake: string, picture: Picture): Promise<void> {
-  picture.idsOf = bake;
+async function loadIds(bake: string, view: string, arrival: Arrival): Promise<void> {
   await attempt(async () => {
-    const path = `/api/bakes/${encodeURIComponent(bake)}/views/${encodeURIComponent(picture.view)}/materials.png`;
-    const ids = await decodeIds(await (await request(path)).arrayBuffer());
-    if (picture.idsOf === bake) picture.setIds(ids);
+    const path = `/api/bakes/${encodeURIComponent(bake)}/views/${encodeURIComponent(view)}/materials.png`;
+    arrival.ids = await decodeIds(await (await request(path)).arrayBuffer());
+    const picture = stage.of(view);
+    if (picture.idsOf === bake) picture.setIds(arrival.ids);
   });
 }
 
 /** The views that each connection was asked to show. */
 const told = new WeakMap<Session, string>();
+
+function arrivalsOf(of: Session): Arrivals {
+  const known = arrivals.get(of) ?? new Arrivals();
+  arrivals.set(of, known);
+  return known;
+}
+
+/** What is shown of these views is not what the server has. */
+function tellNothingExact(shown: string[]): void {
+  for (const picture of shown.map((view) => stage.of(view))) {
+    picture.exactRevision = -1;
+    picture.fidelity = "approximate";
+  }
+  store.exact.value = false;
+  store.fidelity.value = "approximate";
+}
 
 /** Say which views are shown, where that is news, and which of them goes first. */
 function tellViews(of: Session, shown: string[], focus: string): void {
@@ -98,9 +117,8 @@ function tellViews(of: Session, shown: string[], focus: string): void {
   if (told.get(of) !== names) {
     if (!of.send({ type: "views", names: shown })) return;
     told.set(of, names);
-    // they are sent whole again
-    for (const view of shown) stage.of(view).exactRevision = -1;
-    if (of === session) store.exact.value = false;
+    arrivalsOf(of).keep(shown);
+    if (of === session) tellNothingExact(shown); // they are sent whole again
   }
   if (shown.length > 1 && shown.includes(focus)) of.send({ type: "focus", view: focus });
 }
@@ -120,6 +138,7 @@ function welcome(of: Session, message: HelloMessage): void {
   if (kept === null || Object.keys(own).some((section) => !(section in kept))) store.look.value = { ...own, ...kept };
   want(of, store.look.peek() as Look, performance.now());
   told.delete(of);
+  arrivals.delete(of);
   const shown = shownOf(message.views, message.view);
   tellViews(of, shown, store.focusedView.peek());
   if (of === session) {
@@ -134,6 +153,13 @@ function welcome(of: Session, message: HelloMessage): void {
 /** Of a bake whose first picture is on its way. */
 let pending: HelloMessage | null = null;
 
+/** The view that the hand will be in when that bake is shown. */
+function activeOf(hello: HelloMessage | null): string | null {
+  if (hello === null) return null;
+  const [shown, active] = [shownOf(hello.views, hello.view), store.viewName.peek()];
+  return shown.includes(active) ? active : (shown[0] ?? null);
+}
+
 /** Follow a session from now on: its bake and views. */
 function showBake(of: Session, { views, view, method }: HelloMessage): void {
   const shown = shownOf(views, view);
@@ -147,31 +173,63 @@ function showBake(of: Session, { views, view, method }: HelloMessage): void {
 }
 
 async function takeFrame(from: Session, frame: Frame): Promise<void> {
-  if (from === incoming && frame.header.kind !== "brush") swap(from);
-  if (store.coming.peek()?.id === from.bake) store.coming.value = null;
-  const { view, kind, exact, revision } = frame.header;
-  if (from !== session || !store.shownViews.peek().includes(view)) return;
+  const { view, kind } = frame.header;
+  if (from !== incoming && (from !== session || !store.shownViews.peek().includes(view))) return;
+  if (!arrivalsOf(from).isShown(view)) return kind === "brush" ? undefined : arrive(from, frame);
+  await stage.of(view).show(frame).catch(showError);
+  if (kind === "picture" && from === session) noteShown(from, frame.header);
+}
+
+/** Take a frame of a view whose first picture is on its way: what is shown stays until that is whole. */
+async function arrive(from: Session, frame: Frame): Promise<void> {
+  const { view } = frame.header;
+  const isNew = arrivalsOf(from).get(view) === undefined;
+  const arrival = arrivalsOf(from).take(frame);
+  if (isNew && stage.of(view).idsOf !== from.bake) void loadIds(from.bake, view, arrival);
+  if (!arrival.isWhole) return;
+  if (from === session) return showArrived(from, view);
+  // views that are beside this one follow as they come
+  if (view === activeOf(pending)) await swap(from);
+}
+
+async function showArrived(of: Session, view: string): Promise<void> {
+  const [arrival, picture] = [arrivalsOf(of).get(view), stage.of(view)];
+  if (arrival === undefined) return;
+  arrivalsOf(of).show(view);
+  if (picture.idsOf !== of.bake) {
+    picture.idsOf = of.bake;
+    picture.setIds(arrival.ids);
+  }
+  if (store.coming.peek()?.id === of.bake) store.coming.value = null;
+  await picture.showArrived(arrival).catch(showError);
+  if (of === session) noteShown(of, arrival.header);
+}
+
+/** A frame is on the screen. */
+function noteShown(of: Session, { view, exact, revision, fidelity }: Frame["header"]): void {
   const picture = stage.of(view);
-  await picture.show(frame).catch(showError);
-  if (kind === "brush" || from !== session) return;
   picture.exactRevision = exact ? revision : -1;
-  store.exact.value = stage.shown.every((each) => each.exactRevision >= from.revision);
+  picture.fidelity = fidelity;
+  store.exact.value = stage.shown.every((each) => each.exactRevision >= of.revision);
+  store.fidelity.value = worst(stage.shown.map((each) => each.fidelity));
   if (!store.exact.value) return;
   for (const done of exactWaiters.splice(0)) done();
 }
 
-function swap(to: Session): void {
+async function swap(to: Session): Promise<void> {
   const old = session;
   session = to;
   incoming = null;
   old?.close();
   store.freezing.value = null;
   forgetWaiting();
-  for (const picture of stage.shown) picture.exactRevision = -1;
   if (pending !== null) showBake(to, pending);
   pending = null;
-  store.coming.value = null;
   store.connection.value = "open";
+  const shown = store.shownViews.peek();
+  tellNothingExact(shown);
+  const whole = shown.filter((view) => arrivalsOf(to).get(view)?.isWhole);
+  await Promise.all(whole.map((view) => showArrived(to, view)));
   note("The new bake is in place.");
 }
 
@@ -187,8 +245,8 @@ function handlersOf(self: () => Session): SessionHandlers {
     frame: (frame) => takeFrame(self(), frame),
     status(message) {
       if (!current()) return;
-      const { state, what, progress } = message;
-      store.freezing.value = state === "ready" ? null : { state, what, progress };
+      const { state, view, what, progress } = message;
+      store.freezing.value = state === "ready" ? null : { state, view, what, progress };
     },
     problem(message, lastGood) {
       showError(`${problemText(message.problem)} The look is as it was before.`);
@@ -218,7 +276,8 @@ function handlersOf(self: () => Session): SessionHandlers {
       editSent(revision, inputTime);
     },
     ended(reason) {
-      if (self() === incoming) incoming = null;
+      if (self() === incoming) incoming = pending = null;
+      if (store.coming.peek()?.id === self().bake) store.coming.value = null;
       showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
     },
     broken: (text) =>
@@ -283,16 +342,11 @@ export async function withPicturesOf(of: Look, take: () => void): Promise<void> 
 effect(() => {
   const [shown, focus] = [store.shownViews.value, store.focusedView.value];
   if (session !== null && shown.length > 0) tellViews(session, shown, focus);
+  if (incoming !== null && pending !== null) tellViews(incoming, shownOf(pending.views, pending.view), focus);
 });
 
 // revisions that the view has already drawn while another one was counted tell nothing about the time they took
 effect(() => forgetDrawn(stage.of(store.focusedView.value).revision));
-
-effect(() => {
-  const bake = store.bake.value;
-  if (bake === null) return;
-  for (const picture of stage.shown) if (picture.idsOf !== bake) void loadIds(bake, picture);
-});
 
 effect(() => {
   store.soloLight.value;

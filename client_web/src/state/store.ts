@@ -2,7 +2,7 @@
 import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
 import type { Transform } from "../picture/transform";
-import type { BakeBody, CurveMessage, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term, Transport } from "../protocol";
+import type { BakeBody, CurveMessage, Fidelity, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term, Transport } from "../protocol";
 import { History } from "./history";
 import { pointer } from "./pointer";
 
@@ -82,11 +82,20 @@ export const probe = signal<{ view: string; x: number; y: number; answer: ProbeA
 export const connection = signal<Connection>("connecting");
 export const retryInMs = signal(0);
 /** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
-export const freezing = signal<{ state: "freezing" | "shading"; what: string; progress: number } | null>(null);
+export const freezing = signal<{
+  state: "freezing" | "shading";
+  view: string;
+  what: string;
+  progress: number;
+} | null>(null);
 /** Whether every shown picture equals the look. */
 export const exact = signal(false);
 /** Exact, and for a moment: what the status bar says, so that it stands still while a hand drags. */
 export const settled = signal(false);
+/** How near the shown pictures are to the look, the worst of them. */
+export const fidelity = signal<Fidelity>("preview");
+/** Whether the light is the one that the bake was made for; in another one "exact" is said of the bake's own answer. */
+export const bakedLight = computed(() => (look.value?.environment.map ?? null) === null);
 export const latencyMs = signal<number | null>(null);
 /** While frames of another look are fetched, the screens keep what they show. */
 export const held = signal(false);

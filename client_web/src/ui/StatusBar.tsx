@@ -5,7 +5,7 @@ import { limits } from "../picture/limits";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
 import { shownPanels } from "../state/room";
-import { coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
+import { bakedLight, coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
 import { toggleTruth } from "../truth/truth";
 import { formatBytes, formatSeconds } from "./scale";
 import { attempt } from "./toasts";
@@ -29,7 +29,8 @@ function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
-  return settled.value ? "exact ✓" : "refining…";
+  if (!settled.value) return "refining…";
+  return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
 }
 
 function bakeWords(): string {

@@ -1,0 +1,57 @@
+import { describe, expect, test } from "vitest";
+import type { Frame } from "../src/net/frame";
+import { Arrivals } from "../src/picture/arrival";
+import { worst } from "../src/picture/fidelity";
+
+function frame(view: string, complete: boolean, at: number, width = 4): Frame {
+  const words = new Uint32Array([at]);
+  return {
+    header: {
+      frame: 1,
+      revision: at,
+      view,
+      width,
+      height: 1,
+      tiles: [[at, 0, 1, 1]],
+      format: "rgb9e5",
+      exact: false,
+      fidelity: "preview",
+      complete,
+      kind: "picture",
+      ms: { wait: 0, update: 0, encode: 0 },
+    },
+    payload: new Uint8Array(words.buffer),
+  };
+}
+
+describe("a view's first picture", () => {
+  test("is kept aside until it is whole, with all that came for it", () => {
+    const arrivals = new Arrivals();
+    expect(arrivals.take(frame("front", false, 1)).isWhole).toBe(false);
+    arrivals.take(frame("left", true, 3));
+    const whole = arrivals.take(frame("front", true, 2));
+    expect(whole.isWhole).toBe(true);
+    expect([...(whole.pixels?.words ?? [])]).toEqual([0, 1, 2, 0]);
+    expect(arrivals.isShown("front")).toBe(false);
+    arrivals.show("front");
+    expect(arrivals.isShown("front")).toBe(true);
+    expect(arrivals.get("left")?.isWhole).toBe(true);
+  });
+
+  test("begins anew in another size, and when the server has forgotten the view", () => {
+    const arrivals = new Arrivals();
+    arrivals.take(frame("front", false, 1));
+    expect(arrivals.take(frame("front", true, 2, 5)).pixels?.words).toHaveLength(5);
+    arrivals.show("front");
+    arrivals.take(frame("left", false, 1));
+    arrivals.keep(["top"]);
+    expect(arrivals.isShown("front")).toBe(false);
+    expect(arrivals.get("left")).toBeUndefined();
+  });
+});
+
+test("several pictures are as true as the worst of them", () => {
+  expect(worst(["exact", "near", "followed"])).toBe("followed");
+  expect(worst(["approximate", "preview"])).toBe("preview");
+  expect(worst([])).toBe("exact");
+});
