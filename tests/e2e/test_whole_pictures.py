@@ -1,0 +1,128 @@
+"""What the canvas shows while pictures take each other's place: each is whole, of one light, and marked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from editor_page import WAIT_MS, Editor
+from editor_server import Server
+from environment_files import dusk, write_map
+from playwright.sync_api import Browser, Page, expect
+from tiny_scenes import still_life
+
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import register_scene
+
+# Of every picture that is drawn: its mean, and which shares of its pixels are red and blue. The surround is left out.
+RECORD = """() => {
+  const draw = WebGL2RenderingContext.prototype.drawArrays;
+  window.draws = [];
+  WebGL2RenderingContext.prototype.drawArrays = function (...call) {
+    draw.apply(this, call);
+    const { width, height } = this.canvas;
+    const pixels = new Uint8Array(4 * width * height);
+    this.readPixels(0, 0, width, height, this.RGBA, this.UNSIGNED_BYTE, pixels);
+    let [sum, count, red, blue] = [0, 0, 0, 0];
+    for (let i = 0; i < pixels.length; i += 4 * 7) {
+      const [r, g, b] = pixels.subarray(i, i + 3);
+      if (r === 20 && g === 20 && b === 20) continue;
+      sum += r + g + b;
+      count += 1;
+      if (r > b + 12) red += 1;
+      if (b > r + 12) blue += 1;
+    }
+    if (count > 0) window.draws.push({ mean: sum / count / 3, red: red / count, blue: blue / count });
+  };
+}"""
+
+
+def draws(page: Page) -> list[dict[str, float]]:
+    """What was drawn since this was asked last."""
+    found: list[dict[str, float]] = page.evaluate("window.draws.splice(0)")
+    return found
+
+
+def test_exchanged_light_comes_to_background_and_objects_at_once(editor: Editor, tmp_path: Path) -> None:
+    page = editor.page
+    white = dusk() / [1.0, 0.4, 0.2]
+    for name, tint in (("red", [1, 0, 0]), ("blue", [0, 0, 1])):
+        page.get_by_label("Environment file").set_input_files(write_map(tmp_path / f"{name}.exr", white * tint))
+        expect(page.get_by_role("radio", name=name)).to_be_checked()
+        editor.wait_until_exact()
+    mark, words = page.locator(".limits p", has_text="Baked for other light"), page.locator(".exactness")
+    expect(mark).to_be_visible()
+    expect(words).to_have_text("exact for this bake ✓")
+    page.evaluate(RECORD)
+    for name in ("red", "blue"):
+        page.get_by_role("radio", name=name).click()
+        page.wait_for_function("(of) => window.draws.at(-1)?.[of] > 0.3", arg=name)
+        editor.wait_until_exact()
+    drawn = draws(page)
+    assert len(drawn) > 2
+    assert max(min(each["red"], each["blue"]) for each in drawn) < 0.01, "a picture of two lights"
+    page.get_by_role("radio", name="Own").click()
+    editor.wait_until_exact()
+    expect(mark).to_have_count(0)
+    expect(words).to_have_text("exact ✓")
+
+
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, str]]:
+    """A server of its own with a coarse bake of the scene, and the scene's id: others would see the finer bake too."""
+    data = tmp_path_factory.mktemp("crossover")
+    scene, ledger = still_life(), Ledger(open_database(f"sqlite:///{data / 'relume.db'}"))
+    register_scene(data, ledger, scene)
+    ledger.close()
+    server = Server(data)
+    server.start()
+    try:
+        bake(server, scene.id, (96, 72))
+        yield server, scene.id
+    finally:
+        server.kill()
+
+
+def bake(server: Server, scene: str, size: tuple[int, int]) -> None:
+    """Bake two views and wait."""
+    made = server.call("/api/bakes", {"scene": scene, "views": ["front", "left"], "size": size, "lights": 200})
+    deadline = time.monotonic() + WAIT_MS / 1e3
+    while made["state"] != "ready":
+        assert time.monotonic() < deadline
+        assert made["state"] in ("queued", "running"), made["problem"]
+        time.sleep(0.1)
+        made = server.call(f"/api/bakes/{made['id']}")
+
+
+def darkest(drawn: list[dict[str, float]]) -> float:
+    """Mean of the darkest picture, in units of that of the last."""
+    means = np.array([each["mean"] for each in drawn])
+    return float(means.min() / means[-1])
+
+
+def test_finer_bake_and_other_view_come_when_they_are_whole(coarse: tuple[Server, str], browser: Browser) -> None:
+    server, scene = coarse
+    page: Any = browser.new_page(viewport={"width": 1280, "height": 800})
+    try:
+        editor = Editor(page)
+        page.goto(f"{server.url}/?scene={scene}")
+        editor.wait_until_exact()
+        page.evaluate(RECORD)
+        bake(server, scene, (480, 360))
+        page.get_by_text("The new bake is in place.").wait_for(timeout=WAIT_MS)
+        editor.wait_until_exact()
+        drawn = draws(page)
+        assert len(drawn) >= 1
+        assert darkest(drawn) > 0.9
+        page.get_by_role("button", name="left").click()
+        page.wait_for_function("() => window.draws.length > 0")
+        editor.wait_until_exact()
+        assert darkest(draws(page)) > 0.9
+        expect(page.locator(".limits p")).to_have_count(0)
+    finally:
+        page.close()
