@@ -30,10 +30,10 @@ class Changeover:
             glimpse: what was just made, perhaps for an earlier light than the look's.
         """
         images = self._images
-        lit = {image.lit for _, image in images.terms() if not image.is_blank} or {images.light}
-        if lit == {images.light}:
+        lit = [image.lit for _, image in images.terms() if not image.is_blank]
+        if all(light == images.light for light in lit):
             self.light, self.gain = images.light, images.gain
-        elif glimpse is not None and lit == {glimpse.light}:
+        elif glimpse is not None and all(light == glimpse.light for light in lit):
             self.light, self.gain = glimpse.light, glimpse.gain
         else:
             return

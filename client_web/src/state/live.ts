@@ -108,7 +108,11 @@ function tellNothingExact(shown: string[]): void {
     picture.fidelity = "approximate";
   }
   store.exact.value = false;
-  store.fidelity.value = "approximate";
+  sayFidelity();
+}
+
+function sayFidelity(): void {
+  store.fidelity.value = worst(stage.shown.filter((each) => each.isThere).map((each) => each.fidelity));
 }
 
 /** Say which views are shown, where that is news, and which of them goes first. */
@@ -211,7 +215,7 @@ function noteShown(of: Session, { view, exact, revision, fidelity }: Frame["head
   picture.exactRevision = exact ? revision : -1;
   picture.fidelity = fidelity;
   store.exact.value = stage.shown.every((each) => each.exactRevision >= of.revision);
-  store.fidelity.value = worst(stage.shown.map((each) => each.fidelity));
+  sayFidelity();
   if (!store.exact.value) return;
   for (const done of exactWaiters.splice(0)) done();
 }

@@ -50,6 +50,7 @@ function reset(scene: SceneBody): void {
   store.pointedView.value = null;
   store.connection.value = "connecting";
   store.freezing.value = null;
+  store.fidelity.value = "exact";
   store.page.value = "editor";
 }
 

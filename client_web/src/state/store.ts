@@ -92,8 +92,8 @@ export const freezing = signal<{
 export const exact = signal(false);
 /** Exact, and for a moment: what the status bar says, so that it stands still while a hand drags. */
 export const settled = signal(false);
-/** How near the shown pictures are to the look, the worst of them. */
-export const fidelity = signal<Fidelity>("preview");
+/** How near the shown pictures are to the look, the worst of them; of no picture nothing bad is said. */
+export const fidelity = signal<Fidelity>("exact");
 /** Whether the light is the one that the bake was made for; in another one "exact" is said of the bake's own answer. */
 export const bakedLight = computed(() => (look.value?.environment.map ?? null) === null);
 export const latencyMs = signal<number | null>(null);
