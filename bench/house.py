@@ -63,6 +63,7 @@ class Server:
     """
 
     port: int
+    pid: int
     started_s: float
     edits: Path
 
@@ -83,7 +84,7 @@ def serving(house: House) -> Iterator[Server]:
     process = subprocess.Popen([sys.executable, "-m", "bench.recording_server", str(edits)], env=environment)
     try:
         _wait(process, port)
-        yield Server(port, began, edits)
+        yield Server(port, process.pid, began, edits)
     finally:
         process.terminate()
         process.wait(30)

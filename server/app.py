@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+import time
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
@@ -42,12 +43,14 @@ def create_app(
     *,
     open_library: OpenLibrary = open_library,
     open_bakes: OpenBakes = open_bakes,
+    clock: Callable[[], float] = time.monotonic,
 ) -> FastAPI:
     """The ASGI app; opens its data at startup and closes it at shutdown.
 
     Args:
         settings: None: from the environment.
         open_library, open_bakes: what sessions and bakes stand on; tests put stand-ins here.
+        clock: seconds, by which things that nobody uses grow old.
     """
     settings = settings or Settings()
     metrics = Metrics()
@@ -55,7 +58,7 @@ def create_app(
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with MATERIALS.at(materials_path(settings.data)), ENVIRONMENTS.at(environments_path(settings.data)):
-            async with open_services(settings, metrics, open_library, open_bakes) as services:
+            async with open_services(settings, metrics, open_library, open_bakes, clock) as services:
                 app.state.services = services
                 yield
                 del app.state.services

@@ -21,6 +21,7 @@ from sqlalchemy import CursorResult, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import CancelledError, NotFoundError, RelumeError
+from relume.memory import give_back
 from server.errors import BusyError, problem_of
 from server.tables import WorkRow
 
@@ -123,6 +124,7 @@ class Backlog:
                 identity = self._next()
                 if identity is not None:
                     self._do(self.get(identity))
+                    give_back()
                     continue
             except Exception:  # the database may be away for a while; the thread must outlive that
                 log.exception("the queue of %ss cannot be read; trying again", self._noun)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"})
 LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.060, 0.100, 0.250, 1.0, 4.0)
@@ -26,10 +26,24 @@ class Metrics:
         self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
         self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
         self._cache = Gauge("relume_frozen_cache_bytes", "Bytes in the frozen caches", registry=registry)
+        self._held = Gauge("relume_held_bytes", "Bytes of arrays that the server holds", ["holder"], registry=registry)
+        self._workers = Gauge(
+            "relume_workers_resident_bytes", "Memory of the server's own worker processes", registry=registry
+        )
+        ProcessCollector(registry=registry)  # process_resident_memory_bytes and the like
 
     def watch_cache(self, used_bytes: Callable[[], int]) -> None:
         """Where the size of the frozen caches is read from."""
         self._cache.set_function(used_bytes)
+
+    def watch_holders(self, holders: Mapping[str, Callable[[], int]]) -> None:
+        """Where it is read from who holds memory in this process; what two hold is counted by one."""
+        for holder, held_bytes in holders.items():
+            self._held.labels(holder).set_function(held_bytes)
+
+    def watch_workers(self, resident_bytes: Callable[[], int]) -> None:
+        """Where the memory of the server's own worker processes is read from."""
+        self._workers.set_function(resident_bytes)
 
     def count_request(self, method: str, status: int) -> None:
         """One HTTP response; a method that nobody knows must not become a label of its own."""

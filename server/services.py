@@ -12,9 +12,12 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from relume.environments.built_in import built_in
+from relume.memory import held_bytes
 from server import tables  # noqa: F401  its tables must be known before the database is opened
 from server.importing import remove_stray_uploads
 from server.live.bake_news import BakeNews
+from server.live.caretaker import Caretaker
 from server.live.ports import Library
 from server.live.resume import ResumeStore
 from server.live.session import House
@@ -26,6 +29,7 @@ from server.renders import RenderQueue
 from server.settings import Settings
 from server.truths import TruthQueue
 from worker.service import BakeService
+from worker.tasks import kept_bytes
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ class Services:
     truths: TruthQueue
     threads: Threads
     transfers: TransferPool
+    caretaker: Caretaker
     house: House
     session_slots: threading.BoundedSemaphore
     import_slots: asyncio.Semaphore
@@ -51,7 +56,7 @@ class Services:
 
 MAX_IMPORTS = 2
 
-OpenLibrary = Callable[[int], Library]
+OpenLibrary = Callable[[int, int], Library]
 OpenBakes = Callable[[Settings], BakeService]
 
 
@@ -62,13 +67,12 @@ def open_bakes(settings: Settings) -> BakeService:
 
 @asynccontextmanager
 async def open_services(
-    settings: Settings, metrics: Metrics, open_library: OpenLibrary, bakes: OpenBakes
+    settings: Settings, metrics: Metrics, open_library: OpenLibrary, bakes: OpenBakes, clock: Callable[[], float]
 ) -> AsyncIterator[Services]:
     """Open everything; close it in the reverse order."""
     settings.data.mkdir(parents=True, exist_ok=True)
     remove_stray_uploads(settings.data, older_than_s=2 * settings.import_seconds)
-    library = open_library(settings.cache_bytes)
-    metrics.watch_cache(library.cache_used_bytes)
+    library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
     renders = RenderQueue(service.ledger.sessions, settings.data, library)
@@ -81,11 +85,23 @@ async def open_services(
         bake_news=BakeNews(service.bakes),
         ack_seconds=settings.ack_seconds,
     )
-    transfers = TransferPool(library.open_transfer, threads.long)
+    transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
+    caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes)
+    metrics.watch_cache(library.cache_used_bytes)
+    metrics.watch_holders(
+        {
+            "frozen_cache": library.cache_used_bytes,
+            "open_bakes": lambda: held_bytes(transfers.opened),
+            "bake_tasks": kept_bytes,
+            "environments": lambda: held_bytes(built_in),
+        }
+    )
+    metrics.watch_workers(service.workers_resident_bytes)
     looks = LookShelf(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     renders.start()
     truths.start()
+    rounds = asyncio.create_task(caretaker.run())
     try:
         yield Services(
             settings=settings,
@@ -96,11 +112,13 @@ async def open_services(
             truths=truths,
             threads=threads,
             transfers=transfers,
+            caretaker=caretaker,
             house=house,
             session_slots=threading.BoundedSemaphore(settings.max_sessions),
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
+        rounds.cancel()
         await asyncio.to_thread(truths.close)
         await asyncio.to_thread(renders.close)
         await asyncio.to_thread(service.close)

@@ -9,6 +9,8 @@ from platformdirs import user_data_dir
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from worker.rest import idle_seconds
+
 GIB = 1024**3
 
 
@@ -35,6 +37,10 @@ class Settings(BaseSettings):
         default=Path(__file__).resolve().parent.parent / "client_web" / "dist", description="the built editor"
     )
     cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of the frozen caches")
+    cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
+    idle_seconds: float = Field(
+        default_factory=idle_seconds, ge=1, description="how long things that nobody uses are kept"
+    )
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")

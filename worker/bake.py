@@ -28,7 +28,7 @@ from worker.ledger import Ledger
 from worker.paths import bake_path, staging_path
 from worker.progress import Progress
 from worker.status import TaskCost
-from worker.tasks import Job, run_task, scene_of
+from worker.tasks import Job, rest, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
 log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ class BakeRunner:
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
-        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner):
+        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), rest.kept_awake():
             self._run()
         self.changed()
 

@@ -19,6 +19,7 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from relume.errors import PlanError
+from relume.memory import resident_bytes
 from relume.transfer.base import Plan
 from worker.dask_executor import DaskExecutor
 
@@ -93,17 +94,33 @@ class Executors:
             counts = self._client.nthreads() if self._client is not None else {}
         return max(1, int(sum(counts.values())))
 
+    def stop_cluster(self) -> None:
+        """End worker processes of our own; the next bake that needs them starts others. No task may be running."""
+        with self._lock:
+            if self._cluster is not None:
+                self._stop_cluster()
+
+    def resident_bytes(self) -> int:
+        """Memory of our own worker processes."""
+        cluster = self._cluster  # the lock may be held while processes start
+        pids = [] if cluster is None else [nanny.pid for nanny in list(cluster.workers.values())]
+        return sum(resident_bytes(pid) for pid in pids if pid is not None)
+
     def close(self) -> None:
         """Stop what was started; running tasks are abandoned, their shards are whole or absent."""
         with self._lock:
             if self._here is not None:
                 self._here.shutdown(wait=False, cancel_futures=True)
-            if self._client is not None:
-                _attempt(self._client.close, timeout=2)
-            if self._cluster is not None:
-                _attempt(self._cluster.sync, _kill_workers, self._cluster, callback_timeout=5)
-                _attempt(self._cluster.close, timeout=5)
-            self._here = self._client = self._cluster = None
+                self._here = None
+            self._stop_cluster()
+
+    def _stop_cluster(self) -> None:
+        if self._client is not None:
+            _attempt(self._client.close, timeout=2)
+        if self._cluster is not None:
+            _attempt(self._cluster.sync, _kill_workers, self._cluster, callback_timeout=5)
+            _attempt(self._cluster.close, timeout=5)
+        self._client = self._cluster = None
 
     def _connect(self) -> Any:
         import dask

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import shutil
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,8 +21,9 @@ from worker.executor import Executors, is_tiny
 from worker.lease import new_owner
 from worker.ledger import Ledger
 from worker.paths import bake_path
+from worker.rest import idle_seconds
 from worker.status import BakeStatus, bake_id
-from worker.tasks import Job, scene_of
+from worker.tasks import Job, rest, scene_of
 
 log = logging.getLogger(__name__)
 
@@ -93,8 +95,9 @@ class BakeService:
             PlanError: the recipe does not fit the scene; MemoryBudgetError: it does not fit the machine.
             ParameterError: there is no such method.
         """
-        scene = scene_of(self.data_dir, self._known_scene(scene_id))
-        plan = self._method(recipe.method).plan(scene, recipe)
+        identity = self._known_scene(scene_id)
+        with rest.kept_awake():
+            plan = self._method(recipe.method).plan(scene_of(self.data_dir, identity), recipe)
         processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
         check_budget(plan, self.data_dir, processes)
         return plan
@@ -138,6 +141,10 @@ class BakeService:
         """Seconds that a bake will take, by those that took place here; None where there were none."""
         return seconds_for(plan, self.ledger.finished_bakes(NUM_JUDGED_BY), self._executors.num_workers)
 
+    def workers_resident_bytes(self) -> int:
+        """Memory of the worker processes that this service has started."""
+        return self._executors.resident_bytes()
+
     def _known_scene(self, scene_id: str) -> str:
         from worker.scenes import get_scene
 
@@ -173,11 +180,16 @@ class BakeService:
 
     def _run_lane(self, tiny: bool) -> None:
         """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
+        at_work_s = time.monotonic()
         while not self._closing.is_set():
             try:
                 self._wakes[tiny].clear()
-                if not self._run_next(tiny):
-                    self._wakes[tiny].wait(POLL_S)
+                if self._run_next(tiny):
+                    at_work_s = time.monotonic()
+                    continue
+                if not tiny and time.monotonic() - at_work_s > idle_seconds():
+                    self._executors.stop_cluster()
+                self._wakes[tiny].wait(POLL_S)
             except Exception:  # the database may be away for a while; the lane must outlive that
                 log.exception("the bake queue cannot be read; trying again")
                 self._closing.wait(POLL_S)

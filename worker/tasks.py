@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from relume.memory import give_back, held_bytes
 from relume.scene.archive import load_scene
 from relume.scene.model import Scene
 from relume.store import fill
 from relume.transfer.base import Recipe, Task, TransferMethod
 from worker.paths import scene_path, staging_path
+from worker.rest import Rest, idle_seconds
 from worker.status import TaskCost
 
 
@@ -45,10 +47,28 @@ def _resident(method: TransferMethod) -> TransferMethod:
     return _methods.setdefault(pickle.dumps(method), method)
 
 
+def _forget() -> None:
+    """Let go of scenes, of what methods built for them, and of what was read of stores."""
+    scene_of.cache_clear()
+    _methods.clear()
+    fill.reader_of.cache_clear()
+    give_back()
+
+
+rest = Rest(idle_seconds, _forget)
+"""Of this process: what it keeps between tasks goes when no task has come for a while."""
+
+
+def kept_bytes() -> int:
+    """What this process keeps between tasks; Embree's structures, about as much again, are not counted."""
+    return held_bytes(scene_of, _methods, fill.reader_of)
+
+
 def run_task(job: Job, task: Task) -> TaskCost:
     """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes."""
     began = time.perf_counter()
-    scene = scene_of(job.data_dir, job.scene_id)
-    staging = staging_path(job.data_dir, job.bake_id)
-    written = fill.run_task(_resident(job.method), scene, job.recipe, staging, task)
+    with rest.kept_awake():
+        scene = scene_of(job.data_dir, job.scene_id)
+        staging = staging_path(job.data_dir, job.bake_id)
+        written = fill.run_task(_resident(job.method), scene, job.recipe, staging, task)
     return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - began)

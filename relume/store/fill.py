@@ -30,14 +30,14 @@ def begin_stage(method: TransferMethod, scene: Scene, recipe: Recipe, staging: P
 
 
 @lru_cache(maxsize=4)
-def _reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
+def reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
     """One for all tasks of a stage that a process does: what they read is complete, and so read only once."""
     return open_staging(staging)
 
 
 def run_task(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
     """Compute a task and write its rows; doing it twice leaves the same bytes."""
-    reader = _reader_of(staging, task.stage, scene.id, recipe)
+    reader = reader_of(staging, task.stage, scene.id, recipe)
     written = method.compute(scene, recipe, task, reader)
     announced = {spec.path for spec in method.arrays(task.stage, scene, recipe, reader)}
     writer = StoreWriter(staging)

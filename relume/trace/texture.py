@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import weakref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,12 @@ class MipMap:
 
     @staticmethod
     def of(texture: Texture) -> MipMap:
-        """The pyramid of a texture, kept for the next call with the same one."""
-        return _pyramid(_ByIdentity(texture))
+        """The pyramid of a texture, kept for as long as the texture is."""
+        key = id(texture)
+        if key not in _pyramids:
+            _pyramids[key] = MipMap(texture)
+            weakref.finalize(texture, _pyramids.pop, key, None).atexit = False
+        return _pyramids[key]
 
     def sample(self, uv: F32, footprint: F32) -> F32:
         """Filtered values.
@@ -58,22 +62,8 @@ class MipMap:
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 
-class _ByIdentity:
-    """A texture as a key: its arrays are not hashable, and equal content is not worth comparing."""
-
-    def __init__(self, texture: Texture) -> None:
-        self.texture = texture
-
-    def __hash__(self) -> int:
-        return id(self.texture)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByIdentity) and other.texture is self.texture
-
-
-@lru_cache(maxsize=32)
-def _pyramid(key: _ByIdentity) -> MipMap:
-    return MipMap(key.texture)
+_pyramids: dict[int, MipMap] = {}
+"""By identity of their textures, for as long as these live; equal content is not worth comparing."""
 
 
 def _halve(image: F32) -> F32:

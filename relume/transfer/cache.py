@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
 from typing import Protocol, TypeVar
 from weakref import WeakValueDictionary
 
@@ -81,6 +81,22 @@ class FrozenCache:
             self._entries[key] = made
             self._used += made.num_bytes - num_bytes
         return made
+
+    def shrink(self, floor_bytes: int, bakes: Collection[str]) -> None:
+        """Drop entries of all but some bakes, least recently used first, until those left hold at most a floor.
+
+        Args:
+            bakes: whose entries stay; the first part of a key names its bake.
+        """
+        with self._lock:
+            others = [key for key in self._entries if not (isinstance(key, tuple) and key[0] in bakes)]
+            held = sum(self._entries[key].num_bytes for key in others)
+            for key in others:
+                if held <= floor_bytes:
+                    return
+                dropped = self._entries.pop(key).num_bytes
+                held -= dropped
+                self._used -= dropped
 
     def _make_room(self, num_bytes: int) -> None:
         while self._entries and self._used + num_bytes > self.budget_bytes:

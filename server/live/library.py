@@ -8,8 +8,12 @@ from typing import Any
 from server.live.ports import Library
 
 
-def open_library(cache_bytes: int) -> Library:
-    """relume's own, with a frozen cache of so many bytes for all sessions together."""
+def open_library(cache_bytes: int, floor_bytes: int) -> Library:
+    """relume's own, with a frozen cache for all sessions together.
+
+    Args:
+        cache_bytes: that it holds at most. floor_bytes: of them, of bakes that nobody uses.
+    """
     # Imported here because they load compiled kernels, which a process that only describes the API can do without.
     from relume.reference import reference_image
     from relume.scene.archive import load_scene
@@ -29,4 +33,5 @@ def open_library(cache_bytes: int) -> Library:
         render_small=render_small,
         reference=reference,
         cache_used_bytes=lambda: cache.used_bytes,
+        shrink_cache=lambda stores: cache.shrink(floor_bytes, {str(store.resolve()) for store in stores}),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -113,6 +113,7 @@ class Library:
         reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,
             reflects=whether surfaces light each other) -> the same by brute force; heavy.
         cache_used_bytes: what the frozen caches hold now.
+        shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
     """
 
     open_transfer: Callable[[Path], Transfer]
@@ -121,3 +122,4 @@ class Library:
     render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., F32]
     cache_used_bytes: Callable[[], int]
+    shrink_cache: Callable[[Collection[Path]], None]

@@ -214,11 +214,13 @@ class Control:
     freezing: threading.Event = field(default_factory=threading.Event)
     may_freeze: threading.Event = field(default_factory=threading.Event)
     may_trace: threading.Event = field(default_factory=threading.Event)
+    stores_kept: list[set[Path]] = field(default_factory=list)
     passes_asked: list[int] = field(default_factory=list)
     reflections_asked: list[bool] = field(default_factory=list)
 
-    def open_library(self, cache_bytes: int) -> Library:
-        return Library(self._open, self._picture, self._render, self._render_small, self._reference, lambda: 123)
+    def open_library(self, cache_bytes: int, floor_bytes: int) -> Library:
+        paint = self._open, self._picture, self._render, self._render_small, self._reference
+        return Library(*paint, lambda: 123, lambda stores: self.stores_kept.append(set(stores)))
 
     def _open(self, path: Path) -> FakeTransfer:
         attributes = open_store(path).attributes

@@ -171,7 +171,7 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
 
     async def run() -> None:
         with ThreadPoolExecutor(2) as executor:
-            pool = TransferPool(open_transfer, executor)
+            pool = TransferPool(open_transfer, executor, 60.0, lambda: 0.0)
             with pytest.raises(StoreError):
                 async with pool.using("broken", Path("broken")):
                     pass

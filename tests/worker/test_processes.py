@@ -11,6 +11,7 @@ import sys
 import time
 import warnings
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,25 @@ def test_two_processes_bake_one_recipe_once(tmp_path: Path, expected: str) -> No
     assert [finish(process)[-1].split()[0] for process in both] == ["ready", "ready"]
     assert set(Counter(log.read_text().split()).values()) == {1}
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
+
+
+def test_workers_that_have_nothing_to_do_end_and_others_start_for_the_next_bake(
+    tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELUME_IDLE_SECONDS", "1")
+    with BakeService(tmp_path, num_workers=1, methods={"fake": FakeMethod(num_rays=LARGE)}) as service:
+        register_scene(service.data_dir, service.ledger, tiny_scene())
+        for size in (RECIPE.size, (16, 16)):
+            identity = service.submit(tiny_scene().id, replace(RECIPE, size=size))
+            with service.subscribe(identity) as changes:
+                resident = [service.workers_resident_bytes() for _ in changes]
+            assert service.get(identity).state == "ready"
+            assert max(resident) > 50e6
+            deadline = time.monotonic() + 60
+            while service.workers_resident_bytes() and time.monotonic() < deadline:
+                time.sleep(0.1)
+            assert service.workers_resident_bytes() == 0
+        assert tree_hash(service.store_path(IDENTITY)) == expected
 
 
 def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:

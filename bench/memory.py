@@ -1,0 +1,129 @@
+"""memory.*: resident memory of a real server and its worker processes, before ten scenes, after them, and at rest.
+
+Each scene is baked, opened in a session, one of its curves taken in hand, its light turned and exchanged, and left.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench.figure import Figure
+from bench.house import House, Server, baked_house, serving, session
+from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.environments.studio import studio
+from relume.errors import PlanError
+from relume.scene.built_in import BUILT_IN
+from relume.scene.model import Scene
+from relume.transfer.base import Recipe
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import register_scene
+
+_REST_S, _MORE_S = 60, 30  # what the server waits before it lets go, and time to do it
+_NUM_SCENES = 10
+
+
+@dataclass(frozen=True)
+class Resident:
+    """Resident memory in bytes. workers: of all processes that the server has started."""
+
+    server: int
+    workers: int
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """One server; scene after scene; then nothing."""
+    size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
+    scenes = list(_scenes(2 if tiny else _NUM_SCENES))
+    with baked_house(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as house:
+        _register(house, scenes[1:])
+        with serving(house) as server:
+            before = _resident(server.pid)
+            for number, scene in enumerate(scenes):
+                _visit(server, scene, size, num_lights, "gather" if number % 2 else "direct")
+            after = _resident(server.pid)
+            time.sleep(0 if tiny else _REST_S + _MORE_S)
+            rest = _resident(server.pid)
+    context = {"scenes": len(scenes), "size": list(size), "lights": num_lights, "rest_s": _REST_S + _MORE_S}
+    found = {"before": before, "after": after, "rest": rest}
+    return [
+        Figure(f"memory.{of}_{when}_mb", getattr(resident, of) / 1e6, "MB", context)
+        for when, resident in found.items()
+        for of in ("server", "workers")
+    ]
+
+
+def _scenes(count: int) -> Iterator[Scene]:
+    """Scenes of several sizes made by code, each another."""
+    yield from [make() for make in BUILT_IN.values()][:count]
+    for number in range(count - len(BUILT_IN)):
+        yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.05 * number)), (LAMBERT,))
+
+
+def _register(house: House, scenes: list[Scene]) -> None:
+    ledger = Ledger(open_database(f"sqlite:///{house.data / 'relume.db'}"))
+    for scene in scenes:
+        register_scene(house.data, ledger, scene)
+    ledger.close()
+
+
+def _visit(server: Server, scene: Scene, size: tuple[int, int], num_lights: int, method: str) -> None:
+    """Bake a scene, look at it, edit it, and leave."""
+    views = [scene.cameras[0].name]
+    bake = _call(server, "POST", "/api/bakes", scene=scene.id, views=views, size=size, lights=num_lights, method=method)
+    while bake["state"] in ("queued", "running"):
+        time.sleep(0.2)
+        bake = _call(server, "GET", f"/api/bakes/{bake['id']}")
+    if bake["state"] != "ready":
+        raise PlanError(f"the bake {bake['state']}: {bake['problem']}")
+    material = scene.materials[0]
+    curve = "theta_i" if material.terms[0]["model"] == "lambert" else "theta_h"
+    light = [("/environment/rotation", 40.0), ("/environment/map", "sunset")]
+    with session(server, bake["id"]) as client:
+        client.exact(0)
+        client.send(type="touch", curve=f"/materials/{material.name}/terms/0/curves/{curve}")
+        for revision, (path, value) in enumerate(light, start=1):
+            client.send(type="edit", revision=revision, patch=[{"op": "replace", "path": path, "value": value}])
+            client.exact(revision)
+
+
+def _call(server: Server, verb: str, path: str, **body: Any) -> Any:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    headers = {"Content-Type": "application/json"} if body else {}
+    connection.request(verb, path, json.dumps(body) if body else None, headers)
+    answer = json.load(connection.getresponse())
+    connection.close()
+    return answer
+
+
+def _resident(server: int) -> Resident:
+    """Of a process, and of all that it and they have started."""
+    parents = dict(_processes())
+    below, found = {server}, 0
+    while len(below) > found:
+        found = len(below)
+        below |= {pid for pid, parent in parents.items() if parent in below}
+    return Resident(_resident_bytes(server), sum(_resident_bytes(pid) for pid in below - {server}))
+
+
+def _processes() -> Iterator[tuple[int, int]]:
+    """Every process with its parent."""
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            yield int(path.parent.name), int(path.read_text().rpartition(")")[2].split()[1])
+        except OSError:  # it has ended
+            continue
+
+
+def _resident_bytes(pid: int) -> int:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS:")), 0)

@@ -1,0 +1,182 @@
+"""What nobody looks at is let go, what somebody looks at is not, and a bake that was let go opens as it was."""
+
+import asyncio
+import gc
+import threading
+import weakref
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from prometheus_client.parser import text_string_to_metric_families
+from session_client import open_session
+from tiny_scenes import still_life
+
+from relume.memory import held_bytes
+from relume.scene.archive import make_scene
+from relume.transfer.base import Recipe
+from server.app import create_app
+from server.live.transfers import TransferPool
+from server.settings import Settings
+from worker.scenes import register_scene
+
+IDLE_S, FLOOR_BYTES = 60.0, 100_000
+NUM_SCENES = 3
+CURVE = "/materials/Ball/terms/1/curves/theta_h"
+
+
+class Clock:
+    now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def real(tmp_path: Path, clock: Clock) -> Iterator[TestClient]:
+    settings = Settings(
+        data=tmp_path, allowed_hosts=["testserver"], idle_seconds=IDLE_S, cache_floor_bytes=FLOOR_BYTES
+    )
+    with TestClient(create_app(settings, clock=clock)) as client:
+        yield client
+
+
+def go_round(client: TestClient) -> None:
+    client.portal.call(client.app.state.services.caretaker.go_round)
+
+
+def bake_scenes(client: TestClient) -> list[str]:
+    """Bakes of scenes that differ in the colour of the ball."""
+    bakes, base, found = client.app.state.services.bakes, still_life(), []
+    for number in range(NUM_SCENES):
+        ball = base.materials[2]
+        diffuse = {"model": "lambert", "color": [0.1 * number, 0.05, 0.05]}
+        materials = [*base.materials[:2], replace(ball, terms=(diffuse, *ball.terms[1:]))]
+        scene = make_scene(f"still life {number}", base.meshes, materials, base.cameras, base.environment)
+        register_scene(bakes.data_dir, bakes.ledger, scene)
+        found.append(bakes.submit(scene.id, Recipe("direct", ("front",), (48, 32), 60)))
+    for bake in found:
+        with bakes.subscribe(bake) as changes:
+            assert list(changes)[-1].state == "ready"
+    return found
+
+
+def look_at(client: TestClient, bake: str) -> bytes:
+    """The exact picture of a bake, one of its curves frozen and moved."""
+    with open_session(client, bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=CURVE)
+        session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
+        return session.exact(1).payload
+
+
+def gauges(client: TestClient) -> dict[str, float]:
+    """Every sample of /metrics by its name, and by its holder where it has one."""
+    families = text_string_to_metric_families(client.get("/metrics").text)
+    return {s.labels.get("holder", s.name): s.value for family in families for s in family.samples}
+
+
+def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -> None:
+    pool = real.app.state.services.transfers
+    bakes = bake_scenes(real)
+    pictures = [look_at(real, bake) for bake in bakes]
+    go_round(real)
+    kept = [weakref.ref(transfer) for transfer in pool.opened]
+    before = gauges(real)
+    assert kept
+    assert before["open_bakes"] > 0
+    assert before["frozen_cache"] == before["relume_frozen_cache_bytes"] > FLOOR_BYTES
+    assert before["process_resident_memory_bytes"] > before["open_bakes"]
+
+    clock.now += IDLE_S + 1
+    go_round(real)
+    gc.collect()
+    assert [ref() for ref in kept] == [None] * len(kept)
+    after = gauges(real)
+    assert after["open_bakes"] == 0
+    assert 0 < after["frozen_cache"] <= FLOOR_BYTES
+
+    assert [look_at(real, bake) for bake in bakes] == pictures
+
+
+def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) -> None:
+    shown, left = bake_scenes(real)[:2]
+    look_at(real, left)
+    with open_session(real, shown) as session:
+        session.send(type="touch", curve=CURVE)
+        session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
+        session.exact(1)
+        (transfer,) = [one for one in real.app.state.services.transfers.opened if shown in one.key]
+        clock.now += 100 * IDLE_S
+        go_round(real)
+        assert real.app.state.services.transfers.opened == [transfer]
+        assert gauges(real)["frozen_cache"] > FLOOR_BYTES
+        session.edit(2, "/materials/Ball/terms/1/params/sigma", 0.25)
+        session.exact(2)
+    clock.now += IDLE_S - 1
+    go_round(real)
+    assert real.app.state.services.transfers.opened == [transfer]
+
+
+def run_alone(coroutine: Any) -> None:
+    """In a thread of its own: the browser tests' event loop may still stand in this one."""
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, coroutine).result()
+
+
+def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
+    """At every moment of opening and leaving: whoever has asked gets a transfer, and all who use one get the same."""
+    clock, may_open, opened = Clock(), threading.Event(), []
+
+    def open_transfer(path: Path) -> Any:
+        may_open.wait(30)
+        opened.append(object())
+        return opened[-1]
+
+    async def use(pool: TransferPool, may_leave: asyncio.Event) -> Any:
+        async with pool.using("one", Path("one")) as found:
+            await may_leave.wait()
+            return found
+
+    async def run() -> None:
+        with ThreadPoolExecutor(2) as executor:
+            pool, may_leave = TransferPool(open_transfer, executor, IDLE_S, clock), asyncio.Event()
+            first = asyncio.create_task(use(pool, may_leave))
+            await asyncio.sleep(0)
+            clock.now += 2 * IDLE_S
+            assert pool.let_go() == (0, {Path("one")})  # it is being opened
+            may_open.set()
+            second = asyncio.create_task(use(pool, may_leave))
+            await asyncio.sleep(0)
+            may_leave.set()
+            assert await first is await second is opened[0]
+            clock.now += IDLE_S - 1
+            assert pool.let_go() == (0, {Path("one")})
+            clock.now += 2
+            assert pool.let_go() == (1, set())
+            assert await use(pool, may_leave) is opened[1]
+
+    run_alone(run())
+    assert len(opened) == 2
+
+
+def test_what_is_reached_twice_is_counted_once() -> None:
+    array = np.zeros(1000, np.float64)
+    views = {"a": array, "b": [array[10:], array.reshape(10, 100)], "own": np.ones(5, np.uint8)}
+    assert held_bytes(views) == array.nbytes + 5
+    assert held_bytes(lambda: views) == array.nbytes + 5
+
+
+def test_a_file_mapped_into_memory_is_the_systems(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.zeros(1000))
+    assert held_bytes(np.load(tmp_path / "map.npy", mmap_mode="r").view(np.ndarray)) == 0

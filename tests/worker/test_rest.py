@@ -1,0 +1,93 @@
+"""What a process keeps between tasks is forgotten when no task comes, and never during one."""
+
+import threading
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+
+from relume.scene.model import Texture
+from relume.trace.texture import MipMap
+from worker import tasks
+from worker.rest import DEFAULT_IDLE_S, Rest, idle_seconds
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+WAIT_S = 60
+
+
+class Timers:
+    """Stands in for `threading.Timer`; time goes on when a test says so."""
+
+    def __init__(self) -> None:
+        self.running: list[Timers.One] = []
+        timers = self
+
+        class One:
+            def __init__(self, after_s: float, call: object) -> None:
+                self.call, self.daemon = call, False
+
+            def start(self) -> None:
+                assert self.daemon  # it must not keep the process from ending
+                timers.running.append(self)
+
+            def cancel(self) -> None:
+                timers.running.remove(self)
+
+        self.Timer = One
+
+    def elapse(self) -> None:
+        for timer in list(self.running):
+            timer.call()
+
+
+def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    timers, forgotten = Timers(), []
+    monkeypatch.setattr(threading, "Timer", timers.Timer)
+    rest = Rest(lambda: 60.0, lambda: forgotten.append(True))
+    with rest.kept_awake():
+        with rest.kept_awake():
+            timers.elapse()
+        timers.elapse()
+    assert forgotten == []
+    with pytest.raises(ZeroDivisionError), rest.kept_awake():
+        _ = 1 / 0
+    assert len(timers.running) == 1
+    timers.elapse()
+    assert forgotten == [True]
+
+
+def test_scene_and_what_was_built_for_it_go_after_a_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RELUME_IDLE_SECONDS", "1")
+    forgotten = threading.Event()
+    monkeypatch.setattr(tasks, "give_back", forgotten.set)
+    with BakeService(tmp_path, methods={"fake": FakeMethod()}) as service:
+        scene = tiny_scene("one that goes")
+        register_scene(service.data_dir, service.ledger, scene)
+        with service.subscribe(service.submit(scene.id, RECIPE)) as changes:
+            assert list(changes)[-1].state == "ready"
+        with tasks.rest.kept_awake():
+            loaded = weakref.ref(tasks.scene_of(service.data_dir, scene.id))
+            assert tasks.kept_bytes() > 0
+            forgotten.clear()
+        assert forgotten.wait(WAIT_S)
+    assert loaded() is None
+    assert tasks.kept_bytes() == 0
+
+
+def test_idle_seconds_are_those_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RELUME_IDLE_SECONDS", raising=False)
+    assert idle_seconds() == DEFAULT_IDLE_S
+    for text, seconds in (("5", 5.0), ("0", 1.0), ("soon", DEFAULT_IDLE_S)):
+        monkeypatch.setenv("RELUME_IDLE_SECONDS", text)
+        assert idle_seconds() == seconds
+
+
+def test_pyramid_of_a_texture_goes_with_it() -> None:
+    texture = Texture(np.zeros((4, 4, 3), np.float32))
+    pyramid = weakref.ref(MipMap.of(texture))
+    assert MipMap.of(texture) is pyramid()
+    del texture
+    assert pyramid() is None
