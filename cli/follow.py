@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from worker.board import Subscription
-from worker.status import BakeStatus
+from worker.status import PHASE_WORDS, BakeStatus
 
 
 def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = lambda: False) -> BakeStatus:
@@ -26,12 +27,16 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
 
 
 def detail(status: BakeStatus) -> str:
-    """State, rate and time left, in words."""
+    """What it does, rate and time left, in words."""
     if status.state == "queued":
-        return "waiting"
-    parts = []
+        return "waiting" if status.ahead == 0 else f"waiting for {status.ahead} before it"
+    if status.phase is None:
+        return "starting"
+    since_s = time.time() - (status.phase_since or time.time())
+    if status.phase not in ("sampling", "tracing"):
+        return f"{PHASE_WORDS[status.phase]}, {since_s:.0f} s"
+    parts = [PHASE_WORDS[status.phase]]
     if status.rays_per_second:
         parts.append(f"{status.rays_per_second / 1e6:.1f} M rays/s")
-    if status.seconds_left is not None:
-        parts.append(f"{status.seconds_left:.0f} s left")
-    return ", ".join(parts) or "starting"
+    left = "estimating the time left" if status.seconds_left is None else f"{status.seconds_left:.0f} s left"
+    return ", ".join([*parts, left])

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from worker.status import Phase
+
 Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
 Name = Annotated[str, Field(min_length=1, max_length=256)]
 Side = Annotated[int, Field(ge=1, le=16384)]
@@ -207,12 +209,18 @@ class RecipeBody(Body):
 
 
 class BakeBody(Body):
-    """A bake; `progress` 0…1, `problem` one sentence where it failed."""
+    """A bake; `progress` 0…1, `problem` one sentence where it failed.
+
+    `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for.
+    """
 
     id: str
     scene: str
     state: Literal["queued", "running", "ready", "failed", "cancelled"]
     progress: float
+    phase: Phase | None
+    phase_seconds: float | None
+    ahead: int
     rays_per_second: float | None
     seconds_left: float | None
     bytes: int

@@ -25,9 +25,10 @@ from relume.store import fill, open_store, publish
 from relume.transfer.base import Task
 from worker.lease import HEARTBEAT_S, LeaseKeeper
 from worker.ledger import Ledger
+from worker.notes import note_path, read_note
 from worker.paths import bake_path, staging_path
-from worker.progress import Progress
-from worker.status import TaskCost
+from worker.progress import Expected, Progress
+from worker.status import Phase, TaskCost
 from worker.tasks import Job, rest, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
@@ -44,6 +45,7 @@ class BakeRunner:
         window: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect at once.
         changed: called after every change of the ledger.
         stopped: the service is closing; the bake stays `running` for the next start.
+        expected: what finished bakes tell of this one.
     """
 
     ledger: Ledger
@@ -53,12 +55,17 @@ class BakeRunner:
     window: Callable[[], int]
     changed: Callable[[], None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
+    expected: Expected = field(default_factory=Expected)
     _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
+    _entered: tuple[Phase | None, float] = (None, 0.0)
+    _is_working: bool = False
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
         with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), rest.kept_awake():
+            note_path(self._staging).unlink(missing_ok=True)  # of an earlier run
             self._run()
+            note_path(self._staging).unlink(missing_ok=True)
         self.changed()
 
     def _run(self) -> None:
@@ -84,11 +91,13 @@ class BakeRunner:
             self.ledger.forget_tasks(job.bake_id)
         status = self.ledger.bake(job.bake_id)
         shown = status.progress if self.ledger.finished_tasks(job.bake_id) else 0.0
-        scene, progress = scene_of(job.data_dir, job.scene_id), Progress(status.plan, shown)
+        progress = Progress(status.plan, shown, self.expected)
+        self._beat(progress, "reading")
+        scene = scene_of(job.data_dir, job.scene_id)
         fill.begin(job.method, scene, job.recipe, staging)
         for stage in range(len(job.method.stages)):
             self._run_stage(scene, stage, progress)
-        self._beat(progress)
+        self._beat(progress, "publishing")
         try:
             return publish(staging, target)
         except ChunkDamagedError:
@@ -107,7 +116,7 @@ class BakeRunner:
                 progress.add(task, cost, here=False)
             else:
                 waiting.append((task, 1))
-        self._beat(progress)
+        self._beat(progress, self._phase(stage, progress))
         while waiting or self._flying:
             room = self.window() - len(self._flying)
             while waiting and room > 0:
@@ -117,7 +126,19 @@ class BakeRunner:
             finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
             for future in finished:
                 self._collect(future, waiting, progress)
-            self._beat(progress)
+            self._beat(progress, self._phase(stage, progress))
+
+    def _phase(self, stage: int, progress: Progress) -> Phase:
+        """What the processes are at: until one of them works, what they do to get ready."""
+        note = read_note(self._staging)
+        if note == "compiling":
+            return note
+        if not self._is_working and note != "working":
+            return note or "loading"
+        if not self._is_working:
+            self._is_working = True
+            progress.begin_work()
+        return "sampling" if stage == 0 else "tracing"
 
     def _collect(self, future: Future[TaskCost], waiting: deque[tuple[Task, int]], progress: Progress) -> None:
         task, attempt = self._flying.pop(future)
@@ -138,11 +159,15 @@ class BakeRunner:
             waiting.append((task, attempt + 1))
             return
         self.ledger.finish_task(self.job.bake_id, task, cost, attempt)
+        self._is_working = True
         progress.add(task, cost, here=True)
 
-    def _beat(self, progress: Progress) -> None:
+    def _beat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError where somebody wants this run to end."""
-        if self.stopped() or not self.ledger.beat(self.job.bake_id, self.owner, **progress.fields()):
+        if phase != self._entered[0]:
+            self._entered = phase, time.time()
+        entered = dict(zip(("phase", "phase_since"), self._entered, strict=True))
+        if self.stopped() or not self.ledger.beat(self.job.bake_id, self.owner, **progress.fields(), **entered):
             raise CancelledError("the bake was stopped")
         self.changed()
 

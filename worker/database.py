@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Engine, MetaData, create_engine, event
+from sqlalchemy import Column, Connection, Engine, MetaData, Table, create_engine, event, inspect, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import DBAPIError
 
@@ -25,7 +26,28 @@ def open_database(url: str) -> Engine:
     if sqlite:
         event.listen(engine, "connect", _set_up_sqlite)
     create_tables(engine, Base.metadata)
+    add_columns(engine, Base.metadata)
     return engine
+
+
+def add_columns(engine: Engine, metadata: MetaData) -> None:
+    """Add the columns that tables of an older relume lack; they are empty there. Two processes may do so at once."""
+    for attempt in range(CREATE_ATTEMPTS):
+        try:
+            with engine.begin() as connection:
+                for table, column in _lacking(connection, metadata):
+                    kind = column.type.compile(engine.dialect)
+                    connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {column.name} {kind}"))
+            return
+        except DBAPIError:
+            if attempt == CREATE_ATTEMPTS - 1:
+                raise
+
+
+def _lacking(connection: Connection, metadata: MetaData) -> Iterator[tuple[Table, Column[Any]]]:
+    for table in metadata.sorted_tables:
+        known = {column["name"] for column in inspect(connection).get_columns(table.name)}
+        yield from ((table, column) for column in table.columns if column.name not in known and column.nullable)
 
 
 def create_tables(engine: Engine, metadata: MetaData) -> None:

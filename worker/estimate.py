@@ -1,12 +1,13 @@
-"""How long a bake will take, judged by what finished ones took of their plans."""
+"""How long a bake will take, judged by what finished ones took of their plans, and by how busy the machine is."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from relume.transfer.base import Plan
-from worker.executor import is_tiny
+from worker.executor import is_tiny, num_cores
 
 
 @dataclass(frozen=True)
@@ -15,20 +16,38 @@ class Finished:
 
     Attributes:
         task_s: seconds of its tasks, as if they had run one after another.
+        crowding: how many wanted each core at its end.
     """
 
     plan: Plan
     task_s: float
+    crowding: float = 1.0
 
 
-def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int) -> float | None:
+def load_of_machine() -> float:
+    """How many threads want to run, the mean of the last minute; 0 where the system does not tell."""
+    try:
+        return os.getloadavg()[0]
+    except (OSError, AttributeError):
+        return 0.0
+
+
+def crowding(load: float) -> float:
+    """How many of so many threads want each core, at least one: by so much does each of them take longer."""
+    return max(1.0, load / num_cores())
+
+
+def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crowded: float = 1.0) -> float | None:
     """Wall seconds that a bake will take; None where nothing was measured yet.
 
     A plan counts rays that are never traced: edges that are not there, lights behind the surface, shadows that are
     predicted. So the rate is that of planned rays. Tiny bakes run one task at a time, others `num_workers`; the others'
     rate includes their own overhead, so a bake is judged by its like where there is one.
+
+    Args:
+        crowded: how many will want each core while it runs.
     """
     alike = [each for each in finished if is_tiny(each.plan) == is_tiny(plan)] or finished
     planned_rays = sum(each.plan.num_rays for each in alike)
-    wall_s = sum(each.task_s / (1 if is_tiny(each.plan) else num_workers) for each in alike)
-    return plan.num_rays * wall_s / planned_rays if planned_rays and wall_s else None
+    wall_s = sum(each.task_s / each.crowding / (1 if is_tiny(each.plan) else num_workers) for each in alike)
+    return crowded * plan.num_rays * wall_s / planned_rays if planned_rays and wall_s else None

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
@@ -21,10 +21,11 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import NotFoundError
 from relume.transfer.base import Plan, Recipe, Task
-from worker.estimate import Finished
+from worker.estimate import Finished, crowding, load_of_machine
+from worker.executor import is_tiny
 from worker.lease import is_alive
 from worker.models import BakeRow, TaskRow
-from worker.status import BakeState, BakeStatus, TaskCost, bake_id, recipe_from_json, recipe_json
+from worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
 
 class Ledger:
@@ -63,14 +64,14 @@ class Ledger:
 
     def requeue(self, identity: str, states: Sequence[BakeState]) -> None:
         """Put a bake that is in one of `states` back into the queue."""
-        self._change(identity, states, state="queued", problem=None, queued=time.time(), seconds_left=None)
+        self._change(identity, states, state="queued", problem=None, queued=time.time(), seconds_left=None, phase=None)
 
     def bake(self, identity: str) -> BakeStatus:
         """A bake by id. Raises NotFoundError."""
         row = self._get(identity)
         if row is None:
             raise NotFoundError(f"there is no bake {identity[:40]}; queue one first")
-        return _status(row)
+        return _status(row, self._ahead([row]))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
         """All bakes, or those of a scene; newest first."""
@@ -78,11 +79,26 @@ class Ledger:
         if scene_id is not None:
             query = query.where(BakeRow.scene_id == scene_id)
         with self.sessions() as session:
-            return [_status(row) for row in session.scalars(query)]
+            rows = list(session.scalars(query))
+        ahead = self._ahead(rows)
+        return [_status(row, ahead) for row in rows]
+
+    def _ahead(self, rows: Sequence[BakeRow]) -> dict[str, int]:
+        """How many bakes will run before each of those that are queued: tiny ones never wait for others."""
+        if not any(row.state == "queued" for row in rows):
+            return {}
+        query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
+        numbers, ahead = {True: 0, False: 0}, {}
+        with self.sessions() as session:
+            for row in session.scalars(query):
+                tiny = is_tiny(_plan(row.plan))
+                ahead[row.id] = numbers[tiny]
+                numbers[tiny] += 1
+        return ahead
 
     def cancel(self, identity: str) -> bool:
         """Cancel a bake that is queued or running; whoever runs it sees that at its next heartbeat."""
-        return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None)
+        return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None, phase=None)
 
     def claimable(self) -> list[str]:
         """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
@@ -97,10 +113,17 @@ class Ledger:
             return False
         unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
         return self._change(
-            identity, ("queued", "running"), unchanged, state="running", owner=owner, heartbeat=time.time()
+            identity,
+            ("queued", "running"),
+            unchanged,
+            state="running",
+            owner=owner,
+            heartbeat=time.time(),
+            phase=None,
+            seconds_left=None,
         )
 
-    def beat(self, identity: str, owner: str, **progress: float | None) -> bool:
+    def beat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
         """Record progress. False where the bake was cancelled or taken over: stop."""
         mine = BakeRow.owner == owner
         return self._change(identity, ("running",), mine, heartbeat=time.time(), **progress)
@@ -114,10 +137,9 @@ class Ledger:
     ) -> None:
         """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled."""
         mine = BakeRow.owner == owner
-        done = {"progress": 1.0} if state == "ready" else {}
-        self._change(
-            identity, ("running",), mine, state=state, problem=problem, bytes=num_bytes, seconds_left=None, **done
-        )
+        done = {"progress": 1.0, "crowding": crowding(load_of_machine())} if state == "ready" else {}
+        ended = {"problem": problem, "bytes": num_bytes, "seconds_left": None, "phase": None, **done}
+        self._change(identity, ("running",), mine, state=state, **ended)
         self.release(identity, owner)
 
     def release(self, identity: str, owner: str) -> None:
@@ -153,15 +175,28 @@ class Ledger:
         """What the newest ready bakes took."""
         task_s = func.sum(TaskRow.seconds)
         query = (
-            select(BakeRow.plan, task_s)
+            select(BakeRow.plan, task_s, BakeRow.crowding)
             .join(TaskRow, TaskRow.bake_id == BakeRow.id)
             .where(BakeRow.state == "ready")
-            .group_by(BakeRow.id, BakeRow.plan, BakeRow.created)
+            .group_by(BakeRow.id, BakeRow.plan, BakeRow.created, BakeRow.crowding)
             .order_by(BakeRow.created.desc())
             .limit(limit)
         )
         with self.sessions() as session:
-            return [Finished(Plan(**json.loads(plan)), float(seconds)) for plan, seconds in session.execute(query)]
+            rows = list(session.execute(query))
+        return [Finished(_plan(plan), float(seconds), crowded or 1.0) for plan, seconds, crowded in rows]
+
+    def stage_seconds(self, method: str, limit: int) -> dict[int, float]:
+        """What the tasks of each stage took in the newest ready bakes of a method, together; empty where none was."""
+        is_like = BakeRow.recipe.contains(f'"method":{json.dumps(method)}', autoescape=True)
+        newest = select(BakeRow.id).where(BakeRow.state == "ready", is_like).order_by(BakeRow.created.desc())
+        query = (
+            select(TaskRow.stage, func.sum(TaskRow.seconds))
+            .where(TaskRow.bake_id.in_(newest.limit(limit)))
+            .group_by(TaskRow.stage)
+        )
+        with self.sessions() as session:
+            return {stage: float(seconds) for stage, seconds in session.execute(query)}
 
     def _get(self, identity: str) -> BakeRow | None:
         with self.sessions() as session:
@@ -183,17 +218,24 @@ def _is_owned(row: BakeRow) -> bool:
     return row.owner is not None and is_alive(row.owner, row.heartbeat, time.time())
 
 
-def _status(row: BakeRow) -> BakeStatus:
+def _plan(text: str) -> Plan:
+    return Plan(**json.loads(text))
+
+
+def _status(row: BakeRow, ahead: Mapping[str, int]) -> BakeStatus:
     return BakeStatus(
         id=row.id,
         scene=row.scene_id,
         state=cast("BakeState", row.state),
         progress=row.progress,
+        phase=cast("Phase | None", row.phase),
+        phase_since=row.phase_since if row.phase else None,
+        ahead=ahead.get(row.id, 0) if row.state == "queued" else 0,
         rays_per_second=row.rays_per_second,
         seconds_left=row.seconds_left,
         bytes=row.bytes,
         problem=row.problem,
         recipe=recipe_from_json(row.recipe),
-        plan=Plan(**json.loads(row.plan)),
+        plan=_plan(row.plan),
         created=row.created,
     )

@@ -26,7 +26,11 @@ class SceneRow(Base):
 
 
 class BakeRow(Base):
-    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970)."""
+    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970).
+
+    Attributes:
+        crowding: see `worker.estimate`; None where it is not ready, or was baked before that was measured.
+    """
 
     __tablename__ = "bakes"
 
@@ -38,6 +42,9 @@ class BakeRow(Base):
     created: Mapped[float]
     queued: Mapped[float]
     progress: Mapped[float] = mapped_column(default=0.0)
+    phase: Mapped[str | None] = mapped_column(default=None)
+    phase_since: Mapped[float | None] = mapped_column(default=None)
+    crowding: Mapped[float | None] = mapped_column(default=None)
     rays_per_second: Mapped[float | None] = mapped_column(default=None)
     seconds_left: Mapped[float | None] = mapped_column(default=None)
     bytes: Mapped[int] = mapped_column(default=0)

@@ -2,72 +2,151 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 
 from relume.transfer.base import Plan, Task
 from worker.status import TaskCost
 
 # Between two finished tasks the bar moves on at the rate so far, but never past this part of the next task.
 FORESIGHT = 0.9
+# Once so much of a bake is done, its time left follows from its own rate alone; before, also from what others took.
+EVIDENCE = 0.08
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What finished bakes tell of one that begins.
+
+    Attributes:
+        seconds: that it will take, None where nothing is known.
+        shares: of each stage in its time, None where that is not known.
+        parallel: tasks that run at once.
+    """
+
+    seconds: float | None = None
+    shares: Sequence[float] | None = None
+    parallel: int = 1
 
 
 class Progress:
     """Fraction done, rate and time left of one run of a bake.
 
-    Earlier stages count by their rays against the plan's; the tasks of the last stage, by far the longest, are known
-    from its start, so what is left then is divided among its rows. Rate and time left are those of the stage that runs.
+    Stages count by their share of the time of finished bakes, and within a stage tasks by their rows. Where no bake has
+    ended yet, earlier stages count by their rays against the plan's, and the last one, by far the longest, has what is
+    left; rate and time left are then those of the stage that runs.
     """
 
-    def __init__(self, plan: Plan, shown: float = 0.0, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        shown: float = 0.0,
+        expected: Expected | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """
         Args:
             shown: what people have seen already, before an interruption.
             clock: seconds.
         """
-        self._clock = clock
+        self._clock, self._expected = clock, expected or Expected()
         self._num_rays = max(1, plan.num_rays)
-        self._rays = 0
-        self._base = self._done = 0.0
+        self._rays, self._stage = 0, -1
+        self._done = self._base = self._span = 0.0
         self._shown = shown
-        self._rows = self._largest = 0
-        self._rays_here, self._gained = 0, 0.0
-        self._began, self._last_s = clock(), 0.0
+        self._total = self._largest = 0
+        self._is_measurable = self._is_working = False
+        self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
+        self._began = self._last = clock()
 
     def begin_stage(self, tasks: Collection[Task], last: bool) -> None:
         """Note the tasks of a stage."""
-        if last:
-            rows = [task.stop - task.start for task in tasks]
-            self._rows, self._largest, self._base = sum(rows), max(rows, default=0), self._done
-        self._begin()
+        shares = self._expected.shares
+        self._stage += 1
+        weights = [_weight(task) for task in tasks]
+        self._total, self._largest = sum(weights), max(weights, default=0)
+        if shares is not None:
+            self._base, self._span = sum(shares[: self._stage]), shares[self._stage]
+            self._done = self._base
+        elif last:
+            self._base, self._span = self._done, 1 - self._done
+        else:
+            self._span = 0.0
+        self._is_measurable = self._span > 0 and self._total > 0
+        if shares is None or not self._gained:
+            self._restart()
+
+    def begin_work(self) -> None:
+        """Tasks begin only now: the time so far was spent on getting ready, and tells nothing of their rate."""
+        self._is_working = True
+        self._restart()
+
+    def _restart(self) -> None:
+        self._began = self._last = self._clock()
+        self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
 
     def add(self, task: Task, cost: TaskCost, here: bool) -> None:
         """Count a finished task; `here`: in this run, not one before an interruption."""
         before = self._done
         self._rays += cost.rays
-        if self._rows:
-            self._done += (1 - self._base) * (task.stop - task.start) / self._rows
-        else:
+        if self._is_measurable:
+            self._done += self._span * _weight(task) / self._total
+        elif self._expected.shares is None:
             self._done = min(0.5, self._rays / self._num_rays)
         if here:
             self._rays_here += cost.rays
             self._gained += self._done - before
-            self._last_s = self._clock() - self._began
+            self._task_s += cost.seconds
+            self._num_here += 1
+            self._is_working = True
+            self._last = self._clock()
 
     def fields(self) -> dict[str, float | None]:
         """As the ledger keeps them: progress from 0 to 1 that never falls, rays per second, seconds left."""
-        since_s = self._clock() - self._began - self._last_s
-        per_second = self._gained / max(1e-3, self._last_s) if self._rows else 0.0
+        since_s, worked_s = self._clock() - self._last, self._last - self._began
+        per_second = self._rate()
         if per_second:
-            step = FORESIGHT * (1 - self._base) * self._largest / self._rows
+            step = FORESIGHT * self._span * self._largest / max(1, self._total)
             self._shown = max(self._shown, min(1.0, self._done + min(step, per_second * since_s)))
         self._shown = max(self._shown, self._done)
         return {
-            "progress": self._shown,
-            "rays_per_second": self._rays_here / max(1e-3, self._last_s) if self._rays_here else None,
+            "progress": min(1.0, self._shown),
+            "rays_per_second": self._rays_here / max(1e-3, worked_s) if self._rays_here else None,
             "seconds_left": max(0.0, (1 - self._done) / per_second - since_s) if per_second else None,
         }
 
-    def _begin(self) -> None:
-        self._began, self._last_s = self._clock(), 0.0
-        self._rays_here, self._gained = 0, 0.0
+    def _rate(self) -> float | None:
+        """Share of the bake that is done in a second; None where nothing tells.
+
+        What finished bakes took counts less and less as this one goes on. A task that should have ended already shows
+        that the rate is lower than was thought.
+        """
+        parallel, now_s = self._expected.parallel, self._clock() - self._began
+        seconds = self._expected.seconds if self._is_measurable and self._is_working else None
+        expected = 1 / seconds if seconds else None
+        observed = None
+        if self._gained and self._is_measurable:
+            observed = self._gained / max(1e-3, self._worked_s())
+        if expected is None:
+            return observed
+        if observed is not None:
+            trust = min(1.0, self._gained / EVIDENCE)
+            expected = math.exp(trust * math.log(observed) + (1 - trust) * math.log(expected))
+        in_hand = parallel * self._span * self._largest / max(1, self._total)
+        return min(expected, (self._gained + in_hand) / max(1e-3, now_s))
+
+    def _worked_s(self) -> float:
+        """Seconds that the finished tasks took, all together.
+
+        Tasks that run side by side end together: when the first of them has ended, the wall clock would count the time
+        of all for one alone.
+        """
+        wall_s, parallel = self._last - self._began, self._expected.parallel
+        of_finished = wall_s * self._num_here / (self._num_here + parallel - 1)
+        return min(wall_s, max(self._task_s / parallel, of_finished))
+
+
+def _weight(task: Task) -> int:
+    return max(1, task.stop - task.start)

@@ -16,11 +16,13 @@ from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
-from worker.estimate import seconds_for
+from worker.estimate import crowding, load_of_machine, seconds_for
 from worker.executor import Executors, is_tiny
 from worker.lease import new_owner
 from worker.ledger import Ledger
+from worker.notes import note_path
 from worker.paths import bake_path
+from worker.progress import Expected
 from worker.rest import idle_seconds
 from worker.status import BakeStatus, bake_id
 from worker.tasks import Job, rest, scene_of
@@ -59,6 +61,7 @@ class BakeService:
         self._board = StatusBoard(self.ledger)
         self._owner = new_owner()
         self._closing = threading.Event()
+        self._is_crowding = threading.Event()
         self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
 
@@ -139,7 +142,18 @@ class BakeService:
 
     def seconds_for(self, plan: Plan) -> float | None:
         """Seconds that a bake will take, by those that took place here; None where there were none."""
-        return seconds_for(plan, self.ledger.finished_bakes(NUM_JUDGED_BY), self._executors.num_workers)
+        load = load_of_machine()
+        if not is_tiny(plan) and not self._is_crowding.is_set():  # else its own processes' load is in it already
+            load += self._executors.num_workers
+        finished = self.ledger.finished_bakes(NUM_JUDGED_BY)
+        return seconds_for(plan, finished, self._executors.num_workers, crowding(load))
+
+    def _expected(self, status: BakeStatus, parallel: int) -> Expected:
+        method = self._method(status.recipe.method)
+        seconds = self.ledger.stage_seconds(method.name, NUM_JUDGED_BY)
+        total, stages = sum(seconds.values()), range(len(method.stages))
+        shares = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
+        return Expected(self.seconds_for(status.plan), shares, parallel)
 
     def workers_resident_bytes(self) -> int:
         """Memory of the worker processes that this service has started."""
@@ -206,12 +220,16 @@ class BakeService:
         self._board.changed()
         try:
             method = self._method(status.recipe.method)
+            expected = self._expected(status, 1 if tiny else self._executors.num_workers)
+            if not tiny:
+                self.ledger.beat(status.id, self._owner, phase="starting", phase_since=time.time())
+                self._board.changed()
             executor = self._executors.here() if tiny else self._executors.cluster()
         except Exception as error:
             self.ledger.finish(status.id, self._owner, "failed", str(error))
             self._board.changed()
             return
-        BakeRunner(
+        runner = BakeRunner(
             ledger=self.ledger,
             job=Job(self.data_dir, status.id, status.scene, status.recipe, method),
             owner=self._owner,
@@ -219,7 +237,13 @@ class BakeService:
             window=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
             changed=self._board.changed,
             stopped=self._closing.is_set,
-        ).run()
+            expected=expected,
+        )
+        if not tiny:
+            self._is_crowding.set()
+        runner.run()
+        if not tiny:
+            self._is_crowding.clear()
 
     def _remove_strays(self) -> None:
         """Delete unfinished stores that no bake in the ledger will finish."""
@@ -228,3 +252,4 @@ class BakeService:
         for folder in staging.glob("*.zarr"):
             if folder.name.removesuffix(".zarr") not in wanted:
                 shutil.rmtree(folder, ignore_errors=True)
+                note_path(folder).unlink(missing_ok=True)

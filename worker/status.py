@@ -11,6 +11,17 @@ from relume.store.schema import SCHEMA_VERSION
 from relume.transfer.base import Plan, Recipe
 
 BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
+Phase = Literal["starting", "loading", "reading", "building", "compiling", "sampling", "tracing", "publishing"]
+PHASE_WORDS: dict[Phase, str] = {
+    "starting": "starting worker processes",
+    "loading": "loading the kernels",
+    "reading": "reading the scene",
+    "building": "sorting its triangles for tracing",
+    "compiling": "compiling kernels, once on this machine",
+    "sampling": "finding what each pixel sees",
+    "tracing": "tracing",
+    "publishing": "checking and publishing",
+}
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
 
@@ -20,6 +31,8 @@ class BakeStatus:
 
     Attributes:
         progress: 0 to 1.
+        phase: what it does now, None where it does not run. phase_since: seconds since 1970.
+        ahead: bakes that will run before it, where it is queued.
         rays_per_second, seconds_left: None where nothing was measured yet.
         bytes: size of the published store, 0 before.
         problem: one sentence with what to do about it, None where all is well.
@@ -30,6 +43,9 @@ class BakeStatus:
     scene: str
     state: BakeState
     progress: float
+    phase: Phase | None
+    phase_since: float | None
+    ahead: int
     rays_per_second: float | None
     seconds_left: float | None
     bytes: int

@@ -13,6 +13,7 @@ from relume.scene.archive import load_scene
 from relume.scene.model import Scene
 from relume.store import fill
 from relume.transfer.base import Recipe, Task, TransferMethod
+from worker.notes import Notebook
 from worker.paths import scene_path, staging_path
 from worker.rest import Rest, idle_seconds
 from worker.status import TaskCost
@@ -67,8 +68,13 @@ def kept_bytes() -> int:
 def run_task(job: Job, task: Task) -> TaskCost:
     """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes."""
     began = time.perf_counter()
-    with rest.kept_awake():
-        scene = scene_of(job.data_dir, job.scene_id)
-        staging = staging_path(job.data_dir, job.bake_id)
-        written = fill.run_task(_resident(job.method), scene, job.recipe, staging, task)
+    staging = staging_path(job.data_dir, job.bake_id)
+    notes = Notebook(staging)
+    with rest.kept_awake(), notes.watching_compiler():
+        notes.note("reading")
+        scene, method = scene_of(job.data_dir, job.scene_id), _resident(job.method)
+        notes.note("building")
+        method.prepare(scene)
+        notes.note("working")
+        written = fill.run_task(method, scene, job.recipe, staging, task)
     return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - began)

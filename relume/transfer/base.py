@@ -134,6 +134,10 @@ class TransferMethod(Protocol):
         """Cost of a bake; pure, traces nothing. Raises PlanError where the recipe does not fit the scene."""
         ...
 
+    def prepare(self, scene: Scene) -> None:
+        """Build what all tasks of a scene share in one process; kept for the next."""
+        ...
+
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """Root attributes of the store: JSON, enough to open it without the scene."""
         ...

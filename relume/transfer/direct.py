@@ -88,6 +88,10 @@ class DirectMethod:
             peak_bytes=samples_a_view * 600 + SHARD_ROWS * (bits + 200) + 200_000_000 + _geometry_bytes(scene),
         )
 
+    def prepare(self, scene: Scene) -> None:
+        """Build the triangles' search tree."""
+        self.geometry_of(scene)
+
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """What opening the store needs besides its arrays."""
         cameras = {camera.name: camera for camera in scene.cameras}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from typing import Annotated
 
@@ -124,7 +125,9 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
     """A bake as the API shows it."""
-    return BakeBody.of(status, recipe=_recipe_body(status.recipe), plan=_plan(status.plan, services))
+    seconds = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
+    plan = _plan(status.plan, services)
+    return BakeBody.of(status, recipe=_recipe_body(status.recipe), plan=plan, phase_seconds=seconds)
 
 
 def _recipe_body(recipe: Recipe) -> RecipeBody:

@@ -50,6 +50,9 @@ class FakeMethod:
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         return Plan(recipe.size[0] * recipe.size[1], recipe.num_lights * 100, 1000, 1000)
 
+    def prepare(self, scene: Scene) -> None:
+        pass
+
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         return {"method": self.name, "scene": scene.id, "views": list(recipe.views), "size": list(recipe.size)}
 

@@ -53,6 +53,9 @@ class FakeMethod:
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         return Plan(self._rows(recipe) * len(recipe.views), self.num_rays, self.store_bytes, self.peak_bytes)
 
+    def prepare(self, scene: Scene) -> None:
+        pass
+
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         return {"method": self.name, "scene": scene.id, "views": list(recipe.views)}
 

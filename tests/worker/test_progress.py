@@ -2,11 +2,12 @@
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.transfer.base import Task
-from worker.progress import Progress
+from worker.progress import Expected, Progress
 from worker.status import TaskCost
 
 PLAN = FakeMethod(num_rays=10_000).plan(tiny_scene(), RECIPE)
@@ -59,3 +60,85 @@ def test_bake_without_rows_has_progress() -> None:
     progress = Progress(PLAN)
     progress.begin_stage([], last=True)
     assert progress.fields() == {"progress": 0.0, "rays_per_second": None, "seconds_left": None}
+
+
+def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks: int = 100) -> list[tuple[float, ...]]:
+    """(share done, seconds left as said, seconds left in truth) each time that a task has ended.
+
+    Two stages, a tenth and nine tenths of the work; a run of `parallel` processes, whose tasks differ by a tenth.
+    """
+    clock, random = Clock(), np.random.default_rng(1)
+    expected = Expected(prior_s, (0.1, 0.9), parallel)
+    progress = Progress(PLAN, expected=expected, clock=clock)
+    clock.now += 60.0  # the processes start, and compile
+    progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
+    assert progress.fields()["seconds_left"] is None
+    progress.begin_work()
+    began, seen = clock.now, []
+    clock.now += 0.1 * true_s
+    progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 1, 0.1 * true_s * parallel), here=True)
+    tasks = [Task(1, i, "front", i * 10, i * 10 + 10) for i in range(num_tasks)]
+    progress.begin_stage(tasks, last=True)
+    mean_s = 0.9 * true_s * parallel / num_tasks
+    free, ends = [clock.now] * parallel, []
+    for task, seconds in zip(tasks, mean_s * random.uniform(0.9, 1.1, num_tasks), strict=True):
+        first = int(np.argmin(free))
+        free[first] += seconds
+        ends.append((free[first], task, seconds))
+    for done, (now, task, seconds) in enumerate(sorted(ends, key=lambda end: end[0]), start=1):
+        clock.now = now
+        progress.add(task, TaskCost(1000, 1, seconds), here=True)
+        left = progress.fields()["seconds_left"]
+        seen.append((0.1 + 0.9 * done / num_tasks, left, max(free) - now))
+    assert max(free) - began == pytest.approx(true_s, rel=0.1)
+    return seen
+
+
+@pytest.mark.parametrize("slower", [0.1, 0.3, 1.0, 3.0, 10.0])
+@pytest.mark.parametrize("parallel", [1, 2, 8])
+@pytest.mark.parametrize("is_foretold", [True, False])
+def test_a_tenth_of_the_work_tells_the_rest(slower: float, parallel: int, is_foretold: bool) -> None:
+    seen = lefts_of(100.0 * slower, 100.0 if is_foretold else None, parallel)
+    for done, said, true in seen:
+        if 0.1 < done < 0.95:
+            assert said == pytest.approx(true, rel=0.25), done
+
+
+def expected_alone(prior_s: float | None) -> tuple[Progress, Clock]:
+    """A stage of ten tasks that has just begun."""
+    clock = Clock()
+    progress = Progress(PLAN, expected=Expected(prior_s, (0.0, 1.0)), clock=clock)
+    progress.begin_stage([], last=False)
+    progress.begin_stage(TASKS, last=True)
+    progress.begin_work()
+    return progress, clock
+
+
+def test_nothing_is_said_without_evidence() -> None:
+    progress, clock = expected_alone(None)
+    for _ in range(50):
+        assert progress.fields()["seconds_left"] is None
+        clock.now += 1
+
+
+def test_what_others_took_is_said_until_it_cannot_be_true() -> None:
+    progress, clock = expected_alone(20.0)
+    assert progress.fields()["seconds_left"] == pytest.approx(20.0)
+    clock.now += 1
+    assert progress.fields()["seconds_left"] == pytest.approx(19.0)
+    clock.now += 9  # the first of ten tasks should have ended eight seconds ago
+    assert progress.fields()["seconds_left"] >= 90.0
+
+
+def test_stages_count_by_the_time_they_took_before() -> None:
+    progress = Progress(PLAN, expected=Expected(10.0, (0.25, 0.75)), clock=Clock())
+    tasks = [Task(0, i, "front", 0, 0) for i in range(4)]
+    progress.begin_stage(tasks, last=False)
+    progress.add(tasks[0], TaskCost(1000, 1, 1), here=True)
+    assert progress.fields()["progress"] == pytest.approx(0.0625)
+    for task in tasks[1:]:
+        progress.add(task, TaskCost(1000, 1, 1), here=True)
+    progress.begin_stage(TASKS, last=True)
+    assert progress.fields()["progress"] == pytest.approx(0.25)
+    progress.add(TASKS[0], TaskCost(1000, 1, 1), here=True)
+    assert progress.fields()["progress"] == pytest.approx(0.325)
