@@ -29,13 +29,27 @@ from server.routes import (
     renders,
     scenes,
     session,
+    shares,
     truths,
 )
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
 from worker.paths import environments_path, materials_path
 
-ROUTE_GROUPS = (scenes, models, materials, library, environments, bakes, renders, truths, looks, session, health)
+ROUTE_GROUPS = (
+    scenes,
+    models,
+    materials,
+    library,
+    environments,
+    bakes,
+    renders,
+    truths,
+    looks,
+    shares,
+    session,
+    health,
+)
 
 
 def create_app(

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.protocol import MAX_VIEWS_SHOWN
 from worker.status import Phase
 
 Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
@@ -269,6 +270,36 @@ class LookEntry(Body):
     etag: str
     modified: str
     bytes: int
+
+
+class ShareRequest(Body):
+    """What a link shows: a look of a bake, the views beside each other and the one in hand.
+
+    `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone.
+    """
+
+    bake: Id
+    view: Name
+    views: Annotated[list[Name], Field(min_length=1, max_length=MAX_VIEWS_SHOWN)]
+    look: dict[str, Any]
+    solo: Name | None = None
+    solo_light: Annotated[str, Field(max_length=256)] | None = None
+
+
+class ShareEntry(Body):
+    """A link that was made; `url` is relative to the server."""
+
+    id: str
+    url: str
+
+
+class ShareBody(ShareRequest):
+    """What a link shows; `lacking`: what of it is not here any more, one sentence each."""
+
+    id: str
+    created: str
+    scene: str
+    lacking: list[str]
 
 
 class TruthRequest(Body):

@@ -12,6 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
+from worker.status import Phase
+
 SUBPROTOCOL = "relume.v1"
 MAX_MESSAGE_BYTES = 64 * 1024
 MAX_FRAMES_IN_FLIGHT = 2
@@ -239,6 +241,7 @@ class BakeMessage(Message):
     replaces: str
     state: str
     progress: float
+    phase: Phase | None
     seconds_left: float | None
 
 

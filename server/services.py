@@ -27,6 +27,7 @@ from server.looks import LookShelf
 from server.metrics import Metrics
 from server.renders import RenderQueue
 from server.settings import Settings
+from server.shares import ShareShelf
 from server.truths import TruthQueue
 from worker.service import BakeService
 from worker.tasks import kept_bytes
@@ -44,6 +45,7 @@ class Services:
     metrics: Metrics
     bakes: BakeService
     looks: LookShelf
+    shares: ShareShelf
     renders: RenderQueue
     truths: TruthQueue
     threads: Threads
@@ -108,6 +110,7 @@ async def open_services(
             metrics=metrics,
             bakes=service,
             looks=looks,
+            shares=ShareShelf(service.ledger.sessions),
             renders=renders,
             truths=truths,
             threads=threads,

@@ -19,6 +19,17 @@ class LookRow(Base):
     modified: Mapped[float]
 
 
+class ShareRow(Base):
+    """What a link carries; never changed. `document` is JSON of so many bytes, `created` in seconds since 1970."""
+
+    __tablename__ = "shares"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    bytes: Mapped[int]
+    created: Mapped[float]
+
+
 class WorkRow(Base):
     """A long work of the server, see `server.backlog`. `request` is the body as JSON."""
 

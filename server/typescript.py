@@ -41,6 +41,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     bodies.BakeRequest,
     bodies.RenderRequest,
     bodies.TruthRequest,
+    bodies.ShareRequest,
 )
 OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
@@ -58,6 +59,8 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.RenderBody,
     bodies.TruthBody,
     bodies.LookEntry,
+    bodies.ShareEntry,
+    bodies.ShareBody,
 )
 
 

@@ -55,11 +55,11 @@ class Notebook:
     def watching_compiler(self) -> Iterator[None]:
         """While the block runs, kernels that this process compiles are noted."""
         listener = _Compiling(self)
-        event.register("numba:compile", listener)
+        event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
         try:
             yield
         finally:
-            event.unregister("numba:compile", listener)
+            event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]
 
     def compiling(self, is_so: bool) -> None:
         """A kernel is being compiled, or was: what was noted before goes on."""
@@ -69,7 +69,7 @@ class Notebook:
             self._write(self._latest)
 
 
-class _Compiling(event.Listener):  # type: ignore[misc]
+class _Compiling(event.Listener):
     """Kernels that call others are compiled with them: the outermost counts."""
 
     def __init__(self, notes: Notebook) -> None:

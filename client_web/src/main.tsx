@@ -1,6 +1,7 @@
 import { render } from "preact";
 import { Editor } from "./ui/Editor";
 import { StartPage } from "./start/StartPage";
+import { openShare } from "./looks/share";
 import { openScene } from "./state/open";
 import { followPanels } from "./state/panels";
 import { followPlace } from "./state/place";
@@ -33,7 +34,9 @@ function App() {
 
 function start(): void {
   const place = placeFromUrl(location.search);
-  if (place.scene !== null) void openScene(place.scene, place);
+  const shared = new URLSearchParams(location.search).get("share");
+  if (shared !== null) void openShare(shared);
+  else if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
   followPanels();
   followRoom();

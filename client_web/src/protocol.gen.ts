@@ -72,6 +72,16 @@ export interface RenderRequest {
   size?: [number, number] | null;
 }
 
+/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. */
+export interface ShareRequest {
+  bake: string;
+  view: string;
+  views: string[];
+  look: Record<string, unknown>;
+  solo?: string | null;
+  solo_light?: string | null;
+}
+
 /** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
 export interface StreamMessage {
   type: "stream";
@@ -107,12 +117,15 @@ export interface ViewsMessage {
   names: string[];
 }
 
-/** A bake; `progress` 0…1, `problem` one sentence where it failed. */
+/** A bake; `progress` 0…1, `problem` one sentence where it failed. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. */
 export interface BakeBody {
   id: string;
   scene: string;
   state: "queued" | "running" | "ready" | "failed" | "cancelled";
   progress: number;
+  phase: "starting" | "loading" | "reading" | "building" | "compiling" | "sampling" | "tracing" | "publishing" | null;
+  phase_seconds: number | null;
+  ahead: number;
   rays_per_second: number | null;
   seconds_left: number | null;
   bytes: number;
@@ -128,6 +141,7 @@ export interface BakeMessage {
   replaces: string;
   state: string;
   progress: number;
+  phase: "starting" | "loading" | "reading" | "building" | "compiling" | "sampling" | "tracing" | "publishing" | null;
   seconds_left: number | null;
 }
 
@@ -376,6 +390,26 @@ export interface SceneVariant {
 export interface SceneView {
   name: string;
   aspect: number;
+}
+
+/** What a link shows; `lacking`: what of it is not here any more, one sentence each. */
+export interface ShareBody {
+  bake: string;
+  view: string;
+  views: string[];
+  look: Record<string, unknown>;
+  solo: string | null;
+  solo_light: string | null;
+  id: string;
+  created: string;
+  scene: string;
+  lacking: string[];
+}
+
+/** A link that was made; `url` is relative to the server. */
+export interface ShareEntry {
+  id: string;
+  url: string;
 }
 
 /** server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */

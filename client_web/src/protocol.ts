@@ -23,6 +23,8 @@ export type {
   RenderBody,
   RenderRequest,
   ServerMessage,
+  ShareEntry,
+  ShareRequest,
   StatusMessage,
   TruthBody,
   TruthRequest,
@@ -89,6 +91,9 @@ export interface Transport {
 /** A library material, its terms in look-document form. */
 export type MeasuredBody = Omit<gen.MeasuredBody, "terms"> & { terms: Term[] };
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
+
+/** What a link carries; its look is complete. */
+export type ShareBody = Omit<gen.ShareBody, "look"> & { look: Look };
 
 /** A scene, its default terms in look-document form. */
 export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[] }[] };

@@ -48,6 +48,7 @@ class BakeNews:
                 replaces=bake,
                 state=status.state,
                 progress=round(status.progress, 3),
+                phase=status.phase,
                 seconds_left=None if status.seconds_left is None else round(status.seconds_left, 1),
             )
             for status in statuses

@@ -3,7 +3,7 @@
 import pytest
 
 from relume.transfer.base import Plan
-from worker.estimate import Finished, seconds_for
+from worker.estimate import Finished, crowding, seconds_for
 from worker.executor import TINY_BAKE_RAYS
 
 LARGE = Plan(1000, 20 * TINY_BAKE_RAYS, 1, 1)
@@ -31,3 +31,13 @@ def test_a_bake_is_judged_by_its_like_and_by_others_where_there_is_none():
 def test_larger_bakes_count_for_more():
     double = Plan(1000, 2 * LARGE.num_rays, 1, 1)
     assert seconds_for(LARGE, [Finished(LARGE, 30.0), Finished(double, 30.0)], 1) == pytest.approx(20.0)
+
+
+def test_a_busy_machine_takes_longer_and_does_not_make_later_bakes_look_slow():
+    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 2, crowded=4.0) == pytest.approx(240.0)
+    assert seconds_for(LARGE, [Finished(LARGE, 480.0, crowding=4.0)], 2) == pytest.approx(60.0)
+
+
+def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
+    monkeypatch.setattr("worker.estimate.num_cores", lambda: 2)
+    assert [crowding(load) for load in (0.0, 1.9, 5.0)] == [1.0, 1.0, 2.5]

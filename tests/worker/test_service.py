@@ -60,7 +60,9 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
         assert service.get(identity).state == "ready"
 
 
-def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path) -> None:
+def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("ledger", "service"):
+        monkeypatch.setattr(f"worker.{module}.load_of_machine", lambda: 0.0)
     with open_service(tmp_path) as service:
         plan = service.plan(SCENE.id, RECIPE)
         assert service.seconds_for(plan) is None

@@ -58,10 +58,3 @@ export async function exportExr(): Promise<void> {
     download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, name);
   });
 }
-
-export async function share(): Promise<void> {
-  await attempt(async () => {
-    await navigator.clipboard.writeText(location.href);
-    note("The address is copied. It opens this scene, view and selection; save the look to share it too.");
-  });
-}

@@ -12,6 +12,9 @@ import type {
   RenderBody,
   RenderRequest,
   SceneBody,
+  ShareBody,
+  ShareEntry,
+  ShareRequest,
   Term,
   TruthBody,
   TruthRequest,
@@ -102,6 +105,11 @@ export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
 }
 export const getRender = (id: string) => get<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
+
+export async function makeShare(body: ShareRequest): Promise<ShareEntry> {
+  return (await (await request("/api/shares", json("POST", body))).json()) as ShareEntry;
+}
+export const getShare = (id: string) => get<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
 
 const truthPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
 

@@ -1,19 +1,29 @@
 /** Before the first picture: what is waited for, and for how long. */
+import { bakingWords, hasProgress, phaseWords, useElapsed } from "../start/baking";
 import { bake, coming, connection, drawn, freezing } from "../state/store";
-import { formatSeconds } from "../ui/scale";
 import type { Picture } from "./picture";
 
-function words(view: string): { text: string; progress: number | null } {
+interface Words {
+  text: string;
+  /** Without numbers that run. */
+  announced: string;
+  /** Null where nothing is measured, not even that something goes on. */
+  progress: number | undefined | null;
+}
+
+function words(view: string, elapsed: number): Words {
   const next = coming.value;
-  if (bake.value === null && next !== null && next.state !== "ready") {
-    const left = next.seconds_left === null ? "" : `, ${formatSeconds(next.seconds_left)} left`;
-    const text = next.state === "queued" ? "The preview waits for its turn" : `Baking a preview${left}`;
-    return { text, progress: next.progress };
-  }
+  if (bake.value === null && next !== null && next.state !== "ready")
+    return {
+      text: `Preview: ${bakingWords(next, elapsed)}`,
+      announced: `Preview: ${phaseWords(next)}`,
+      progress: hasProgress(next) ? next.progress : undefined,
+    };
   const making = freezing.value;
   if (connection.value === "open" && making?.view === view) {
     const doing = making.what === "a preview" ? `Shading ${view}` : `Shading ${view}: ${making.what}`;
-    return { text: `${doing}… ${Math.round(100 * making.progress)} %`, progress: making.progress };
+    const percent = Math.round(100 * making.progress);
+    return { text: `${doing}… ${percent} %`, announced: `${doing}…`, progress: making.progress };
   }
   const text = {
     reconnecting: "Waiting for the server",
@@ -21,17 +31,21 @@ function words(view: string): { text: string; progress: number | null } {
     connecting: "Opening the scene",
     open: "Waiting for the first picture",
   };
-  return { text: text[connection.value], progress: null };
+  return { text: text[connection.value], announced: text[connection.value], progress: null };
 }
 
 export function Waiting({ picture }: { picture: Picture }) {
   drawn.value;
+  const elapsed = useElapsed(coming.value);
   if (picture.isThere) return null;
-  const { text, progress } = words(picture.view);
+  const { text, announced, progress } = words(picture.view, elapsed);
   return (
-    <div class="waiting" role="status">
+    <div class="waiting">
       <p>{text}</p>
-      {progress !== null && <progress max={1} value={progress} aria-label={text} />}
+      {progress !== null && <progress max={1} value={progress} aria-label={announced} />}
+      <span class="announce" role="status">
+        {announced}
+      </span>
     </div>
   );
 }

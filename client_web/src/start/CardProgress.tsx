@@ -2,16 +2,11 @@
 import { useEffect, useState } from "preact/hooks";
 import { followBake } from "../net/events";
 import type { BakeBody, SceneBody } from "../protocol";
-import { formatSeconds } from "../ui/scale";
-
-function words(bake: BakeBody): string {
-  if (bake.state === "queued") return "waits for its turn";
-  if (bake.state !== "running") return `bake ${bake.state}`;
-  return bake.seconds_left === null ? "baking" : `baking, ${formatSeconds(bake.seconds_left)} left`;
-}
+import { bakingWords, hasProgress, useElapsed } from "./baking";
 
 export function CardProgress({ scene, onReady }: { scene: SceneBody; onReady(): void }) {
   const [bake, setBake] = useState<BakeBody | null>(null);
+  const elapsed = useElapsed(bake);
   const newest = scene.bakes[0];
   useEffect(() => {
     if (newest === undefined) return undefined;
@@ -22,8 +17,10 @@ export function CardProgress({ scene, onReady }: { scene: SceneBody; onReady(): 
   }, [newest]);
   return (
     <span class="no-picture">
-      {bake === null ? (newest === undefined ? "not baked yet" : "…") : words(bake)}
-      {bake?.state === "running" && <progress max={1} value={bake.progress} aria-label={`Bake of ${scene.name}`} />}
+      {bake === null ? (newest === undefined ? "not baked yet" : "…") : bakingWords(bake, elapsed)}
+      {bake?.state === "running" && (
+        <progress max={1} value={hasProgress(bake) ? bake.progress : undefined} aria-label={`Bake of ${scene.name}`} />
+      )}
     </span>
   );
 }

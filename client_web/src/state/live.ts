@@ -270,9 +270,9 @@ function handlersOf(self: () => Session): SessionHandlers {
       if (current() && message.curve === store.curvePath.peek()) showShape(message);
     },
     bake(message) {
-      const { bake: id, state, progress, seconds_left } = message;
+      const { bake: id, state, progress, phase, seconds_left } = message;
       if (state === "ready") onBakeReady(id);
-      else store.coming.value = { id, state: state as "running", progress, seconds_left, problem: null };
+      else store.coming.value = { id, state: state as "running", progress, phase, seconds_left, problem: null };
     },
     sent(revision, inputTime) {
       if (!current()) return;

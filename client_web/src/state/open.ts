@@ -77,6 +77,17 @@ function restorePlace(scene: SceneBody, place: Place): void {
   } else store.selectedLight.value = place.light;
 }
 
+/** Call back when there is a look of the scene: one that was kept at once, the scene's own with the first hello. */
+function onceThereIsALook(scene: SceneBody, take: () => void): void {
+  let waits = true;
+  const stop = store.look.subscribe((look) => {
+    if (!waits || (look === null && store.scene.peek() === scene)) return;
+    waits = false;
+    queueMicrotask(() => stop());
+    if (store.scene.peek() === scene) take();
+  });
+}
+
 /** Follow a bake that is meant to replace the one shown. */
 export function follow(bake: BakeBody): void {
   stopFollowing();
@@ -128,12 +139,15 @@ export async function openScene(
   id: string,
   place: Place = placeFromUrl(`?scene=${id}`),
   choice?: BakeChoice,
+  /** Called once, when there is a look to be changed. */
+  arrived?: () => void,
 ): Promise<void> {
   await attempt(async () => {
     const [scene, models] = await Promise.all([api.getScene(id), api.listModels()]);
     store.models.value = models;
     reset(scene);
     restorePlace(scene, place);
+    if (arrived !== undefined) onceThereIsALook(scene, arrived);
     const bakes = await bakesOf(scene);
     store.bakes.value = bakes;
     const ready = bakes.filter((bake) => bake.state === "ready");

@@ -3,6 +3,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Connection } from "../net/session";
 import type { Transform } from "../picture/transform";
 import type { BakeBody, CurveMessage, Fidelity, HelloMessage, Look, ModelBody, ProbeAnswer, SceneBody, Term, Transport } from "../protocol";
+import type { Baking } from "../start/baking";
 import { History } from "./history";
 import { pointer } from "./pointer";
 
@@ -13,7 +14,7 @@ export const scene = signal<SceneBody | null>(null);
 /** The bake that the picture shows, and which light it has; and one that is on its way. */
 export const bake = signal<string | null>(null);
 export const method = signal<string | null>(null);
-export const coming = signal<Pick<BakeBody, "id" | "state" | "progress" | "seconds_left" | "problem"> | null>(null);
+export const coming = signal<Baking | null>(null);
 export const bakes = signal<BakeBody[]>([]);
 
 export const views = signal<HelloMessage["views"]>([]);

@@ -4,6 +4,7 @@ import { cancelBake } from "../net/api";
 import { limits } from "../picture/limits";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
+import { bakingWords, hasProgress, useElapsed } from "../start/baking";
 import { shownPanels } from "../state/room";
 import { bakedLight, coming, connection, freezing, latencyMs, look, retryInMs, settled } from "../state/store";
 import { toggleTruth } from "../truth/truth";
@@ -33,18 +34,17 @@ function pictureWords(): string {
   return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
 }
 
-function bakeWords(): string {
+function bakeWords(elapsed: number): string {
   const next = coming.value;
   if (next === null) return "";
-  if (next.state === "queued") return "Bake waits for its turn";
-  if (next.state === "failed") return "Bake failed";
-  if (next.state === "cancelled") return "Bake cancelled";
-  const left = next.seconds_left === null ? "" : `, ${formatSeconds(next.seconds_left)} left`;
-  return next.state === "ready" ? "Bake ready, opening" : `Baking ${Math.round(100 * next.progress)} %${left}`;
+  if (next.state === "ready") return "Bake ready, opening";
+  if (next.state !== "running" && next.state !== "queued") return `Bake ${next.state}`;
+  return `New bake: ${bakingWords(next, elapsed)}`;
 }
 
 export function StatusBar() {
   const memory = useMemory();
+  const elapsed = useElapsed(coming.value);
   // announced: only what changes seldom, without the numbers that run
   const announced = useComputed(() =>
     [
@@ -78,10 +78,10 @@ export function StatusBar() {
       <span class="spacer" />
       {coming.value !== null && (
         <span class="bake">
-          {bakeWords()}
+          {bakeWords(elapsed)}
           {running && (
             <>
-              <progress max={1} value={coming.value.progress} aria-label="Bake" />
+              <progress max={1} value={hasProgress(coming.value) ? coming.value.progress : undefined} aria-label="Bake" />
               <button onClick={() => coming.value && void attempt(() => cancelBake(coming.value?.id ?? ""))}>
                 Cancel
               </button>

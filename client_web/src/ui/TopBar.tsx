@@ -1,6 +1,6 @@
 /** Scene, views, undo, comparison, display, export. */
 import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
-import { exportExr, exportPng, share } from "../looks/export";
+import { exportExr, exportPng } from "../looks/export";
 import { lightLimitWords } from "../picture/limits";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
@@ -14,6 +14,7 @@ import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
 import { useDrag } from "./drag";
 import { Overflow } from "./Overflow";
+import { ShareButton } from "./ShareButton";
 import { Slider } from "./Slider";
 import { Switch } from "./Switch";
 
@@ -138,10 +139,6 @@ function Export() {
   );
 }
 
-function Share() {
-  return <IconButton icon="share" label="Copy the address" onClick={() => void share()} />;
-}
-
 function Side({ icon, label, panel }: { icon: "left" | "right"; label: string; panel: SidePanel }) {
   const shown = shownPanels.value.includes(panel);
   return <IconButton icon={icon} label={label} pressed={shown} onClick={() => togglePanel(panel)} />;
@@ -164,7 +161,7 @@ const CONTROLS = [
   { name: "compare", rank: 2, Content: Compare },
   { name: "display", rank: 3, Content: Display },
   { name: "export", rank: 1, Content: Export },
-  { name: "share", rank: 0, Content: Share },
+  { name: "share", rank: 0, Content: ShareButton },
 ];
 
 export function TopBar() {

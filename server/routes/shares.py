@@ -1,0 +1,80 @@
+"""/api/shares: links that carry a look. What one shows is checked when it is made, and never changes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume import environments
+from relume import look as looks
+from relume.errors import NotFoundError
+from relume.measured.shelf import SHELF as MEASURED
+from server.bodies import ShareBody, ShareEntry, ShareRequest, moment
+from server.live.ports import Transfer
+from server.routes.bakes import ready_bake
+from server.routes.renders import baked_view, check_look
+from server.services import Services, Shared
+from server.shares import MAX_ID_LENGTH
+from worker.scenes import get_scene
+
+router = APIRouter(prefix="/api/shares", tags=["shares"])
+ShareId = Annotated[str, Path(max_length=MAX_ID_LENGTH, pattern=r"^[a-z2-7]+$")]
+
+
+@router.post("", status_code=201, responses={200: {"model": ShareEntry, "description": "It was shared before"}})
+async def make_share(request: ShareRequest, services: Shared, response: Response) -> ShareEntry:
+    """Save what a link shows: 201, or 200 where the same was shared before."""
+    status = await run_in_threadpool(ready_bake, services, request.bake)
+    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        look = await run_in_threadpool(_complete, request, transfer)
+    document = {**request.model_dump(), "scene": status.scene, "look": look}
+    identity, is_new = await run_in_threadpool(services.shares.put, document)
+    response.status_code = 201 if is_new else 200
+    response.headers["Location"] = f"/api/shares/{identity}"
+    return ShareEntry(id=identity, url=f"/?share={identity}")
+
+
+def _complete(request: ShareRequest, transfer: Transfer) -> dict[str, Any]:
+    """The whole look, so that it stays what it is whatever defaults become."""
+    for name in {request.view, *request.views}:
+        baked_view(name, transfer)
+    check_look(request.look, transfer, "/look")
+    return looks.complete(request.look, transfer.default_look)
+
+
+@router.get("/{share}")
+def get_share(share: ShareId, services: Shared, response: Response) -> ShareBody:
+    """What a link shows, and what of it is not here any more."""
+    found = services.shares.get(share)
+    response.headers["Cache-Control"] = "no-cache"
+    return ShareBody(
+        id=found.id, created=moment(found.created), lacking=_lacking(found.document, services), **found.document
+    )
+
+
+@router.delete("/{share}", status_code=204)
+def delete_share(share: ShareId, services: Shared) -> Response:
+    """Make room for others; the link opens nothing any more."""
+    services.shares.delete(share)
+    return Response(status_code=204)
+
+
+def _lacking(document: dict[str, Any], services: Services) -> list[str]:
+    """What a link names and the server has no more, one sentence each."""
+    try:
+        get_scene(services.bakes.ledger, document["scene"])
+    except NotFoundError:
+        return ["The scene of this link was deleted; ask who sent it to import it again."]
+    terms = [term for material in document["look"]["materials"].values() for term in material["terms"]]
+    measured = sorted({term["data"] for term in terms if "data" in term})
+    map_name = document["look"]["environment"]["map"]
+    lacking = [
+        f"The measured material {name} of this link was deleted; import it again."
+        for name in measured
+        if not MEASURED.is_known(name)
+    ]
+    if map_name is not None and not environments.is_known(map_name):
+        lacking.append(f"The environment {map_name} of this link was deleted; import it again.")
+    return lacking

@@ -1,0 +1,102 @@
+"""Links that carry a look: what one shows is checked, bounded and never changes."""
+
+import re
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from problems import problem_of
+from session_client import Baked
+
+from server import shares
+from worker.scenes import delete_scene
+
+LOOK = {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.1, 0.2, 0.3]}]}}}
+
+
+def body(baked: Baked, **more: Any) -> dict[str, Any]:
+    return {"bake": baked.bake, "view": "left", "views": ["front", "left"], "look": LOOK, **more}
+
+
+def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
+    made = client.post("/api/shares", json=body(baked, solo="Paper", solo_light=""))
+    assert made.status_code == 201
+    entry = made.json()
+    assert re.fullmatch("[a-z2-7]{10}", entry["id"])
+    assert entry["url"] == f"/?share={entry['id']}"
+    assert made.headers["location"] == f"/api/shares/{entry['id']}"
+    found = client.get(made.headers["location"]).json()
+    assert found["look"]["materials"]["Paper"]["terms"][0]["color"] == [0.1, 0.2, 0.3]
+    assert set(found["look"]) == {"materials", "environment", "lights", "transport", "display"}  # complete
+    assert (found["scene"], found["bake"], found["view"], found["views"]) == (
+        baked.scene, baked.bake, "left", ["front", "left"],
+    )  # fmt: skip
+    assert (found["solo"], found["solo_light"], found["lacking"]) == ("Paper", "", [])
+
+
+def test_the_same_again_is_the_same_link_and_another_look_another(client: TestClient, baked: Baked) -> None:
+    first = client.post("/api/shares", json=body(baked))
+    again = client.post("/api/shares", json=body(baked))
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert first.json() == again.json()
+    other = client.post("/api/shares", json=body(baked, look={"display": {"exposure": 1.0}}))
+    assert other.json()["id"] != first.json()["id"]
+    assert client.get(f"/api/shares/{first.json()['id']}").json()["look"]["display"]["exposure"] == 0.0
+
+
+def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shares, "ID_LENGTH", 1)
+    ids = set()
+    for number in range(40):  # more than a character can tell apart
+        look = {"display": {"exposure": number / 10}}
+        ids.add(client.post("/api/shares", json=body(baked, look=look)).json()["id"])
+        assert client.post("/api/shares", json=body(baked, look=look)).json()["id"] in ids
+    assert len(ids) == 40
+    assert {len(identity) for identity in ids} >= {1, 2}
+    for identity in ids:
+        assert client.get(f"/api/shares/{identity}").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("wrong", "status"),
+    [
+        ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
+        ({"look": {"display": {"exposure": 1e9}}}, 422),
+        ({"view": "nowhere"}, 422),
+        ({"views": ["front", "nowhere"]}, 422),
+        ({"views": []}, 422),
+        ({"views": ["front"] * 5}, 422),
+        ({"bake": "0" * 16}, 404),
+        ({"bake": "../../etc"}, 422),
+        ({"more": 1}, 422),
+    ],
+)
+def test_what_does_not_fit_is_refused(client: TestClient, baked: Baked, wrong: dict[str, Any], status: int) -> None:
+    answer = client.post("/api/shares", json=body(baked, **wrong))
+    assert answer.status_code == status
+    problem_of(answer)
+
+
+def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = client.post("/api/shares", json=body(baked)).json()["id"]
+    another = body(baked, look={"display": {"exposure": 2.0}})
+    for limit, value, status in (("MAX_SHARES", 1, 503), ("MAX_BYTES", 100, 503), ("MAX_SHARE_BYTES", 100, 413)):
+        with monkeypatch.context() as context:
+            context.setattr(shares, limit, value)
+            answer = client.post("/api/shares", json=another)
+            assert answer.status_code == status
+            problem_of(answer)
+    monkeypatch.setattr(shares, "MAX_SHARES", 1)
+    assert client.delete(f"/api/shares/{kept}").status_code == 204
+    assert client.get(f"/api/shares/{kept}").status_code == 404
+    assert client.post("/api/shares", json=another).status_code == 201
+
+
+def test_a_link_says_what_is_gone(client: TestClient, baked: Baked) -> None:
+    made = client.post("/api/shares", json=body(baked)).json()["id"]
+    bakes = client.app.state.services.bakes
+    delete_scene(bakes.data_dir, bakes.ledger, baked.scene)
+    (lacking,) = client.get(f"/api/shares/{made}").json()["lacking"]
+    assert "scene" in lacking
+    for unknown in ("aaaaaaaaaa", "a" * 33, "ABC", "..%2f"):
+        assert client.get(f"/api/shares/{unknown}").status_code in (404, 422)

@@ -1,0 +1,129 @@
+"""People see what a bake is at: behind whom it waits, what its processes do before they trace, when it is published."""
+
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numba as nb
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+from sqlalchemy import inspect
+
+from cli.follow import detail
+from relume.transfer.base import Plan
+from worker.database import open_database
+from worker.executor import TINY_BAKE_RAYS
+from worker.ledger import Ledger
+from worker.notes import Notebook, note_path, read_note
+from worker.scenes import register_scene
+from worker.service import BakeService
+from worker.status import BakeStatus
+
+LARGE = TINY_BAKE_RAYS + 1
+
+
+@pytest.fixture
+def entered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Every phase that is told to the ledger, in order, each once."""
+    phases: list[str] = []
+    beat = Ledger.beat
+
+    def noted(self: Ledger, identity: str, owner: str, **progress: Any) -> bool:
+        if not phases or phases[-1] != progress["phase"]:
+            phases.append(progress["phase"])
+        return beat(self, identity, owner, **progress)
+
+    monkeypatch.setattr(Ledger, "beat", noted)
+    return phases
+
+
+@pytest.mark.parametrize("num_rays", [1000, LARGE], ids=["in this process", "in worker processes"])
+def test_phases_of_a_bake(tmp_path: Path, entered: list[str], num_rays: int) -> None:
+    with BakeService(tmp_path, num_workers=1, methods={"fake": FakeMethod(num_rays=num_rays)}) as service:
+        register_scene(service.data_dir, service.ledger, tiny_scene())
+        with service.subscribe(service.submit(tiny_scene().id, RECIPE)) as changes:
+            seen = list(changes)
+    assert seen[-1].state == "ready"
+    assert (entered[0] == "starting") == (num_rays == LARGE)
+    order = ["starting", "reading", "loading", "sampling", "tracing", "publishing"]
+    known = [phase for phase in entered if phase in order]
+    assert known == sorted(known, key=order.index)
+    assert {"reading", "sampling", "tracing", "publishing"} <= set(known)
+    assert all((status.phase is None) == (status.phase_since is None) for status in seen)
+    assert seen[-1].phase is None
+    assert not list((tmp_path / "bakes" / "staging").iterdir())
+
+
+def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
+    service = BakeService(tmp_path, methods={"fake": FakeMethod()})
+    register_scene(service.data_dir, service.ledger, tiny_scene())
+    recipes = [replace(RECIPE, num_lights=lights) for lights in (8, 16, 24, 32)]
+    plans = [Plan(1, rays, 1, 1) for rays in (LARGE, 1000, LARGE, LARGE)]  # the tiny one has a lane of its own
+    ids = [service.ledger.submit(tiny_scene().id, *one) for one in zip(recipes, plans, strict=True)]
+    assert [service.get(identity).ahead for identity in ids] == [0, 0, 1, 2]
+    assert {status.id: status.ahead for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
+    service.ledger.claim(ids[0], "host/1/nonce/1")
+    service.cancel(ids[2])
+    assert [service.get(identity).ahead for identity in ids] == [0, 0, 0, 1]
+    service.close()
+
+
+def test_kernels_that_are_compiled_are_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+    write = Notebook._write
+
+    def noted(self: Notebook, what: Any) -> None:
+        write(self, what)
+        written.append(read_note(tmp_path / "one.zarr") or "")
+
+    monkeypatch.setattr(Notebook, "_write", noted)
+    notes = Notebook(tmp_path / "one.zarr")
+    kernel = nb.njit(lambda x: x + 1)
+    with notes.watching_compiler():
+        notes.note("working")
+        assert kernel(1) == kernel(1) == 2
+    assert kernel(1.0) == 2.0  # compiled again, and nobody is told
+    assert written == ["working", "compiling", "working"]
+
+
+def test_note_that_cannot_be_kept_costs_the_words_alone(tmp_path: Path) -> None:
+    Notebook(tmp_path / "nowhere" / "one.zarr").note("working")
+    assert read_note(tmp_path / "nowhere" / "one.zarr") is None
+    note_path(tmp_path / "one.zarr").write_text("something else")
+    assert read_note(tmp_path / "one.zarr") is None
+
+
+def test_database_of_an_older_relume_gets_what_it_lacks(tmp_path: Path) -> None:
+    path = tmp_path / "relume.db"
+    service = BakeService(tmp_path, methods={"fake": FakeMethod()})
+    register_scene(service.data_dir, service.ledger, tiny_scene())
+    identity = service.submit(tiny_scene().id, RECIPE)
+    service.close()
+    lacking = ("phase", "phase_since", "crowding")
+    with sqlite3.connect(path) as old:
+        for column in lacking:
+            old.execute(f"ALTER TABLE bakes DROP COLUMN {column}")
+    with ThreadPoolExecutor(4) as threads:  # a server and the command line may start at once
+        engines = list(threads.map(open_database, [f"sqlite:///{path}"] * 4))
+    assert {column["name"] for column in inspect(engines[0]).get_columns("bakes")} >= set(lacking)
+    assert Ledger(engines[0]).bake(identity).phase is None
+    for engine in engines:
+        engine.dispose()
+
+
+def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cli.follow.time.time", lambda: 1012.0)
+    plan, none = Plan(1, 1, 1, 1), {"rays_per_second": None, "bytes": 0, "problem": None, "created": 0.0}
+
+    def status(state: Any, phase: Any, seconds_left: float | None = None, ahead: int = 0) -> BakeStatus:
+        return BakeStatus(
+            id="", scene="", state=state, progress=0.0, phase=phase, phase_since=1000.0, ahead=ahead,
+            seconds_left=seconds_left, recipe=RECIPE, plan=plan, **none,
+        )  # fmt: skip
+
+    assert detail(status("queued", None, ahead=2)) == "waiting for 2 before it"
+    assert detail(status("running", "compiling", 5.0)) == "compiling kernels, once on this machine, 12 s"
+    assert detail(status("running", "tracing")) == "tracing, estimating the time left"
+    assert detail(status("running", "tracing", 41.4)) == "tracing, 41 s left"
