@@ -50,8 +50,14 @@ def measure(tiny: bool) -> list[Figure]:
             after = _resident(server.pid)
             time.sleep(0 if tiny else _REST_S + _MORE_S)
             rest = _resident(server.pid)
-    context = {"scenes": len(scenes), "size": list(size), "lights": num_lights, "rest_s": _REST_S + _MORE_S}
-    found = {"before": before, "after": after, "rest": rest}
+    context = {
+        "scenes": len(scenes),
+        "size": list(size),
+        "lights": num_lights,
+        "rest_s": _REST_S + _MORE_S,
+        "server_at_start": before.server / 1e6,
+    }
+    found = {"after": after, "rest": rest}
     return [
         Figure(f"memory.{of}_{when}_mb", getattr(resident, of) / 1e6, "MB", context)
         for when, resident in found.items()

@@ -9,7 +9,7 @@ from platformdirs import user_data_dir
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from worker.rest import idle_seconds
+from worker.rest import DEFAULT_IDLE_S
 
 GIB = 1024**3
 
@@ -38,9 +38,7 @@ class Settings(BaseSettings):
     )
     cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of the frozen caches")
     cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
-    idle_seconds: float = Field(
-        default_factory=idle_seconds, ge=1, description="how long things that nobody uses are kept"
-    )
+    idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")

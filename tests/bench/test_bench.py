@@ -26,7 +26,7 @@ IN_PROCESS = [
 ]  # fmt: skip
 WITH_PROCESSES = [
     "bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
-    "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights",
+    "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights", "bench.memory",
 ]  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import threading
+import time
 import weakref
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -126,6 +127,23 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
     clock.now += IDLE_S - 1
     go_round(real)
     assert real.app.state.services.transfers.opened == [transfer]
+
+
+def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClient, clock: Clock) -> None:
+    bake = bake_scenes(real)[0]
+    truth = real.post("/api/truths", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
+    request = {"bake": bake, "view": "front", "format": "png", "looks": [{"display": {"exposure": 1.0}}] * 2}
+    render = real.post("/api/renders", json=request).headers["location"]
+    works = [truth, render]
+    for _ in range(6000):
+        clock.now += IDLE_S + 1
+        go_round(real)
+        states = [real.get(work).json()["state"] for work in works]
+        if not {"queued", "running"} & set(states):
+            break
+        time.sleep(0.02)
+    assert states == ["ready", "ready"]
+    assert real.app.state.services.transfers.opened == []
 
 
 def run_alone(coroutine: Any) -> None:

@@ -3,14 +3,17 @@ import { useEffect, useRef } from "preact/hooks";
 import { linkToCopy, share } from "../looks/share";
 import { IconButton } from "./Button";
 
-const close = () => (linkToCopy.value = null);
-
 export function ShareButton() {
   const link = linkToCopy.value;
   const field = useRef<HTMLInputElement>(null);
+  const menu = useRef<HTMLDivElement>(null);
+  const close = () => {
+    linkToCopy.value = null;
+    menu.current?.querySelector("button")?.focus();
+  };
   useEffect(() => field.current?.select(), [link]);
   return (
-    <div class="menu share" onKeyDown={(event) => event.key === "Escape" && close()}>
+    <div class="menu share" ref={menu} onKeyDown={(event) => event.key === "Escape" && link !== null && close()}>
       <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void share()} />
       {link !== null && (
         <div class="menu-body" role="dialog" aria-label="Link to this picture">

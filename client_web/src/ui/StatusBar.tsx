@@ -39,7 +39,7 @@ function bakeWords(elapsed: number): string {
   if (next === null) return "";
   if (next.state === "ready") return "Bake ready, opening";
   if (next.state !== "running" && next.state !== "queued") return `Bake ${next.state}`;
-  return `New bake: ${bakingWords(next, elapsed)}`;
+  return `Bake: ${bakingWords(next, elapsed)}`;
 }
 
 export function StatusBar() {
