@@ -25,7 +25,7 @@ from relume.store import fill, open_store, publish
 from relume.transfer.base import Task
 from worker.lease import HEARTBEAT_S, LeaseKeeper
 from worker.ledger import Ledger
-from worker.notes import note_path, read_note
+from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
 from worker.status import Phase, TaskCost
@@ -63,9 +63,9 @@ class BakeRunner:
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
         with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), rest.kept_awake():
-            note_path(self._staging).unlink(missing_ok=True)  # of an earlier run
+            forget_note(self._staging)  # of an earlier run
             self._run()
-            note_path(self._staging).unlink(missing_ok=True)
+            forget_note(self._staging)
         self.changed()
 
     def _run(self) -> None:

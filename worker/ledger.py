@@ -186,17 +186,24 @@ class Ledger:
             rows = list(session.execute(query))
         return [Finished(_plan(plan), float(seconds), crowded or 1.0) for plan, seconds, crowded in rows]
 
-    def stage_seconds(self, method: str, limit: int) -> dict[int, float]:
-        """What the tasks of each stage took in the newest ready bakes of a method, together; empty where none was."""
+    def stage_seconds(self, scene_id: str, method: str, num_workers: int, limit: int) -> dict[int, float]:
+        """What each stage took of the newest ready bakes of a method, of this scene where there are any.
+
+        Returns:
+            Wall seconds by stage, those of all bakes together; empty where there was none.
+        """
         is_like = BakeRow.recipe.contains(f'"method":{json.dumps(method)}', autoescape=True)
-        newest = select(BakeRow.id).where(BakeRow.state == "ready", is_like).order_by(BakeRow.created.desc())
-        query = (
-            select(TaskRow.stage, func.sum(TaskRow.seconds))
-            .where(TaskRow.bake_id.in_(newest.limit(limit)))
-            .group_by(TaskRow.stage)
-        )
+        newest = select(BakeRow.id, BakeRow.scene_id, BakeRow.plan).where(BakeRow.state == "ready", is_like)
+        of_tasks = select(TaskRow.bake_id, TaskRow.stage, func.sum(TaskRow.seconds), func.count())
+        found: dict[int, float] = {}
         with self.sessions() as session:
-            return {stage: float(seconds) for stage, seconds in session.execute(query)}
+            bakes = list(session.execute(newest.order_by(BakeRow.created.desc()).limit(limit)))
+            alike = [bake for bake in bakes if bake[1] == scene_id] or bakes
+            at_once = {bake: 1 if is_tiny(_plan(plan)) else num_workers for bake, _, plan in alike}
+            query = of_tasks.where(TaskRow.bake_id.in_(at_once)).group_by(TaskRow.bake_id, TaskRow.stage)
+            for bake, stage, seconds, count in session.execute(query):
+                found[stage] = found.get(stage, 0.0) + float(seconds) / min(count, at_once[bake])
+        return found
 
     def _get(self, identity: str) -> BakeRow | None:
         with self.sessions() as session:

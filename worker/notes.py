@@ -33,6 +33,12 @@ def read_note(staging: Path) -> Note | None:
     return next((note for note in _NOTES if note == text), None)
 
 
+def forget_note(staging: Path) -> None:
+    """Remove it, where there is one."""
+    with suppress(OSError):
+        note_path(staging).unlink(missing_ok=True)
+
+
 class Notebook:
     """Notes of one task; kernels that are compiled meanwhile are noted as well."""
 

@@ -58,8 +58,8 @@ class Progress:
         self._shown = shown
         self._total = self._largest = 0
         self._is_measurable = self._is_working = False
-        self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
-        self._began = self._last = clock()
+        self._parallel = 1
+        self._restart()
 
     def begin_stage(self, tasks: Collection[Task], last: bool) -> None:
         """Note the tasks of a stage."""
@@ -75,6 +75,8 @@ class Progress:
         else:
             self._span = 0.0
         self._is_measurable = self._span > 0 and self._total > 0
+        self._parallel = max(1, min(self._expected.parallel, len(tasks)))
+        self._num_here, self._task_s, self._stage_began = 0, 0.0, self._clock()
         if shares is None or not self._gained:
             self._restart()
 
@@ -84,7 +86,7 @@ class Progress:
         self._restart()
 
     def _restart(self) -> None:
-        self._began = self._last = self._clock()
+        self._began = self._last = self._stage_began = self._clock()
         self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
 
     def add(self, task: Task, cost: TaskCost, here: bool) -> None:
@@ -114,28 +116,31 @@ class Progress:
         return {
             "progress": min(1.0, self._shown),
             "rays_per_second": self._rays_here / max(1e-3, worked_s) if self._rays_here else None,
-            "seconds_left": max(0.0, (1 - self._done) / per_second - since_s) if per_second else None,
+            "seconds_left": self._seconds_left(per_second, since_s) if per_second else None,
         }
+
+    def _seconds_left(self, per_second: float, since_s: float) -> float:
+        """At a rate; but at least as many as where all tasks in hand ended just now."""
+        in_hand = self._span * min(1.0, self._parallel * self._largest / max(1, self._total))
+        gained = self._gained + in_hand
+        least = (1 - self._done - in_hand) * (self._clock() - self._began) / gained if gained else 0.0
+        return max(0.0, least, (1 - self._done) / per_second - since_s)
 
     def _rate(self) -> float | None:
         """Share of the bake that is done in a second; None where nothing tells.
 
-        What finished bakes took counts less and less as this one goes on. A task that should have ended already shows
-        that the rate is lower than was thought.
+        What finished bakes took counts less and less as this one goes on.
         """
-        parallel, now_s = self._expected.parallel, self._clock() - self._began
-        seconds = self._expected.seconds if self._is_measurable and self._is_working else None
-        expected = 1 / seconds if seconds else None
-        observed = None
-        if self._gained and self._is_measurable:
-            observed = self._gained / max(1e-3, self._worked_s())
-        if expected is None:
+        if not self._is_measurable:
+            return None
+        observed = self._gained / max(1e-3, self._worked_s()) if self._gained else None
+        if not self._expected.seconds or not self._is_working:
             return observed
-        if observed is not None:
-            trust = min(1.0, self._gained / EVIDENCE)
-            expected = math.exp(trust * math.log(observed) + (1 - trust) * math.log(expected))
-        in_hand = parallel * self._span * self._largest / max(1, self._total)
-        return min(expected, (self._gained + in_hand) / max(1e-3, now_s))
+        expected = 1 / self._expected.seconds
+        if observed is None:
+            return expected
+        trust = min(1.0, self._gained / EVIDENCE)
+        return math.exp(trust * math.log(observed) + (1 - trust) * math.log(expected))
 
     def _worked_s(self) -> float:
         """Seconds that the finished tasks took, all together.
@@ -143,9 +148,10 @@ class Progress:
         Tasks that run side by side end together: when the first of them has ended, the wall clock would count the time
         of all for one alone.
         """
-        wall_s, parallel = self._last - self._began, self._expected.parallel
-        of_finished = wall_s * self._num_here / (self._num_here + parallel - 1)
-        return min(wall_s, max(self._task_s / parallel, of_finished))
+        wall_s, parallel = self._last - self._stage_began, self._parallel
+        of_finished = wall_s * self._num_here / max(1, self._num_here + parallel - 1)
+        of_stage = min(wall_s, max(self._task_s / parallel, of_finished))
+        return max(0.0, self._stage_began - self._began) + max(0.0, of_stage)
 
 
 def _weight(task: Task) -> int:

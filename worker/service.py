@@ -20,7 +20,7 @@ from worker.estimate import crowding, load_of_machine, seconds_for
 from worker.executor import Executors, is_tiny
 from worker.lease import new_owner
 from worker.ledger import Ledger
-from worker.notes import note_path
+from worker.notes import forget_note
 from worker.paths import bake_path
 from worker.progress import Expected
 from worker.rest import idle_seconds
@@ -143,14 +143,14 @@ class BakeService:
     def seconds_for(self, plan: Plan) -> float | None:
         """Seconds that a bake will take, by those that took place here; None where there were none."""
         load = load_of_machine()
-        if not is_tiny(plan) and not self._is_crowding.is_set():  # else its own processes' load is in it already
+        if is_tiny(plan) or not self._is_crowding.is_set():  # else a bake that ends before this one is counted already
             load += self._executors.num_workers
         finished = self.ledger.finished_bakes(NUM_JUDGED_BY)
         return seconds_for(plan, finished, self._executors.num_workers, crowding(load))
 
     def _expected(self, status: BakeStatus, parallel: int) -> Expected:
         method = self._method(status.recipe.method)
-        seconds = self.ledger.stage_seconds(method.name, NUM_JUDGED_BY)
+        seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_JUDGED_BY)
         total, stages = sum(seconds.values()), range(len(method.stages))
         shares = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
         return Expected(self.seconds_for(status.plan), shares, parallel)
@@ -252,4 +252,4 @@ class BakeService:
         for folder in staging.glob("*.zarr"):
             if folder.name.removesuffix(".zarr") not in wanted:
                 shutil.rmtree(folder, ignore_errors=True)
-                note_path(folder).unlink(missing_ok=True)
+                forget_note(folder)

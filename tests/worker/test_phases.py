@@ -12,14 +12,14 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 from sqlalchemy import inspect
 
 from cli.follow import detail
-from relume.transfer.base import Plan
+from relume.transfer.base import Plan, Task
 from worker.database import open_database
 from worker.executor import TINY_BAKE_RAYS
 from worker.ledger import Ledger
 from worker.notes import Notebook, note_path, read_note
 from worker.scenes import register_scene
 from worker.service import BakeService
-from worker.status import BakeStatus
+from worker.status import BakeStatus, TaskCost
 
 LARGE = TINY_BAKE_RAYS + 1
 
@@ -127,3 +127,19 @@ def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert detail(status("running", "compiling", 5.0)) == "compiling kernels, once on this machine, 12 s"
     assert detail(status("running", "tracing")) == "tracing, estimating the time left"
     assert detail(status("running", "tracing", 41.4)) == "tracing, 41 s left"
+
+
+def test_stages_are_known_from_bakes_of_the_same_scene_where_there_are_any(tmp_path: Path) -> None:
+    service = BakeService(tmp_path, methods={"fake": FakeMethod()})
+    scenes = [tiny_scene(name) for name in ("one", "two", "three")]
+    for scene, seconds in zip(scenes[:2], (3.0, 5.0), strict=True):
+        register_scene(service.data_dir, service.ledger, scene)
+        identity = service.ledger.submit(scene.id, RECIPE, Plan(1, LARGE, 1, 1))
+        service.ledger.claim(identity, "host/1/nonce/1")
+        for task in (Task(0, 0, "front", 0, 1), Task(1, 0, "front", 0, 1), Task(1, 1, "front", 1, 2)):
+            service.ledger.finish_task(identity, task, TaskCost(1, seconds, seconds), 1)
+        service.ledger.finish(identity, "host/1/nonce/1", "ready")
+    known = [service.ledger.stage_seconds(scene.id, "fake", 2, 8) for scene in scenes]
+    assert known == [{0: 3.0, 1: 3.0}, {0: 5.0, 1: 5.0}, {0: 8.0, 1: 8.0}]
+    assert service.ledger.stage_seconds(scenes[0].id, "other", 2, 8) == {}
+    service.close()

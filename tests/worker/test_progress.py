@@ -142,3 +142,15 @@ def test_stages_count_by_the_time_they_took_before() -> None:
     assert progress.fields()["progress"] == pytest.approx(0.25)
     progress.add(TASKS[0], TaskCost(1000, 1, 1), here=True)
     assert progress.fields()["progress"] == pytest.approx(0.325)
+
+
+def test_a_stage_that_cannot_be_shared_counts_as_long_as_it_took() -> None:
+    """One task of a fifth, then twenty of the rest by two processes: the first tells what the others will take."""
+    clock = Clock()
+    progress = Progress(PLAN, expected=Expected(None, (0.2, 0.8), 2), clock=clock)
+    progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
+    progress.begin_work()
+    clock.now += 20
+    progress.add(Task(0, 0, "front", 0, 0), TaskCost(0, 0, 20), here=True)
+    progress.begin_stage([Task(1, i, "front", i * 10, i * 10 + 10) for i in range(20)], last=True)
+    assert progress.fields()["seconds_left"] == pytest.approx(80)
