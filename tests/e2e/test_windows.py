@@ -72,6 +72,12 @@ def test_everything_in_the_editor_can_be_reached(editor: Editor, size: tuple[int
     page.locator(".library").get_by_role("button", name="Close").click()
     expect(page.locator(".inspector")).to_be_visible()  # it comes back where it had made room
 
+    ask = page.get_by_role("button", name="How true is this?")
+    ask.click()
+    expect(page.get_by_role("complementary", name="How true is this picture?")).to_be_visible()
+    assert_nothing_is_cut_off(page, "the comparison with brute force")
+    ask.click()
+
     page.keyboard.press("?")
     keys = page.get_by_role("dialog", name="Keyboard map")
     keys.get_by_text("One of several views").scroll_into_view_if_needed()
