@@ -27,13 +27,16 @@ def import_scene(
         str | None,
         typer.Option(metavar="NAME", help="In place of a file: still_life, cornell_box, lamplit_cornell_box, …"),
     ] = None,
+    ground: Annotated[bool, typer.Option("--ground", help="Put it on a ground, which catches its shadows.")] = False,
     data: Data = None,
 ) -> None:
     """Register a scene; print its id, what was understood, and a warning for each thing that was not."""
     from cli.house import open_bakes, open_settings
+    from relume.scene.ground import with_ground
     from worker.scenes import get_scene, register_scene
 
     scene = _find(file, environment, name, built_in)
+    scene = with_ground(scene) if ground else scene
     service = open_bakes(open_settings(data))
     try:
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))

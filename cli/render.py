@@ -29,6 +29,7 @@ def render(scene: SceneName, output: Output, look: LookFile = None, view: View =
         document = complete_look(partial, transfer.default_look)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
-        save(output, render_image(transfer, view_name, document), document)
+        for_display = output.suffix.lower() != ".exr"
+        save(output, render_image(transfer, view_name, document, for_display=for_display), document)
     finally:
         service.close()

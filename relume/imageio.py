@@ -38,17 +38,19 @@ def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: st
 
     Args:
         path: ends in .exr (linear radiance, float32; exposure and tone map do not apply), .png or .webp (8 bit).
-        image: linear Rec. 709 radiance, top row first. (height, width, 3) float32
+        image: linear Rec. 709 radiance, top row first, with coverage as a fourth channel where it is not opaque: the
+            others are multiplied by it, as EXR has them; the other formats hold them without it.
+            (height, width, 3 or 4) float32
         exposure: stops. tone_map_name: as for `tone_map`.
     Raises:
-        ParameterError: another format, or no such tone map. ShapeMismatchError: not an RGB image.
+        ParameterError: another format, or no such tone map. ShapeMismatchError: neither RGB nor RGB with coverage.
         RelumeError: the file cannot be written.
     """
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
         raise ParameterError("the image format", path.suffix, f"a file name ending in {', '.join(_WRITERS)}")
-    if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
-        raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or image.size == 0:
+        raise ShapeMismatchError(f"an image has the shape (height, width, 3 or 4), not {image.shape}; reshape it")
     try:
         _write_whole(path, lambda unfinished: write(unfinished, image, exposure, tone_map_name))
     except OSError as error:
@@ -66,8 +68,8 @@ def _write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
-    height, width, _ = image.shape
-    specification = OpenImageIO.ImageSpec(width, height, 3, OpenImageIO.FLOAT)
+    height, width, channels = image.shape
+    specification = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
     specification.attribute("compression", "zip")
     specification.attribute("oiio:ColorSpace", "lin_rec709_scene")
     output = OpenImageIO.ImageOutput.create(str(path))
@@ -78,12 +80,20 @@ def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str) -> N
         raise OSError(output.geterror())
 
 
+def _displayed(image: F32, exposure: float, tone_map_name: str) -> NDArray[np.uint8]:
+    """What the screen shows of the surfaces themselves, and how much of each pixel they cover."""
+    alpha = np.clip(image[..., 3:], 0, 1)
+    surfaces = image[..., :3] if image.shape[2] == 3 else image[..., :3] / np.maximum(alpha, 1e-6)
+    shown = tone_map(np.asarray(surfaces, np.float32), exposure, tone_map_name)
+    return np.concatenate([to_bytes(shown), to_bytes(alpha)], axis=-1)
+
+
 def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
-    Image.fromarray(to_bytes(tone_map(image, exposure, tone_map_name))).save(path, "PNG")
+    Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "PNG")
 
 
 def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
-    Image.fromarray(to_bytes(tone_map(image, exposure, tone_map_name))).save(path, "WEBP", quality=92, method=4)
+    Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "WEBP", quality=92, method=4)
 
 
 _WRITERS: dict[str, Callable[[Path, F32, float, str], None]] = {

@@ -11,12 +11,12 @@ def shrink(image: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.floa
     """Resample by area.
 
     Args:
-        image: linear radiance. (height, width, 3) float32
+        image: linear radiance. (height, width, channels) float32
         size: width and height, neither larger than the image's.
     Returns:
-        (size[1], size[0], 3) float32
+        (size[1], size[0], channels) float32
     """
     if size == (image.shape[1], image.shape[0]):
         return image
-    channels = [Image.fromarray(np.ascontiguousarray(image[..., c])) for c in range(3)]
+    channels = [Image.fromarray(np.ascontiguousarray(image[..., c])) for c in range(image.shape[2])]
     return np.stack([np.asarray(c.resize(size, Image.Resampling.BOX), np.float32) for c in channels], axis=-1)

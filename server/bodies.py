@@ -43,10 +43,12 @@ class SceneView(Body):
 
 
 class SceneMaterial(Body):
-    """A material and its default terms, in look-document form."""
+    """A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its
+    shadows alone."""
 
     name: str
     terms: list[dict[str, Any]]
+    catcher: bool
 
 
 class SceneVariant(Body):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # the import process itself has no use for it
 
 MAX_OUTPUT_BYTES = 64 * 1024
 UPLOAD_PREFIX = "upload-"
-Kind = Literal["scene", "environment"]
+Kind = Literal["scene", "environment", "grounded"]
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,10 @@ class Order:
     """What to import.
 
     Attributes:
-        kind, file: what it is, and its path.
+        kind, file: what it is, and its path; of a scene to be "grounded" the folder that it is kept in.
         environment: path of a scene's environment map, or None.
         name: what people will call it.
+        ground: whether a scene is put on one.
         seconds: of processor and wall. max_bytes: of address space.
     """
 
@@ -47,6 +48,7 @@ class Order:
     name: str
     seconds: int
     max_bytes: int
+    ground: bool = False
 
     @classmethod
     def of(cls, settings: Settings, kind: Kind, file: Path, name: str, environment: Path | None = None) -> Order:
@@ -111,6 +113,8 @@ def main() -> int:
 
 
 def _import(order: Order) -> str:
+    if order.kind == "grounded":
+        return _put_on_ground(order)
     return _import_scene(order) if order.kind == "scene" else _import_environment(order)
 
 
@@ -123,6 +127,7 @@ def _import_environment(order: Order) -> str:
 
 def _import_scene(order: Order) -> str:
     from relume.light.environment import read_environment
+    from relume.scene.ground import with_ground
     from relume.scene.importer import import_scene, read_file
     from worker.database import open_database
     from worker.ledger import Ledger
@@ -130,6 +135,18 @@ def _import_scene(order: Order) -> str:
 
     environment = None if order.environment is None else read_environment(order.environment, "Environment")
     scene = import_scene(read_file(order.file), order.name, environment)  # bytes: what lies beside it is not its own
+    scene = with_ground(scene) if order.ground else scene
+    return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
+
+
+def _put_on_ground(order: Order) -> str:
+    from relume.scene.archive import load_scene
+    from relume.scene.ground import with_ground
+    from worker.database import open_database
+    from worker.ledger import Ledger
+    from worker.scenes import register_scene
+
+    scene = with_ground(load_scene(order.file), order.name)
     return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
 
 

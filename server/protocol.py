@@ -3,7 +3,8 @@
 Text messages are JSON, at most `MAX_MESSAGE_BYTES`. A binary message is one frame: uint32 little-endian header length,
 JSON header (`FrameHeader`), payload. The payload holds the header's tiles one after another, row-major, top row first:
 "rgb9e5" 4 bytes a pixel, "f32" 12 bytes a pixel, "jpeg" one image of the whole picture, "r8" one byte a pixel
-(frames of kind "brush": 0…255 stands for 0…1).
+(frames of kind "brush": 0…255 stands for 0…1). Where the header says `alpha`, a byte for each pixel of the same tiles
+follows all that: how much it hides of what is put behind it, which its light has been multiplied by already.
 """
 
 from __future__ import annotations
@@ -270,4 +271,5 @@ class FrameHeader(Message):
     fidelity: Literal["preview", "approximate", "followed", "near", "exact"]
     complete: bool
     kind: Literal["picture", "brush"]
+    alpha: bool = False
     ms: FrameTimes

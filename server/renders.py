@@ -70,7 +70,7 @@ class RenderQueue:
             return
         request = status.request
         look = looks.validate(partial, transfer.default_look)
-        image = self._library.render(transfer, request.view, look)
+        image = self._library.render(transfer, request.view, look, for_display=request.format != "exr")
         image = image if request.size is None else shrink(image, request.size)
         write_image(path, image, look.display.exposure, look.display.tone_map)
 

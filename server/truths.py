@@ -75,7 +75,7 @@ class TruthQueue:
     def _work(self, work: Work) -> None:
         request, folder = TruthRequest(**work.request), self._backlog.folder / work.id
         transfer = self._library.open_transfer(self._data / "bakes" / f"{request.bake}.zarr")
-        look = looks.validate(request.look, transfer.default_look)
+        look = looks.validate(request.look, transfer.default_look).on_the_map()
         frame, estimate = _load(folder)
         try:
             if frame is None or estimate is None:

@@ -27,7 +27,7 @@ class SceneRecord:
     Attributes:
         created: seconds since 1970.
         views: camera names, in order.
-        materials: {"name", "terms"} each, in the order of material ids.
+        materials: {"name", "terms", "catcher"} each, in the order of material ids; old ones lack the last.
         variants: partial looks that the file brought, by name.
         lights: names of the scene's own.
     """
@@ -48,7 +48,10 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
     save_scene(scene, scene_path(data_dir, scene.id))
     summary = {
         "views": [camera.name for camera in scene.cameras],
-        "materials": [{"name": material.name, "terms": list(material.terms)} for material in scene.materials],
+        "materials": [
+            {"name": material.name, "terms": list(material.terms), "catcher": material.catcher}
+            for material in scene.materials
+        ],
         "warnings": list(scene.warnings),
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,

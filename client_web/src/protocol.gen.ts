@@ -201,6 +201,7 @@ export interface FrameHeader {
   fidelity: "preview" | "approximate" | "followed" | "near" | "exact";
   complete: boolean;
   kind: "picture" | "brush";
+  alpha: boolean;
   ms: FrameTimes;
 }
 
@@ -374,10 +375,11 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, in look-document form. */
+/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
+  catcher: boolean;
 }
 
 /** A look that came with the scene's file; partial, in look-document form. */

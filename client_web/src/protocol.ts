@@ -55,6 +55,14 @@ export interface Term {
 }
 export interface MaterialLook {
   terms: Term[];
+  /** Of a ground alone: only shadows on it are shown. */
+  catcher?: boolean;
+}
+/** What is seen where no surface is; it lights nothing. `color` is radiance, `blur` degrees. */
+export interface Background {
+  kind: "map" | "blurred" | "color" | "transparent";
+  color: Rgb;
+  blur: number;
 }
 export type Fidelity = gen.FrameHeader["fidelity"];
 
@@ -62,6 +70,7 @@ export interface Look {
   materials: Record<string, MaterialLook>;
   /** `map` names an environment of the server, null the scene's own. */
   environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
+  background: Background;
   lights: Record<string, Light>;
   /** Which light paths are shown; `bounces` between surfaces. */
   transport: Transport;
@@ -96,4 +105,4 @@ export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 export type ShareBody = Omit<gen.ShareBody, "look"> & { look: Look };
 
 /** A scene, its default terms in look-document form. */
-export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[] }[] };
+export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[]; catcher: boolean }[] };

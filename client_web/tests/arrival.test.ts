@@ -18,6 +18,7 @@ function frame(view: string, complete: boolean, at: number, width = 4): Frame {
       fidelity: "preview",
       complete,
       kind: "picture",
+  alpha: false,
       ms: { wait: 0, update: 0, encode: 0 },
     },
     payload: new Uint8Array(words.buffer),

@@ -36,6 +36,14 @@ describe("parseFrame", () => {
     }
   });
 
+  test("keeps the coverage of its pixels apart", () => {
+    const all = Uint8Array.from({ length: 20 }, (_, i) => i);
+    const frame = parseFrame(pack({ ...HEADER, alpha: true }, all));
+    expect([...frame.payload]).toEqual([...all.subarray(0, 16)]);
+    expect([...(frame.alpha ?? [])]).toEqual([16, 17, 18, 19]);
+    expect(parseFrame(pack(HEADER)).alpha).toBeNull();
+  });
+
   const hostile: [string, ArrayBuffer][] = [
     ["empty", new ArrayBuffer(0)],
     ["shorter than a length", new ArrayBuffer(3)],
@@ -54,6 +62,7 @@ describe("parseFrame", () => {
     ["tiles that are no list", pack({ ...HEADER, tiles: "all" })],
     ["NaN as a number", pack({ ...HEADER, frame: null })],
     ["unknown format", pack({ ...HEADER, format: "bmp" })],
+    ["no coverage where it is announced", pack({ ...HEADER, alpha: true }, new Uint8Array(16))],
     ["payload too short", pack(HEADER, new Uint8Array(15))],
     ["payload too long", pack(HEADER, new Uint8Array(17))],
   ];

@@ -12,6 +12,7 @@ export const LOOK: Look = {
     "a/b~c": { terms: [{ model: "lambert", color: [0.5, 0.5, 0.5] }] },
   },
   environment: { scale: 1, color: [1, 1, 1], rotation: 0 },
+  background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   lights: {},
   transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },

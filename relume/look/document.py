@@ -9,15 +9,17 @@ from relume import environments
 from relume.errors import ParameterError
 from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.look.lights import MAX_SCALE, complete_lights, default_lights
-from relume.look.model import Look, Show, ToneMap
+from relume.look.model import Backdrop, Look, Show, ToneMap
 from relume.look.terms import complete_term
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
 MAX_EXPOSURE = 20.0
 MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
-_SECTIONS = ("materials", "environment", "lights", "transport", "display")
+SHARPEST_BLUR, STRONGEST_BLUR = 2.0, 60.0  # degrees
+_SECTIONS = ("materials", "environment", "background", "lights", "transport", "display")
 _DEFAULT_ENVIRONMENT: dict[str, Any] = {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+_DEFAULT_BACKGROUND: dict[str, Any] = {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0}
 _DEFAULT_TRANSPORT: dict[str, Any] = {"show": "all", "bounces": MAX_BOUNCES}
 
 
@@ -29,10 +31,14 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
     """
     return {
         "materials": {
-            material.name: {"terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ())}
+            material.name: {
+                "terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ()),
+                **({"catcher": True} if material.catcher else {}),
+            }
             for material in scene_materials
         },
         "environment": dict(_DEFAULT_ENVIRONMENT),
+        "background": dict(_DEFAULT_BACKGROUND),
         "lights": default_lights(scene_lights, [material.name for material in scene_materials]),
         "transport": dict(_DEFAULT_TRANSPORT),
         "display": {"exposure": 0.0, "tone_map": "agx"},
@@ -67,6 +73,7 @@ def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[st
         "environment": _complete_environment(
             partial.get("environment", {}), default["environment"], known["environment"]
         ),
+        "background": _complete_background(partial.get("background", {}), default.get("background", {})),
         "lights": complete_lights(partial.get("lights", {}), default["lights"], known["lights"]),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),
@@ -82,9 +89,10 @@ def _complete_material(name: str, given: Any, default: Mapping[str, Any], known:
     if given is known[name] or given is default[name]:
         return given
     pointer: Pointer = ("materials", name)
-    check_object(pointer, given, ("terms",))
-    terms = given.get("terms", default[name]["terms"])
-    return {"terms": _complete_terms((*pointer, "terms"), terms, known[name]["terms"])}
+    merged = _merged(pointer, given, default[name])  # only a scene's ground may be a catcher
+    if not isinstance(merged.get("catcher", True), bool):
+        raise fail((*pointer, "catcher"), merged["catcher"], "true or false")
+    return {**merged, "terms": _complete_terms((*pointer, "terms"), merged["terms"], known[name]["terms"])}
 
 
 def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[Any]:
@@ -111,6 +119,16 @@ def _check_map(pointer: Pointer, name: Any) -> None:
     if name is not None and not (isinstance(name, str) and environments.is_known(name)):
         known = names_text(environments.known_names())
         raise fail(pointer, name, f"null for the scene's own, or an environment that is here: {known}")
+
+
+def _complete_background(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    pointer = ("background",)
+    merged = _merged(pointer, given, {**_DEFAULT_BACKGROUND, **default})  # older stores know of no background
+    if merged["kind"] not in get_args(Backdrop):
+        raise fail((*pointer, "kind"), merged["kind"], f"one of {names_text(get_args(Backdrop))}")
+    check_triple((*pointer, "color"), merged["color"], 0.0, MAX_COLOR)
+    check_number((*pointer, "blur"), merged["blur"], SHARPEST_BLUR, STRONGEST_BLUR)
+    return merged
 
 
 def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ Xyz = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
 Show = Literal["all", "direct", "first_bounce", "further_bounces"]
+Backdrop = Literal["map", "blurred", "color", "transparent"]
 
 
 class DrawnCurve(TypedDict):
@@ -44,9 +45,11 @@ class _Frozen(BaseModel):
 
 
 class MaterialLook(_Frozen):
-    """A material is the sum of its terms."""
+    """A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as
+    its shadows and as bright as what is reflected onto it."""
 
     terms: tuple[TermLook, ...]
+    catcher: bool = False
 
 
 class EnvironmentKey(NamedTuple):
@@ -214,11 +217,27 @@ class DisplayLook(_Frozen):
     tone_map: ToneMap
 
 
+class BackgroundLook(_Frozen):
+    """What the eye sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that
+    many degrees, one `color` (radiance), or nothing."""
+
+    kind: Backdrop
+    color: Rgb
+    blur: float
+
+
 class Look(_Frozen):
     """A complete, valid look; made by `relume.look.validate`."""
 
     materials: dict[str, MaterialLook]
     environment: EnvironmentLook
+    background: BackgroundLook
     lights: dict[str, LightLook]
     transport: TransportLook
     display: DisplayLook
+
+    def on_the_map(self) -> Look:
+        """The same with nothing that is only put behind or under the objects: what brute force can be asked for."""
+        plain = {name: material.model_copy(update={"catcher": False}) for name, material in self.materials.items()}
+        background = self.background.model_copy(update={"kind": "map"})
+        return self.model_copy(update={"materials": plain, "background": background})

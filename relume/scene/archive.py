@@ -122,6 +122,7 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "terms": list(material.terms),
                 "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
                 "double_sided": material.double_sided,
+                **({"catcher": True} if material.catcher else {}),  # ids of scenes without one stay what they were
             }
             for material in scene.materials
         ],
@@ -167,7 +168,8 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
         textures[channel] = Texture(pixels, (str(wrap_u), str(wrap_v)))
     normal_map = textures.pop("normal_map", None)
     terms = tuple(dict(term) for term in document["terms"])
-    return Material(str(document["name"]), terms, textures, normal_map, bool(document["double_sided"]))
+    double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
+    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher)
 
 
 def _read_document(path: Path) -> dict[str, Any]:

@@ -60,6 +60,7 @@ class Material:
             `textures["diffuse"]`. Known channels: "diffuse", "specular".
         normal_map: tangent-space normals in [-1, 1], already scaled; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
+        catcher: it is a ground that looks may show by its shadows alone, and the default look does.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Material:
     textures: dict[str, Texture] = field(default_factory=dict)
     normal_map: Texture | None = None
     double_sided: bool = True
+    catcher: bool = False
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
-from relume.transfer.stored import SHARD_ROWS, read_lights, read_tiles
+from relume.transfer.stored import SHARD_ROWS, read_lights, read_traced_directions
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
@@ -201,8 +201,4 @@ def _geometry_bytes(scene: Scene) -> int:
 
 
 def _targets(store: StoreReader) -> Targets:
-    """Light that may come to any part of a tile is asked for in its middle."""
-    lights = read_lights(store)
-    is_relightable = bool(store.attributes["relightable"])
-    towards = read_tiles(store).centroids.astype(np.float32) if is_relightable else lights.direction
-    return targets_of(towards, lights.power)
+    return targets_of(read_traced_directions(store), read_lights(store).power)

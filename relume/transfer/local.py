@@ -114,6 +114,12 @@ class LocalLights:
         light, pattern = self._light(source.geometry), pattern_of(source.geometry, ROUGH_SAMPLES)
         return LocalRays(light, pattern, np.array(source.gain, np.float32), points.position, points.numbers, seen)
 
+    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
+        """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
+        pattern = pattern_of(geometry, SAMPLES)
+        seen = np.full((len(points.position), -(-len(pattern.uv) // 8)), 255, np.uint8)
+        return arriving(self._light(geometry), pattern, points.position, points.normal, points.numbers, seen)
+
     def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""
         return Shadows(self._trace(geometry, points, SAMPLES))

@@ -30,6 +30,8 @@ class MaterialImage:
         self.terms = [TermImage(document, self._cos_theta_o, light) for document in documents]
         self._emission = (0.0, 0.0, 0.0)
         self._shines: F32 | None = None
+        self._factor: F32 | None = None
+        self.factor_key: Hashable = None
         self._is_current = False
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
@@ -60,6 +62,20 @@ class MaterialImage:
         if self._shines is None:
             self._shines = shines(self.index).astype(np.float32)
 
+    def set_factor(self, key: Hashable, factor: F32 | None) -> None:
+        """Every sample's finished radiance is multiplied, as on a ground that only catches shadows; None: by one.
+
+        Args:
+            key: that tells it from others, None for none. factor: (3, n) float32
+        """
+        if key != self.factor_key:
+            self.factor_key, self._factor, self._is_current = key, factor, False
+
+    @property
+    def is_caught(self) -> bool:
+        """Whether only shadows on it are shown."""
+        return self._factor is not None
+
     def changed_terms(self) -> Iterator[TermImage]:
         """Terms whose image does not show their target."""
         return (term for term in self.terms if not term.is_exact())
@@ -70,7 +86,8 @@ class MaterialImage:
             return False
         for k, term in enumerate(self.terms):
             color, texture, has_texture = self._factors(term)
-            add_term(term.displayed, color, texture, term.outgoing, has_texture, self._first, k == 0, radiance)
+            outgoing = term.outgoing if self._factor is None else self._factor
+            add_term(term.displayed, color, texture, outgoing, has_texture, self._first, k == 0, radiance)
             term.is_composed = True
         own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:

@@ -21,7 +21,7 @@ from relume.transfer.material_image import MaterialImage
 from relume.transfer.receivers import Receivers
 from relume.transfer.shade import Shaded, shade, shaded_bytes
 from relume.transfer.term_image import TermImage
-from relume.transfer.view_images import ViewImages
+from relume.transfer.view_images import ViewImages, documents_of
 
 
 class Candidate(NamedTuple):
@@ -257,4 +257,4 @@ def need_of_image(images: ViewImages, material: MaterialImage, image: TermImage,
 
 def _is_default(images: ViewImages, material: MaterialImage, image: TermImage, light: Light) -> bool:
     name = images.transfer.material_names[material.index]
-    return light == images.default_light and image.document in images.default.materials[name].terms
+    return light == images.default_light and image.document in documents_of(images.default, name)

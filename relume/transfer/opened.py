@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from relume import environments
 from relume.errors import ParameterError, StoreError
+from relume.light.blur import blurred, reduced
 from relume.light.environment import lookup, shrunk, turned
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights, weigh
@@ -30,6 +31,9 @@ from relume.transfer.view import View, open_view
 _LIGHTS_KEPT = 4
 _ROUGH_WIDTH = 512
 _EDITED_BYTES = 256 << 20
+_BLURS_KEPT = 16
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -98,8 +102,14 @@ class Transfer:
 
     def rough_lights_of(self, light: Light) -> TriangleLights:
         """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
-        rough = self._rough_radiance(light.environment.map)
-        return _shown(weigh(self._tiles, rough, light.environment.rotation), light)
+        return _shown(self._roughly_weighed(light.environment), light)
+
+    @cached_property
+    def _roughly_weighed(self) -> Callable[[EnvironmentKey], TriangleLights]:
+        def weighed(key: EnvironmentKey) -> TriangleLights:
+            return weigh(self._tiles, self._rough_radiance(key.map), key.rotation)
+
+        return lru_cache(maxsize=_LIGHTS_KEPT)(weighed)
 
     @cached_property
     def _rough_radiance(self) -> Callable[[str | None], NDArray[np.float32]]:
@@ -140,8 +150,18 @@ class Transfer:
         """Radiance of a view's samples of an environment. (n, 3) float32"""
         if environment == BAKED_ENVIRONMENT:
             return view.background()
-        towards = turned(view.background_directions(), -environment.rotation)
-        return lookup(self.radiance_of(environment.map), towards.astype(np.float32))
+        return self.seen_in(environment, view.background_directions())
+
+    def seen_in(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
+        """Radiance of an environment in unit directions, blurred by so many degrees. (n, 3) float32"""
+        name = environment.map
+        radiance = self._blurred(name, blur) if blur else self.radiance_of(name)
+        return lookup(radiance, turned(directions, -environment.rotation).astype(np.float32))
+
+    @cached_property
+    def _blurred(self) -> Callable[[str | None, float], F32]:
+        few = lru_cache(maxsize=_LIGHTS_KEPT)(lambda name: reduced(self.radiance_of(name)))
+        return lru_cache(maxsize=_BLURS_KEPT)(lambda name, degrees: blurred(few(name), degrees))
 
 
 def _shown(lights: TriangleLights, light: Light) -> TriangleLights:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
-from relume.look import EnvironmentKey, Look
-from relume.look.model import Rgb
+from relume.imageio import to_bytes
+from relume.look import Look
+from relume.transfer.backdrop import Backdrop
 from relume.transfer.cache import FrozenCache
 from relume.transfer.changeover import Changeover
 from relume.transfer.fidelity import Fidelity, worst
 from relume.transfer.following import RowsNeed
 from relume.transfer.glimpse import Glimpse
-from relume.transfer.light import Light
 from relume.transfer.light_mode import LightMode
 from relume.transfer.need import Candidate, Hand, Need, check_room, next_need
 from relume.transfer.opened import Transfer
@@ -66,14 +66,12 @@ class Picture:
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: FrozenCache, *, is_watched: bool = False) -> None:
-        self._transfer = transfer
         self._images = ViewImages(transfer, view_name, cache)
         self._view = self._images.view
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._background: tuple[EnvironmentKey, Rgb] | None = None
-        self._unit_background: tuple[EnvironmentKey | None, F32] = None, np.empty((0, 3), np.float32)
+        self._backdrop = Backdrop(self._images)
         self._touched: CurvePointer | ParameterPointer | None = None
         self._moved: ParameterPointer | None = None
         self._light_mode, self._changeover = LightMode(self._images), Changeover(self._images)
@@ -159,14 +157,13 @@ class Picture:
                 if frozen is not None:
                     term.step(frozen, max_coefficients)
         tiles: set[Tile] = set()
+        light, gain = self._changeover.light, self._backdrop.gain_of(self._changeover.gain)
+        is_new_behind = self._backdrop.follow(self._look, light, gain, self._radiance)
         for index, material in enumerate(images.by_name.values()):
             if material.num_samples and material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
-        light, gain = self._changeover.light, self._changeover.gain
-        background = (light.environment, light.environment_gain) if light.paths.direct else None
-        if background != self._background or not np.array_equal(self._gain, gain):
-            self._gain, self._background = np.array(gain), background
-            self._radiance[:, self._view.num_surface_samples :] = self._outside(light).T
+        if is_new_behind or not np.array_equal(self._gain, gain):
+            self._gain = gain
             tiles.update(self._view.all_tiles)
         fidelity = worst(image.fidelity for _, image in images.terms())
         complete = not any(image.is_blank for _, image in images.terms())
@@ -178,14 +175,6 @@ class Picture:
         self._light_mode.step()
         self._changeover.step(glimpse if isinstance(glimpse, Glimpse) else None)
 
-    def _outside(self, light: Light) -> F32:
-        """Radiance of the samples of the background. (n, 3)"""
-        if not light.paths.direct:
-            return np.zeros((self._view.num_view_samples - self._view.num_surface_samples, 3), np.float32)
-        if self._unit_background[0] != light.environment:
-            self._unit_background = light.environment, self._transfer.background_in(light.environment, self._view)
-        return self._unit_background[1] * np.array(light.environment_gain, np.float32)
-
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture."""
         return self._view.all_tiles
@@ -194,8 +183,22 @@ class Picture:
         """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
         return encode(self._view, self._radiance, tiles, form, self._gain)
 
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
+        if not self._backdrop.is_transparent:
+            return None
+        return to_bytes(resolve(self._view, self._backdrop.alpha(for_display=True), tiles, 1.0)[:, 0]).tobytes()
+
+    def alpha(self, *, for_display: bool) -> F32 | None:
+        """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
+        if not self._backdrop.is_transparent:
+            return None
+        whole = [(0, 0, self._view.width, self._view.height)]
+        alpha = resolve(self._view, self._backdrop.alpha(for_display=for_display), whole, 1.0)[:, 0]
+        return np.clip(alpha, 0, 1).reshape(self._view.height, self._view.width)
+
     def image(self) -> F32:
-        """Linear radiance. (height, width, 3) float32"""
+        """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
         whole = [(0, 0, self._view.width, self._view.height)]
         pixels = resolve(self._view, self._radiance, whole, self._gain)
         return pixels.reshape(self._view.height, self._view.width, 3)

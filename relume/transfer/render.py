@@ -16,14 +16,16 @@ _CACHE_BYTES = 4 << 30  # one operator at a time is alive; the largest picture t
 
 
 def render_image(
-    transfer: Transfer, view_name: str, look: Look, size: tuple[int, int] | None = None
+    transfer: Transfer, view_name: str, look: Look, size: tuple[int, int] | None = None, *, for_display: bool = False
 ) -> NDArray[np.float32]:
     """Render a look exactly.
 
     Args:
         size: width and height; only the baked one is possible, None means it.
+        for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
     Returns:
-        Linear radiance. (height, width, 3) float32
+        Linear radiance; where the look's background is transparent, coverage as a fourth channel, which the others
+        are multiplied by already. (height, width, 3 or 4) float32
     Raises:
         PlanError: another size than the baked one.
     """
@@ -35,7 +37,8 @@ def render_image(
     while True:
         exact = picture.advance(None).exact
         if picture.waiting() is None and exact:
-            return picture.image()
+            image, alpha = picture.image(), picture.alpha(for_display=for_display)
+            return image if alpha is None else np.dstack([image, alpha])
         picture.freeze(lambda share: None, lambda: False)
 
 

@@ -48,6 +48,13 @@ def read_tiles(store: StoreReader) -> Tiles:
     return tiles
 
 
+def read_traced_directions(store: StoreReader) -> F32:
+    """Where shadow rays went: light that may come to any part of a tile is asked for in its middle. (M, 3) float32"""
+    if store.attributes["relightable"]:
+        return read_tiles(store).centroids.astype(np.float32)
+    return read_lights(store).direction
+
+
 def read_tree(store: StoreReader) -> CellTree:
     """The tree over a store's gather cells."""
     return CellTree(*(store.read(f"cells/{name}") for name in CellTree._fields))

@@ -128,6 +128,12 @@ class View:
         """Unit directions in which those samples look. (n, 3)"""
         return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
 
+    def directions_to(self, material: int) -> NDArray[np.float64]:
+        """Unit directions in which the camera sees a material's samples; reads the store. (n, 3)"""
+        rows = self.rows(material)
+        towards = self.store.read(f"views/{self.index}/position", rows.start, rows.stop) - self.camera.to_world[:3, 3]
+        return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float64)
+
     def surface_at(self, sample: int) -> tuple[F32, F32]:
         """Position and unit normal of a sample on a surface, world space, from the store. (3,) each"""
         position, normal = (

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
 from relume.light.local import num_samples
-from relume.look import LightGeometry, Look, validate
+from relume.look import LightGeometry, Look, TermLook, validate
+from relume.look.terms import complete_term
 from relume.transfer.along import Along, AlongCurve
 from relume.transfer.cache import FrozenCache
 from relume.transfer.frozen import Frozen
@@ -22,6 +24,14 @@ from relume.transfer.receivers import LocalRays
 from relume.transfer.shade import Shaded
 from relume.transfer.slider import linearise
 from relume.transfer.term_image import TermImage
+
+_WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
+
+
+def documents_of(look: Look, material: str) -> Sequence[TermLook]:
+    """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
+    chosen = look.materials[material]
+    return (cast(TermLook, _WHITE),) if chosen.catcher else chosen.terms
 
 
 class ViewImages:
@@ -39,7 +49,7 @@ class ViewImages:
         self.default = validate(transfer.default_look, transfer.default_look)
         self.light = self.default_light = self._light_of(self.default)
         self.by_name = {
-            name: MaterialImage(self.view, index, self.default.materials[name].terms, self.light)
+            name: MaterialImage(self.view, index, documents_of(self.default, name), self.light)
             for index, name in enumerate(transfer.material_names)
         }
         self.gain = gain_of(self.default)
@@ -58,7 +68,7 @@ class ViewImages:
             for material in self.by_name.values():
                 material.set_light(light)
         for name, material in self.by_name.items():
-            material.set_documents(look.materials[name].terms)
+            material.set_documents(documents_of(look, name))
         self.gain = gain_of(look)
 
     def shine_in(self, light: Light) -> None:

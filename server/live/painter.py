@@ -113,7 +113,7 @@ def paint(picture: Picture, order: Order) -> Painted:
     is_sent = (has_news or not order.is_told) if advance.exact else (has_news and not order.only_exact)
     if not is_sent:
         return Painted(need, advance, None, update_ms)
-    tiles, payload = _payload(picture, order, advance.tiles)
+    tiles, payload, alpha = _payload(picture, order, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
     wait_ms = 0.0 if order.received_s is None else (start_s - order.received_s) * 1e3
     header = FrameHeader(
@@ -128,16 +128,18 @@ def paint(picture: Picture, order: Order) -> Painted:
         fidelity=advance.fidelity,
         complete=advance.complete,
         kind="picture",
+        alpha=alpha is not None,
         ms=times(wait_ms, update_ms, encode_ms),
     )
-    return Painted(need, advance, pack(header, payload), update_ms, encode_ms)
+    return Painted(need, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
 
 
-def _payload(picture: Picture, order: Order, changed: Sequence[Tile]) -> tuple[list[Tile], bytes]:
+def _payload(picture: Picture, order: Order, changed: Sequence[Tile]) -> tuple[list[Tile], bytes, bytes | None]:
+    """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
     if order.form == "jpeg":
-        return [(0, 0, *order.size)], _jpeg(picture, order.quality, order.target.look.display)
+        return [(0, 0, *order.size)], _jpeg(picture, order.quality, order.target.look.display), None
     tiles = sorted(order.lacking.union(changed), key=lambda tile: (tile[1], tile[0]))
-    return tiles, picture.encode(tiles, "rgb9e5")
+    return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
 
 
 def _jpeg(picture: Picture, quality: int, display: Any) -> bytes:

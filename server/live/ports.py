@@ -95,6 +95,7 @@ class Picture(Protocol):
     def advance(self, max_coefficients: int | None) -> Advance: ...
     def all_tiles(self) -> Sequence[Tile]: ...
     def encode(self, tiles: Sequence[Tile], form: Any, /) -> bytes: ...
+    def encode_alpha(self, tiles: Sequence[Tile], /) -> bytes | None: ...
     def image(self) -> F32: ...
     def probe(self, x: int, y: int) -> Mapping[str, Any]: ...
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
@@ -107,7 +108,8 @@ class Library:
     Attributes:
         open_transfer: path of a published store -> transfer; heavy.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
-        render: (transfer, view name, complete look) -> (H, W, 3) linear radiance in the baked size; heavy.
+        render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
+            where the look's background is transparent; `for_display` as of `render_image`; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
         reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,
@@ -118,7 +120,7 @@ class Library:
 
     open_transfer: Callable[[Path], Transfer]
     make_picture: Callable[[Any, str], Picture]
-    render: Callable[[Any, str, Any], F32]
+    render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., F32]
     cache_used_bytes: Callable[[], int]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import MAX_WIDTH, thumbnail
 from server.uploads import keep_upload, plain_stem
+from worker.paths import scene_path
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
 
@@ -28,20 +30,22 @@ SceneFile = Annotated[
 ]
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]
+Ground = Annotated[bool, Form(description="whether it is put on a ground, which catches its shadows")]
 
 
 @router.post("", status_code=201)
 async def import_scene(
-    scene: SceneFile, services: Shared, response: Response, environment: EnvironmentFile = None, name: SceneName = ""
+    scene: SceneFile, services: Shared, response: Response, environment: EnvironmentFile = None, name: SceneName = "",
+    ground: Ground = False,
 ) -> SceneBody:
     """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
     async with services.import_slots:
-        identity = await run_in_threadpool(_import, scene, environment, name, services)
+        identity = await run_in_threadpool(_import, scene, environment, name, ground, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 
 
-def _import(scene: UploadFile, environment: UploadFile | None, name: str, services: Services) -> str:
+def _import(scene: UploadFile, environment: UploadFile | None, name: str, ground: bool, services: Services) -> str:
     settings = services.settings
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
@@ -49,7 +53,19 @@ def _import(scene: UploadFile, environment: UploadFile | None, name: str, servic
         file = keep_upload(scene, Path(folder) / "scene")
         lit_by = None if environment is None else keep_upload(environment, Path(folder) / "environment")
         name = name.strip() or plain_stem(scene.filename) or "Scene"
-        return import_in_process(Order.of(settings, "scene", file, name, lit_by))
+        return import_in_process(replace(Order.of(settings, "scene", file, name, lit_by), ground=ground))
+
+
+@router.post("/{scene}/ground", status_code=201)
+async def add_ground(scene: Id, services: Shared, response: Response) -> SceneBody:
+    """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
+    record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
+    settings = services.settings
+    order = Order.of(settings, "grounded", scene_path(settings.data, scene), f"{record.name[:185]} on a ground")
+    async with services.import_slots:
+        identity = await run_in_threadpool(import_in_process, order)
+    response.headers["Location"] = f"/api/scenes/{identity}"
+    return await run_in_threadpool(get_one, identity, services)
 
 
 @router.get("")
@@ -100,7 +116,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
         name=record.name,
         created=moment(record.created),
         views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
-        materials=[SceneMaterial(name=m["name"], terms=m["terms"]) for m in record.materials],
+        materials=[SceneMaterial(**{"catcher": False, **material}) for material in record.materials],
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=list(record.warnings),

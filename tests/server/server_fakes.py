@@ -182,6 +182,9 @@ class FakePicture:
             for x in range(0, width, TILE)
         ]
 
+    def encode_alpha(self, tiles: Sequence[tuple[int, int, int, int]]) -> bytes | None:
+        return None
+
     def encode(self, tiles: Sequence[tuple[int, int, int, int]], form: str) -> bytes:
         assert form == "rgb9e5"
         return b"".join(
@@ -234,7 +237,7 @@ class Control:
     def _picture(self, transfer: FakeTransfer, view: str) -> FakePicture:
         return FakePicture(transfer, transfer.views[view], self)
 
-    def _render(self, transfer: FakeTransfer, view: str, look: Any) -> np.ndarray:
+    def _render(self, transfer: FakeTransfer, view: str, look: Any, *, for_display: bool = False) -> np.ndarray:
         shape = transfer.views[view].height, transfer.views[view].width, 3
         return np.full(shape, exact_pixel(look), np.float32)
 

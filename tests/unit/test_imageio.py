@@ -40,6 +40,23 @@ def test_webp_is_close_to_what_the_screen_shows(tmp_path, image):
     assert np.abs(shown - tone_map(image, 0.0, "agx") * 255).mean() < 4
 
 
+@pytest.mark.parametrize("name", ["a.png", "a.webp", "a.exr"])
+def test_coverage_is_kept_beside_the_colours(tmp_path, image, name):
+    alpha = np.linspace(0, 1, 48, dtype=np.float32)[None, :, None] * np.ones((32, 1, 1), np.float32)
+    write_image(tmp_path / name, np.concatenate([image * alpha, alpha], axis=-1))
+    buffer = OpenImageIO.ImageBuf(str(tmp_path / name))
+    assert buffer.spec().alpha_channel == 3
+    if name == "a.exr":  # multiplied by it already, as the format wants it
+        np.testing.assert_array_equal(buffer.get_pixels(OpenImageIO.FLOAT)[..., :3], image * alpha)
+        return
+    with Image.open(tmp_path / name) as opened:
+        assert opened.mode == "RGBA"
+        found = np.asarray(opened, np.float64)
+    np.testing.assert_allclose(found[..., 3], 255 * alpha[..., 0], atol=0.51)
+    solid = alpha[..., 0] > 0.1
+    assert np.abs(found[..., :3] - tone_map(image, 0.0, "agx") * 255)[solid].mean() < 4
+
+
 def test_image_of_a_transposed_view_is_written_right(tmp_path, image):
     write_image(tmp_path / "a.exr", image.transpose(1, 0, 2))
     read = OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).get_pixels(OpenImageIO.FLOAT)
@@ -78,7 +95,7 @@ def test_bad_arguments_are_refused_before_anything_is_written(tmp_path, image):
         write_image(tmp_path / "a.gif", image)
     with pytest.raises(ParameterError, match="tone_map"):
         write_image(tmp_path / "a.png", image, 0.0, "reinhard")
-    for shape in ((3,), (4, 4), (4, 4, 4), (0, 4, 3)):
+    for shape in ((3,), (4, 4), (4, 4, 5), (0, 4, 3)):
         with pytest.raises(ShapeMismatchError):
             write_image(tmp_path / "a.exr", np.zeros(shape, np.float32))
     assert not list(tmp_path.iterdir())

@@ -50,6 +50,33 @@ function AddTerm({ material }: { material: string }) {
   );
 }
 
+/** A ground shows shadows alone, in front of what is behind it, or is a surface like others. */
+function Catcher({ material }: { material: string }) {
+  const catcher = look.value?.materials[material]?.catcher;
+  if (catcher === undefined) return null;
+  return (
+    <div class="catcher">
+      <label>
+        <input
+          type="checkbox"
+          checked={catcher}
+          onChange={(event) => {
+            const only = event.currentTarget.checked;
+            edit(only ? "Shadows only" : "A surface to see", pointer("materials", material, "catcher"), only);
+          }}
+        />
+        Shadows only
+      </label>
+      {catcher && (
+        <p>
+          The background shows through, as dark as the shadows on it. Switch this off to see and change the material
+          itself; in reflected light it goes on lighting the objects.
+        </p>
+      )}
+    </div>
+  );
+}
+
 export function Inspector() {
   const [light, shown] = [openLight.value, selectedLight.value];
   if (light !== null && shown !== null) return <LightInspector key={shown} name={shown} light={light} />;
@@ -74,6 +101,7 @@ function MaterialInspector() {
     );
   }
   const original = defaultLook.value?.materials[material];
+  const isCaught = look.value?.materials[material]?.catcher === true;
   return (
     <div class="panel inspector">
       <header class="panel-head">
@@ -88,7 +116,8 @@ function MaterialInspector() {
           onClick={() => edit("Reset material", pointer("materials", material), original)}
         />
       </header>
-      {terms.value.map((term, index) => (
+      <Catcher material={material} />
+      {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}
           material={material}
@@ -109,7 +138,7 @@ function MaterialInspector() {
           }
         />
       ))}
-      <AddTerm material={material} />
+      {!isCaught && <AddTerm material={material} />}
     </div>
   );
 }

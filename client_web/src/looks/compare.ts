@@ -25,6 +25,7 @@ export function completed(partial: Partial<Look>): Look {
   return {
     materials: { ...base.materials, ...partial.materials },
     environment: { ...base.environment, ...partial.environment },
+    background: { ...base.background, ...partial.background },
     lights: {
       ...base.lights,
       ...Object.fromEntries(

@@ -30,7 +30,7 @@ export async function exportPng(): Promise<void> {
   if (current === null || !stage.active.isThere) return;
   await attempt(async () => {
     await whenExact();
-    const url = URL.createObjectURL(await pngBlob(stage.active.pixels, current.display));
+    const url = URL.createObjectURL(await pngBlob(stage.active.pixels, stage.active.alpha, current.display));
     download(url, fileName("png"));
     window.setTimeout(() => URL.revokeObjectURL(url), 10_000);
   });

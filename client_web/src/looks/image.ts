@@ -9,15 +9,19 @@ const TAPS = 2;
 
 type Display = Look["display"];
 
-function put(image: ImageData, index: number, radiance: Rgb, display: Display): void {
+function put(image: ImageData, index: number, radiance: Rgb, display: Display, alpha = 255): void {
   const shown = toDisplay(radiance, display.exposure, display.tone_map);
-  image.data.set([...shown.map((v) => Math.round(255 * v)), 255], 4 * index);
+  image.data.set([...shown.map((v) => Math.round(255 * v)), alpha], 4 * index);
 }
 
-/** The whole picture as it is displayed. */
-export function displayed(pixels: Pixels, display: Display): ImageData {
+/** The whole picture as it is displayed. `alpha`: of each pixel, whose light it has been multiplied by; null: 255. */
+export function displayed(pixels: Pixels, alpha: Uint8Array | null, display: Display): ImageData {
   const image = new ImageData(pixels.width, pixels.height);
-  pixels.words.forEach((word, i) => put(image, i, decodeRgb9e5(word), display));
+  pixels.words.forEach((word, i) => {
+    const covers = alpha?.[i] ?? 255;
+    const own = decodeRgb9e5(word).map((v) => (255 * v) / Math.max(1, covers)) as Rgb;
+    put(image, i, own, display, covers);
+  });
   return image;
 }
 
@@ -49,8 +53,8 @@ export function thumbnail(pixels: Pixels, display: Display): string {
   return canvasOf(image).toDataURL("image/jpeg", 0.85);
 }
 
-export function pngBlob(pixels: Pixels, display: Display): Promise<Blob> {
-  const canvas = canvasOf(displayed(pixels, display));
+export function pngBlob(pixels: Pixels, alpha: Uint8Array | null, display: Display): Promise<Blob> {
+  const canvas = canvasOf(displayed(pixels, alpha, display));
   return new Promise((resolve, reject) => {
     canvas.toBlob(
       (blob) => (blob === null ? reject(new Error("The picture could not be written as PNG.")) : resolve(blob)),

@@ -89,6 +89,11 @@ export async function deleteScene(id: string): Promise<void> {
   await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 
+/** The same scene on a ground, as a new one. */
+export async function addGround(id: string): Promise<SceneBody> {
+  return (await (await request(`/api/scenes/${encodeURIComponent(id)}/ground`, { method: "POST" })).json()) as SceneBody;
+}
+
 export async function planBake(body: BakeRequest): Promise<DryRunBody> {
   return (await (await request("/api/bakes", json("POST", { ...body, dry_run: true }))).json()) as DryRunBody;
 }

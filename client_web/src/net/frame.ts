@@ -8,6 +8,8 @@ const PIXEL_BYTES: Record<string, number> = { rgb9e5: 4, f32: 12, r8: 1 };
 export interface Frame {
   header: FrameHeader;
   payload: Uint8Array;
+  /** How much each pixel of the tiles hides of what is put behind it; null where it hides all. */
+  alpha: Uint8Array | null;
 }
 
 export class FrameError extends Error {}
@@ -57,11 +59,14 @@ export function parseFrame(buffer: ArrayBuffer): Frame {
     throw new FrameError("a frame's header is longer than the frame");
   }
   const header = readHeader(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes)));
-  const payload = new Uint8Array(buffer, 4 + headerBytes);
-  if (header.format === "jpeg") return { header, payload };
+  const all = new Uint8Array(buffer, 4 + headerBytes);
+  if (header.format === "jpeg") return { header, payload: all, alpha: null };
   const perPixel = PIXEL_BYTES[header.format];
   if (perPixel === undefined) throw new FrameError(`a frame has the unknown format ${String(header.format)}`);
   const pixels = header.tiles.reduce((sum, [, , w, h]) => sum + w * h, 0);
-  if (pixels * perPixel !== payload.byteLength) throw new FrameError("a frame's tiles and its bytes do not agree");
-  return { header, payload };
+  const size = pixels * perPixel;
+  if (size + (header.alpha ? pixels : 0) !== all.byteLength) {
+    throw new FrameError("a frame's tiles and its bytes do not agree");
+  }
+  return { header, payload: all.subarray(0, size), alpha: header.alpha ? all.subarray(size) : null };
 }

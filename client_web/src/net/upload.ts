@@ -6,6 +6,7 @@ export interface Upload {
   scene: File;
   environment: File | null;
   name: string;
+  ground: boolean;
 }
 
 function answer(request: XMLHttpRequest): unknown {
@@ -41,6 +42,7 @@ export function uploadScene(upload: Upload, progress: (fraction: number) => void
   form.append("scene", upload.scene);
   if (upload.environment !== null) form.append("environment", upload.environment);
   form.append("name", upload.name);
+  form.append("ground", String(upload.ground));
   return post("/api/scenes", form, progress) as Promise<SceneBody>;
 }
 

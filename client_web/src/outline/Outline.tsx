@@ -7,6 +7,7 @@ import { toggleMaterialSolo } from "../state/solo";
 import { LightsPanel } from "../lights/LightsPanel";
 import { IconButton } from "../ui/Button";
 import { Section } from "../ui/Section";
+import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
 
@@ -97,6 +98,7 @@ export function Outline() {
       </Section>
       <LightsPanel />
       <EnvironmentPanel />
+      <BackgroundPanel />
       <TransportPanel />
     </nav>
   );

@@ -4,7 +4,7 @@ import type { Frame } from "../net/frame";
 import type { Fidelity, Rgb } from "../protocol";
 import type { Arrival } from "./arrival";
 import { brushed, materialNames } from "../state/store";
-import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, type Pixels } from "./pixels";
+import { applyFrame, brushImage, copyPixels, copyTiles, emptyPixels, normalised, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
 import { decodeRgb9e5 } from "./rgb9e5";
 import type { Renderer } from "./renderer";
@@ -29,6 +29,8 @@ export class Picture {
   idsOf: string | null = null;
   /** Share of each pixel that a stretch of the curve lights, 255 = the most of all. */
   brush: Uint8Array | null = null;
+  /** How much each pixel hides of what is put behind it, which its light has been multiplied by; null: all. */
+  alpha: Uint8Array | null = null;
   /** What the server has tone-mapped already, where that is what was sent last. */
   display: ImageBitmap | null = null;
   revision = 0;
@@ -46,7 +48,7 @@ export class Picture {
     if (format === "jpeg") return this.showJpeg(frame);
     if (this.pixels.width !== width || this.pixels.height !== height) {
       this.pixels = emptyPixels(width, height);
-      this.brush = null;
+      this.brush = this.alpha = null;
       this.screen?.renderer.setPicture(this.pixels);
     }
     if (frame.header.tiles.length > 0) {
@@ -71,10 +73,21 @@ export class Picture {
 
   private takeTiles(frame: Frame): void {
     const tiles = applyFrame(this.pixels, frame);
+    this.takeAlpha(frame);
     // one big upload is quicker than many small ones of the same size
     const area = tiles.reduce((sum, { words }) => sum + words.length, 0);
     if (area > this.pixels.words.length / 2) this.screen?.renderer.updatePicture(this.pixels);
     else this.screen?.renderer.uploadTiles(tiles);
+  }
+
+  private takeAlpha({ header, alpha }: Frame): void {
+    if (alpha === null) {
+      this.alpha = null;
+      return;
+    }
+    this.alpha ??= new Uint8Array(header.width * header.height).fill(255);
+    copyTiles(this.alpha, header.width, header.tiles, alpha);
+    this.screen?.renderer.setAlpha(header.width, header.height, this.alpha);
   }
 
   private showBrush(frame: Frame): void {

@@ -63,16 +63,21 @@ export function normalised(values: Uint8Array): Uint8Array {
   return values.map((value) => (value * 255) / largest);
 }
 
+/** Write the bytes of tiles, one tile after another, into an image. */
+export function copyTiles(target: Uint8Array, width: number, tiles: readonly Tile[], bytes: Uint8Array): void {
+  let offset = 0;
+  for (const [x, y, w, h] of tiles) {
+    for (let row = 0; row < h; row++) {
+      target.set(bytes.subarray(offset, offset + w), (y + row) * width + x);
+      offset += w;
+    }
+  }
+}
+
 /** A brush frame (how much of each pixel comes from a stretch of the curve) as one image, 255 = all of it. */
 export function brushImage(frame: Frame): Uint8Array {
   const { width, height, tiles } = frame.header;
   const values = new Uint8Array(width * height);
-  let offset = 0;
-  for (const [x, y, w, h] of tiles) {
-    for (let row = 0; row < h; row++) {
-      values.set(frame.payload.subarray(offset, offset + w), (y + row) * width + x);
-      offset += w;
-    }
-  }
+  copyTiles(values, width, tiles, frame.payload);
   return values;
 }

@@ -4,7 +4,7 @@ import type { Pixels } from "./pixels";
 import { fragment, VERTEX, type Features } from "./shaders";
 import { allocate, makeTexture, Program } from "./gl";
 
-const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uIds"] as const;
+const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uIds"] as const;
 type Unit = (typeof UNITS)[number];
 /** Screen pixels per picture pixel from which the pixels themselves are shown. */
 const NEAREST_FROM = 6;
@@ -21,6 +21,7 @@ export interface DrawState {
   solo: number;
   brush: boolean;
   displayReferred: boolean;
+  transparent: boolean;
   surround: [number, number, number];
 }
 
@@ -50,6 +51,7 @@ export class Renderer {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
     this.setBrush(1, 1, new Uint8Array(1));
+    this.setAlpha(1, 1, new Uint8Array(1));
     this.setIds(1, 1, new Uint16Array([65535]));
     this.setDisplay(new ImageData(1, 1));
   }
@@ -101,8 +103,16 @@ export class Renderer {
   }
 
   setBrush(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uBrush", width, height, values);
+  }
+
+  setAlpha(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uAlpha", width, height, values);
+  }
+
+  private setBytes(unit: Unit, width: number, height: number, values: Uint8Array): void {
     const { gl } = this;
-    gl.bindTexture(gl.TEXTURE_2D, this.textures.uBrush);
+    gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, width, height, 0, gl.RED, gl.UNSIGNED_BYTE, values);
   }
 
@@ -121,6 +131,7 @@ export class Renderer {
       falseColour: state.falseColour,
       shrunk: state.place[2] < this.size[0],
       displayReferred: state.displayReferred,
+      transparent: state.transparent,
       compare: state.wipe > 0,
       brush: state.brush,
       outline: state.hover >= 0,
@@ -143,7 +154,7 @@ export class Renderer {
     UNITS.forEach((unit, index) => {
       gl.activeTexture(gl.TEXTURE0 + index);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
-      if (unit === "uPicture" || unit === "uReference") {
+      if (unit === "uPicture" || unit === "uReference" || unit === "uAlpha") {
         gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
       }
     });

@@ -68,6 +68,7 @@ export class Screen implements Shows {
     if (shown.reference !== null) renderer.setReference(shown.reference);
     if (shown.ids !== null) renderer.setIds(shown.ids.width, shown.ids.height, shown.ids.values);
     if (shown.brush !== null) renderer.setBrush(width, height, shown.brush);
+    if (shown.alpha !== null) renderer.setAlpha(width, height, shown.alpha);
     if (shown.display !== null) renderer.setDisplay(shown.display);
     this.redraw();
   }
@@ -141,6 +142,7 @@ export class Screen implements Shows {
       ...settings,
       place: [Math.round(left * ratio), Math.round(top * ratio), width * ratio, (width * ratio) / shown.aspect],
       displayReferred: shown.display !== null,
+      transparent: shown.alpha !== null,
       surround: SURROUND,
     });
     this.blank = false;

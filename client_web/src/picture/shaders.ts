@@ -11,6 +11,8 @@ export interface Features {
   shrunk: boolean;
   /** The server has tone-mapped the image already. */
   displayReferred: boolean;
+  /** There is nothing behind some of it: squares show. */
+  transparent: boolean;
   compare: boolean;
   brush: boolean;
   outline: boolean;
@@ -35,6 +37,7 @@ export function fragment(features: Features): string {
           : "PLAIN",
     features.shrunk && "SHRUNK",
     features.displayReferred && "DISPLAY_REFERRED",
+    features.transparent && "TRANSPARENT",
     features.compare && "COMPARE",
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
@@ -51,6 +54,7 @@ uniform sampler2D uPicture;    // linear radiance
 uniform sampler2D uReference;  // the A side of a comparison, linear radiance
 uniform sampler2D uDisplay;    // an image that the server has tone-mapped already
 uniform sampler2D uBrush;      // 0..1: share of each pixel that a stretch of the curve lights
+uniform sampler2D uAlpha;      // how much of what is behind each pixel it hides; its light is multiplied by that
 uniform usampler2D uIds;       // material of each pixel, 65535 = background
 uniform vec2 uCanvas;          // device pixels
 uniform vec4 uPlace;           // left, top, width, height of the picture, device pixels from the top left
@@ -118,15 +122,40 @@ vec3 radiance(vec2 uv, bool reference) {
   return texture(uPicture, uv).rgb;
 }
 
-vec3 shown(vec2 uv, bool reference) {
+float alpha(vec2 uv, bool reference) {
+#ifdef TRANSPARENT
+  if (!reference) return texture(uAlpha, uv).r;
+#endif
+  return 1.0;
+}
+
+// light, and how much it hides of what is behind it
+vec4 sampled(vec2 uv, bool reference) {
+  return vec4(radiance(uv, reference), alpha(uv, reference));
+}
+
+// the same where the picture is shown: shared exponents cannot be mipmapped, so four taps across the footprint
+vec4 filtered(vec2 uv, bool reference) {
 #ifdef SHRUNK
-  // shared exponents cannot be mipmapped: four taps across the footprint
   vec2 d = (uSize / uPlace.zw - 1.0) * 0.25 / uSize;
-  vec3 sum = radiance(uv + d, reference) + radiance(uv - d, reference)
-    + radiance(uv + vec2(d.x, -d.y), reference) + radiance(uv + vec2(-d.x, d.y), reference);
-  return display(sum * 0.25);
+  return 0.25 * (sampled(uv + d, reference) + sampled(uv - d, reference)
+    + sampled(uv + vec2(d.x, -d.y), reference) + sampled(uv + vec2(-d.x, d.y), reference));
 #else
-  return display(radiance(uv, reference));
+  return sampled(uv, reference);
+#endif
+}
+
+vec3 squares() {
+  vec2 at = floor(gl_FragCoord.xy / 10.0);
+  return vec3(mod(at.x + at.y, 2.0) < 0.5 ? 0.27 : 0.36);
+}
+
+vec3 shown(vec2 uv, bool reference) {
+  vec4 light = filtered(uv, reference);
+#ifdef TRANSPARENT
+  return mix(squares(), display(light.rgb / max(light.a, 1.0 / 512.0)), light.a);
+#else
+  return display(light.rgb);
 #endif
 }
 
@@ -158,6 +187,9 @@ void main() {
 #endif
 #ifdef DISPLAY_REFERRED
   vec3 colour = reference ? shown(uv, true) : texture(uDisplay, uv).rgb;
+#ifdef TRANSPARENT
+  if (!reference) colour += (1.0 - filtered(uv, false).a) * squares();
+#endif
 #else
   vec3 colour = shown(uv, reference);
 #endif

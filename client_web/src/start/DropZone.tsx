@@ -10,6 +10,7 @@ const NOTHING: Chosen = { scene: null, environment: null, refused: [] };
 
 export function DropZone({ onImported }: { onImported(scene: SceneBody): void }) {
   const [chosen, setChosen] = useState<Chosen>(NOTHING);
+  const [ground, setGround] = useState(false);
   const [sent, setSent] = useState<number | null>(null);
   const take = (files: File[]) => {
     const next = sortFiles(files, chosen);
@@ -22,7 +23,7 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
   const over = useFileDrop(take);
   const send = async (scene: File) => {
     setSent(0);
-    const order = { scene, environment: chosen.environment, name: stem(scene.name) };
+    const order = { scene, environment: chosen.environment, name: stem(scene.name), ground };
     const imported = await attempt(() => uploadScene(order, setSent));
     setSent(null);
     if (imported === undefined) return;
@@ -51,6 +52,10 @@ export function DropZone({ onImported }: { onImported(scene: SceneBody): void })
       <div class="chosen">
         <span class={chosen.scene ? "" : "quiet"}>Scene: {chosen.scene?.name ?? "none"}</span>
         <span class={chosen.environment ? "" : "quiet"}>Environment: {chosen.environment?.name ?? "none"}</span>
+        <label class="on-ground">
+          <input type="checkbox" checked={ground} onChange={(event) => setGround(event.currentTarget.checked)} />
+          Put it on a ground
+        </label>
         {sent !== null ? (
           <>
             <progress max={1} value={sent} aria-label="Upload" />

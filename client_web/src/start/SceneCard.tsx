@@ -9,6 +9,8 @@ interface Props {
   onOpen(): void;
   onBake(): void;
   onDelete(): void;
+  /** Make the same scene on a ground. */
+  onGround(): void;
   /** Its first bake is ready. */
   onReady(): void;
 }
@@ -25,7 +27,7 @@ function Picture({ of }: { of: string }) {
 }
 
 /** One scene: a click anywhere on the card opens it, but for the card's own buttons. */
-export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
+export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }: Props) {
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
@@ -53,6 +55,15 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onReady }: Props) {
       </div>
       <div class="scene-actions">
         <button onClick={onBake}>Bake…</button>
+        {!scene.materials.some(({ catcher }) => catcher) && (
+          <button
+            onClick={onGround}
+            aria-label={`Put ${scene.name} on a ground`}
+            title="A new scene, the same on a ground that catches shadows"
+          >
+            On a ground
+          </button>
+        )}
         <IconButton icon="trash" label={`Delete ${scene.name}`} onClick={onDelete} />
       </div>
     </li>

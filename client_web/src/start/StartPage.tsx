@@ -1,6 +1,6 @@
 /** Scenes as cards; drop a scene and an environment anywhere. */
 import { useEffect, useState } from "preact/hooks";
-import { deleteScene, listScenes } from "../net/api";
+import { addGround, deleteScene, listScenes } from "../net/api";
 import type { SceneBody } from "../protocol";
 import { openScene, type BakeChoice } from "../state/open";
 import { attempt, note } from "../ui/toasts";
@@ -27,6 +27,10 @@ export function StartPage() {
       label: "Delete",
       run: () => void attempt(() => deleteScene(scene.id)).then(refresh),
     });
+  const putOnGround = async (scene: SceneBody) => {
+    const grounded = await attempt(() => addGround(scene.id));
+    if (grounded !== undefined) imported(grounded);
+  };
   return (
     <main class="start">
       <header>
@@ -48,6 +52,7 @@ export function StartPage() {
             onOpen={() => open(scene)}
             onBake={() => setPlanned(scene)}
             onDelete={() => remove(scene)}
+            onGround={() => void putOnGround(scene)}
             onReady={() => void refresh()}
           />
         ))}

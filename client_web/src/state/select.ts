@@ -21,7 +21,8 @@ export function selectLight(name: string | null): void {
 export function select(material: string | null): void {
   selectedLight.value = null;
   if (material === selectedMaterial.value) return;
-  const own = (material === null ? undefined : look.value?.materials[material]?.terms) ?? [];
+  const chosen = material === null ? undefined : look.value?.materials[material];
+  const own = chosen === undefined || chosen.catcher ? [] : chosen.terms; // of a catcher's terms nothing is seen
   const index = Math.max(
     0,
     own.findIndex((term) => modelOf(term)?.texture !== "diffuse"),

@@ -1,0 +1,61 @@
+"""The background of a look, and the ground that catches shadows: checked, completed, kept out of brute force."""
+
+from __future__ import annotations
+
+import pytest
+
+from relume.errors import ParameterError
+from relume.look import apply_patch, complete, default_look, validate
+from relume.scene.model import Material
+
+PLAIN = Material("Ball", ({"model": "lambert"},))
+GROUND = Material("Ground", ({"model": "lambert"},), catcher=True)
+DEFAULT = default_look([PLAIN, GROUND])
+
+
+def test_default_shows_the_map_and_a_ground_catches():
+    assert DEFAULT["background"]["kind"] == "map"
+    assert DEFAULT["materials"]["Ground"]["catcher"] is True
+    assert "catcher" not in DEFAULT["materials"]["Ball"]
+
+
+def test_looks_and_stores_of_before_have_one_too():
+    old = {name: part for name, part in DEFAULT.items() if name != "background"}
+    assert complete({"background": {"kind": "color"}}, complete({}, old))["background"]["kind"] == "color"
+    assert validate(old, DEFAULT).background.kind == "map"
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("kind", "sky"),
+        ("kind", ["map"]),
+        ("color", [0, 0]),
+        ("color", [0, 0, -1]),
+        ("color", [0, 0, float("nan")]),
+        ("blur", 0),
+        ("blur", 61),
+        ("blur", True),
+        ("radius", 1),
+    ],
+)
+def test_what_is_no_background_is_refused(field, value):
+    with pytest.raises(ParameterError, match=f"/background/{field}"):
+        complete({"background": {field: value}}, DEFAULT)
+
+
+def test_only_a_ground_may_catch():
+    patch = [{"op": "replace", "path": "/materials/Ground/catcher", "value": False}]
+    changed = apply_patch(DEFAULT, patch, DEFAULT)
+    assert validate(changed, DEFAULT).materials["Ground"].catcher is False
+    assert changed["materials"]["Ball"] is DEFAULT["materials"]["Ball"]
+    with pytest.raises(ParameterError, match="/materials/Ball/catcher"):
+        complete({"materials": {"Ball": {"catcher": True}}}, DEFAULT)
+    with pytest.raises(ParameterError, match="/materials/Ground/catcher"):
+        complete({"materials": {"Ground": {"catcher": 1}}}, DEFAULT)
+
+
+def test_brute_force_is_asked_for_what_is_there():
+    look = validate({"background": {"kind": "transparent"}}, DEFAULT).on_the_map()
+    assert look.background.kind == "map"
+    assert not look.materials["Ground"].catcher
