@@ -19,10 +19,14 @@ Backdrop = Literal["map", "blurred", "color", "transparent"]
 
 
 class DrawnCurve(TypedDict):
-    """A curve drawn by hand: either `points`, [degrees, value], or `bands`, J values or three times J."""
+    """A curve drawn by hand: `points`, [degrees, value], or `bands`, J values or three times J; or a change to one of
+    them or to what the parameters give: `factors` and `offsets` of bands, `handles`, [degrees, was, becomes]."""
 
     points: NotRequired[list[tuple[float, float]]]
     bands: NotRequired[list[float] | list[list[float]]]
+    factors: NotRequired[list[float] | list[list[float]]]
+    offsets: NotRequired[list[float] | list[list[float]]]
+    handles: NotRequired[list[tuple[float, float, float]]]
     channels: NotRequired[str]
 
 

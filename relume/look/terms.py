@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from relume.brdf.curves import CHANNELS
+from relume.brdf.edited import RELATIVE, is_relative
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.look.checks import (
@@ -107,31 +109,40 @@ def _check_drawn(pointer: Pointer, drawn: Any, curve: Curve) -> None:
 
 
 def _check_drawn_object(pointer: Pointer, drawn: Any, curve: Curve) -> None:
-    check_object(pointer, drawn, ("points", "bands", "channels"))
+    check_object(pointer, drawn, ("points", "bands", *RELATIVE, "channels"))
     channels = drawn.get("channels", CHANNELS)
     if not isinstance(channels, str) or not channels or sorted(set(channels) & set(CHANNELS)) != sorted(channels):
         raise fail((*pointer, "channels"), channels, "one or more of the letters r, g, b, each once")
-    if ("points" in drawn) == ("bands" in drawn):
-        raise fail(pointer, drawn, "either points or bands")
-    if "points" in drawn:
-        _check_points((*pointer, "points"), drawn["points"])
-    else:
-        _check_bands((*pointer, "bands"), drawn["bands"], curve.num_bands)
+    grounds = ("points" in drawn) + ("bands" in drawn)
+    if grounds > 1 or not (grounds or is_relative(drawn)):
+        raise fail(pointer, drawn, f"either points or bands, or one or more of {names_text(RELATIVE)}")
+    for name in drawn:
+        if name in ("points", "handles"):
+            _check_points((*pointer, name), drawn[name], num_values=1 if name == "points" else 2)
+        elif name != "channels":
+            _check_bands((*pointer, name), drawn[name], curve.num_bands)
 
 
-def _check_points(pointer: Pointer, points: Any) -> None:
+def _check_points(pointer: Pointer, points: Any, num_values: int) -> None:
+    """Points [degrees, value], or handles [degrees, was, becomes]."""
+    form = "a point [degrees, value]" if num_values == 1 else "a handle [degrees, was, becomes]"
     if not isinstance(points, list | tuple) or not 2 <= len(points) <= MAX_POINTS:
-        raise fail(pointer, points, f"a list of 2 to {MAX_POINTS} points [degrees, value]")
+        raise fail(pointer, points, f"a list of 2 to {MAX_POINTS}, each {form}")
     for k, point in enumerate(points):
-        if not isinstance(point, list | tuple) or len(point) != 2:
-            raise fail((*pointer, k), point, "a point [degrees, value]")
-    angles, values = zip(*points, strict=True)
+        if not isinstance(point, list | tuple) or len(point) != 1 + num_values:
+            raise fail((*pointer, k), point, form)
+    angles, *values = zip(*points, strict=True)
     _check_values(pointer, angles, 90.0, lambda k: (k, 0))
-    _check_values(pointer, values, MAX_CURVE_VALUE, lambda k: (k, 1))
+    for column, of in enumerate(values, 1):
+        _check_values(pointer, of, MAX_CURVE_VALUE, partial(_in_column, column))
     not_after = np.diff(np.asarray(angles, np.float64)) <= 0
     if not_after.any():
         k = int(np.argmax(not_after)) + 1
         raise fail((*pointer, k, 0), angles[k], "an angle greater than that of the point before")
+
+
+def _in_column(column: int, row: int) -> Pointer:
+    return row, column
 
 
 def _check_bands(pointer: Pointer, bands: Any, num_bands: int) -> None:

@@ -1,0 +1,97 @@
+"""Edits of a curve relative to what it was: of each band a factor and an offset, so that a band nobody touched stays.
+
+    edited = factor · before + offset
+
+`factors` and `offsets` give them band by band. `handles`, [degrees, was, becomes], pull the result: between two of them
+the pulls of both are blended, so that one handle moves the curve as far as its neighbours and no farther (ADR 29).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+RELATIVE = ("factors", "offsets", "handles")
+
+
+def is_relative(drawn: Mapping[str, Any]) -> bool:
+    """Whether a freehand object says anything relative to what the curve was."""
+    return any(name in drawn for name in RELATIVE)
+
+
+def relative_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
+    """What multiplies each band of a curve, and what is then added.
+
+    Args:
+        before: band averages of what is edited, not negative. (3, J)
+    Returns:
+        factor, offset: (3, J) each, not negative; exactly one and zero in bands that are not edited
+    """
+    factor, offset = (_rows(drawn, name, before, plain) for name, plain in (("factors", 1.0), ("offsets", 0.0)))
+    if "handles" not in drawn:
+        return factor, offset
+    gain, lift = _pulls(np.asarray(drawn["handles"], np.float64), factor * before + offset)
+    return gain * factor, gain * offset + lift
+
+
+def at_angles(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
+    """Numbers of bands at exact angles: those of the band, so that averages hold; `smooth`, linear between middles.
+
+    Args:
+        rows: (3, J). gamma: radians in [0, max_angle]. (...)
+    Returns:
+        (3, ...) float64
+    """
+    num_bands = rows.shape[1]
+    place = gamma * (num_bands / max_angle)
+    if smooth:
+        return np.stack([np.interp(place - 0.5, np.arange(num_bands), row) for row in rows])
+    return rows[:, np.minimum(place.astype(np.intp), num_bands - 1)]
+
+
+def _rows(drawn: Mapping[str, Any], name: str, like: F64, plain: float) -> F64:
+    """(3, J), from one J for all channels, three lists of J, or 3·J flat."""
+    if name not in drawn:
+        return np.full(like.shape, plain)
+    return np.broadcast_to(np.asarray(drawn[name], np.float64).reshape(-1, like.shape[1]), like.shape)
+
+
+def _pulls(handles: F64, before: F64) -> tuple[F64, F64]:
+    """Factor and offset of each band by its two neighbouring handles. (3, J) each"""
+    num_bands = before.shape[1]
+    # the outer half of the first and the last band belongs to its middle: there is nothing finer
+    place = np.clip(handles[:, 0] * (num_bands / 90.0) - 0.5, 0.0, num_bands - 1.0)
+    band = np.arange(num_bands)
+    left = np.clip(np.searchsorted(place, band, side="right") - 1, 0, len(place) - 2)
+    gap = place[left + 1] - place[left]
+    share = np.clip((band - place[left]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
+    towards_right = share * share * (3.0 - 2.0 * share)
+    factor, offset = np.ones_like(before), np.zeros_like(before)
+    for near, weight in ((left, 1.0 - towards_right), (left + 1, towards_right)):
+        gain, lift = _pull(handles[near, 1], handles[near, 2], before)
+        factor += weight * gain
+        offset += weight * lift
+    return factor, offset
+
+
+def _pull(was: F64, becomes: F64, before: F64) -> tuple[F64, F64]:
+    """How one handle moves values: change = gain · before + lift. (3, J) each
+
+    What is lower than the handle moves in proportion, what is higher as far as the handle, so that nothing moves
+    farther than the hand, neither in amount nor in proportion. A handle that more than doubles what was there adds the
+    rest to the low ones too: nothing can be multiplied out of a curve that is zero.
+    """
+    move = becomes - was
+    rise = np.maximum(move, 0.0)
+    reach = np.maximum(was, rise)
+    reach = np.where(reach > 0, reach, 1.0)
+    is_low = before <= was
+    high = np.where(is_low, 1.0, before)
+    gain = np.where(is_low, move / reach, np.minimum(move, 0.0) / high)
+    lift = np.where(is_low, rise * np.maximum(rise - was, 0.0) / reach, rise)
+    return gain, lift
