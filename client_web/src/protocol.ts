@@ -35,12 +35,17 @@ export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];
 export type ParamValue = number | Rgb;
 export type Point = [degrees: number, value: number];
+export type Handle = [degrees: number, was: number, becomes: number];
 export type Tile = [x: number, y: number, width: number, height: number];
 export type PatchOp = gen.PatchOperation;
 
+/** A curve by `points` or `bands`, or a change to these or to what the parameters give by the other three. */
 export interface CurveOverride {
   points?: Point[];
   bands?: number[] | number[][];
+  factors?: number[] | number[][];
+  offsets?: number[] | number[][];
+  handles?: Handle[];
   channels?: string;
 }
 export type CurveEdits = CurveOverride | CurveOverride[];

@@ -1,19 +1,11 @@
 import { describe, expect, test } from "vitest";
 import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "../src/curve/axes";
 import { joined, readChannels, writeChannels } from "../src/curve/channels";
-import { bandSamples, fitPoints, MAX_POINTS, Stroke } from "../src/curve/fit";
-import { pchip } from "../src/curve/pchip";
-import {
-  addPoint,
-  mergeStroke,
-  MIN_GAP,
-  movePoint,
-  removePoint,
-  scaleStretch,
-  shiftStretch,
-} from "../src/curve/points";
+import { bandSamples, fitPoints, knotSamples, MAX_POINTS, Stroke } from "../src/curve/fit";
+import { bandsOfPoints, pchip } from "../src/curve/pchip";
+import { addPoint, movePoint, removePoint } from "../src/curve/points";
 import { mainStretch, shareOf } from "../src/curve/stretch";
-import type { Point } from "../src/protocol";
+import type { CurveOverride, Point } from "../src/protocol";
 
 const LINEAR: Axes = { stretched: false, log: false, top: 5 };
 const POINTS: Point[] = [
@@ -61,6 +53,19 @@ describe("pchip", () => {
     for (let x = 10; x <= 30; x += 0.1) expect(curve(x)).toBeLessThanOrEqual(5.1 + 1e-12);
   });
 
+  test("is averaged over bands", () => {
+    const straight: Point[] = [
+      [0, 0],
+      [90, 9],
+    ];
+    bandsOfPoints(straight, 64).forEach((v, j) => expect(v).toBeCloseTo((9 * (j + 0.5)) / 64, 12));
+    const curve = pchip(POINTS);
+    const fine = (j: number) => Array.from({ length: 400 }, (_, i) => curve((90 * (j + (i + 0.5) / 400)) / 64));
+    bandsOfPoints(POINTS, 64).forEach((v, j) => {
+      expect(Math.abs(v - fine(j).reduce((a, b) => a + b, 0) / 400)).toBeLessThan(2e-3);
+    });
+  });
+
   test("one point and none are constant", () => {
     expect(pchip([[10, 3]])(50)).toBe(3);
     expect(pchip([])(50)).toBe(0);
@@ -100,6 +105,14 @@ describe("fitPoints", () => {
     for (const [x, y] of samples) expect(Math.abs(curve(x) - y) / axes.top).toBeLessThan(0.01);
   });
 
+  test("points may stand on each band's middle, and at the ends", () => {
+    expect(knotSamples([3, 2, 1])).toEqual([
+      [0, 3],
+      [45, 2],
+      [90, 1],
+    ]);
+  });
+
   test("a constant needs two points", () => {
     expect(fitPoints(bandSamples(Array<number>(64).fill(1)), LINEAR)).toEqual([
       [0, 1],
@@ -115,9 +128,8 @@ describe("Stroke", () => {
     stroke.add(20, 1);
     const heights = stroke.heights(0);
     expect(heights).toHaveLength(11);
-    expect(heights[5]?.[0]).toBeCloseTo(15, 9);
-    expect(heights[5]?.[1]).toBeCloseTo(0.5, 9);
-    expect(stroke.extent()).toEqual([10, 20]);
+    expect(heights[5]).toBeCloseTo(0.5, 9);
+    expect(stroke.range()).toEqual([10, 20]);
   });
 
   test("the newest pass wins", () => {
@@ -125,53 +137,61 @@ describe("Stroke", () => {
     stroke.add(10, 0.2);
     stroke.add(30, 0.2);
     stroke.add(20, 0.8);
-    expect(stroke.heights(0).find(([x]) => x === 20)?.[1]).toBeCloseTo(0.8, 9);
-    expect(stroke.heights(0).find(([x]) => x === 12)?.[1]).toBeCloseTo(0.2, 9);
+    expect(stroke.heights(0)[10]).toBeCloseTo(0.8, 9);
+    expect(stroke.heights(0)[2]).toBeCloseTo(0.2, 9);
   });
 
   test("smoothing takes the shake out and keeps a straight line", () => {
     const shaky = new Stroke(256, LINEAR);
     const straight = new Stroke(256, LINEAR);
     for (let j = 0; j <= 128; j++) {
-      shaky.add((j / 256) * 90, 0.5 + (j % 2 ? 0.1 : -0.1));
-      straight.add((j / 256) * 90, j / 256);
+      shaky.add(((j + 0.5) / 256) * 90, 0.5 + (j % 2 ? 0.1 : -0.1));
+      straight.add(((j + 0.5) / 256) * 90, j / 256);
     }
     const inner = shaky.heights().slice(6, -6);
-    for (const [, h] of inner) expect(Math.abs(h - 0.5)).toBeLessThan(0.005);
-    for (const [x, h] of straight.heights()) expect(h).toBeCloseTo(x / 90, 9);
-  });
-
-  test("merged, it replaces what it covers, keeps the rest, and stays bounded", () => {
-    let points = POINTS;
-    for (let pass = 0; pass < 30; pass++) {
-      const stroke = new Stroke(256, LINEAR);
-      for (let i = 0; i <= 50; i++) stroke.add(20 + (pass % 3) * 5 + i / 4, 0.4 + 0.3 * Math.sin(i / 2 + pass));
-      points = mergeStroke(points, stroke, LINEAR);
-      expectValid(points);
-      expect(points.length).toBeLessThanOrEqual(MAX_POINTS);
-    }
-    expect(points.slice(0, 4)).toEqual(POINTS.slice(0, 4));
-    expect(points.at(-1)).toEqual([90, 0]);
+    for (const h of inner) expect(Math.abs(h - 0.5)).toBeLessThan(0.005);
+    straight.heights().forEach((h, j) => expect(h).toBeCloseTo(j / 256, 9));
   });
 });
 
 describe("points", () => {
+  const BAND = 90 / 256;
+
   test("are added in order, and twice in one place is a change of value", () => {
-    const { points, index } = addPoint(POINTS, 20, 3);
+    const { points, index } = addPoint(POINTS, 20, 3, BAND);
     expect(index).toBe(4);
     expectValid(points);
-    const again = addPoint(points, 20.001, 5);
+    const again = addPoint(points, 20.2, 5, BAND);
     expect(again.points).toHaveLength(points.length);
     expect(again.points[4]).toEqual([20, 5]);
+    expect(addPoint(POINTS, 0.1, 7, BAND).points[0]).toEqual([0, 7]);
   });
 
   test("are stopped by their neighbours and by the plot", () => {
-    const moved = movePoint(POINTS, 2, 60, -3);
+    const moved = movePoint(POINTS, 2, 60, -3, BAND);
     expectValid(moved);
-    expect(moved[2]?.[0]).toBeCloseTo(13 - MIN_GAP, 6);
+    expect(moved[2]?.[0]).toBeCloseTo(13 - 0.9 * BAND, 3);
     expect(moved[2]?.[1]).toBe(0);
-    expect(movePoint(POINTS, 5, 200, 1)[5]).toEqual([90, 1]);
+    expect(movePoint(POINTS, 5, 200, 1, BAND)[5]).toEqual([90, 1]);
     expect(POINTS[2]).toEqual([12, 1.5]);
+  });
+
+  test("that stand closer than a band can still be raised, and moved apart", () => {
+    const close: Point[] = [
+      [0, 1],
+      [20, 2],
+      [20.1, 3],
+      [90, 0],
+    ];
+    expect(movePoint(close, 1, 20, 5, BAND)[1]).toEqual([20, 5]);
+    expect(movePoint(close, 1, 20.05, 5, BAND)[1]).toEqual([20, 5]);
+    expect(movePoint(close, 1, 15, 5, BAND)[1]).toEqual([15, 5]);
+  });
+
+  test("others stay the objects they were", () => {
+    const { points } = addPoint(POINTS, 20, 3, BAND);
+    for (const kept of POINTS) expect(points).toContain(kept);
+    expect(movePoint(POINTS, 2, 11, 1, BAND).filter((p) => POINTS.includes(p))).toHaveLength(POINTS.length - 1);
   });
 
   test("two always stay", () => {
@@ -185,61 +205,33 @@ describe("points", () => {
 
   test("no more than the bound are taken", () => {
     const many = Array.from({ length: MAX_POINTS }, (_, i): Point => [i, 1]);
-    expect(addPoint(many, 80.5, 1)).toEqual({ points: many, index: -1 });
-  });
-});
-
-describe("stretches", () => {
-  test("scaling multiplies inside and leaves the outside alone", () => {
-    const before = pchip(POINTS);
-    const points = scaleStretch(POINTS, 15, 35, 2, 0.35);
-    expectValid(points);
-    const after = pchip(points);
-    expect(after(15)).toBeCloseTo(2 * before(15), 2);
-    expect(after(35)).toBeCloseTo(2 * before(35), 2);
-    expect(after(5)).toBeCloseTo(before(5), 2);
-    expect(after(60)).toBeCloseTo(before(60), 1);
-  });
-
-  test("shifting moves the stretch and stays on the plot", () => {
-    const points = shiftStretch(POINTS, 10, 14, 10);
-    expectValid(points);
-    expect(points).toContainEqual([22, 1.5]);
-    expect(points).toContainEqual([23, 1.5]);
-    expectValid(shiftStretch(POINTS, 10, 14, -500));
-    expectValid(shiftStretch(POINTS, 10, 14, 500));
+    expect(addPoint(many, 80.5, 1, BAND)).toEqual({ points: many, index: -1 });
   });
 });
 
 describe("channels", () => {
-  const red: Point[] = [
-    [0, 1],
-    [90, 0],
-  ];
-  const rest: Point[] = [
-    [0, 2],
-    [90, 1],
-  ];
+  const red: CurveOverride = { points: [[0, 1], [90, 0]] };
+  const rest: CurveOverride = { handles: [[0, 2, 2], [90, 1, 3]], factors: [1, 0.5] };
 
   test("equal channels share one object, and reading gives back what was written", () => {
-    expect(writeChannels([rest, rest, rest])).toEqual({ points: rest, channels: "rgb" });
+    expect(writeChannels([rest, rest, { ...rest }])).toEqual({ ...rest, channels: "rgb" });
     expect(writeChannels([null, null, null])).toBeUndefined();
     const mixed = [red, null, rest] as const;
     expect(writeChannels(mixed)).toEqual([
-      { points: red, channels: "r" },
-      { points: rest, channels: "b" },
+      { ...red, channels: "r" },
+      { ...rest, channels: "b" },
     ]);
-    expect(readChannels(writeChannels(mixed), 256)).toEqual(mixed);
-    expect(joined(readChannels({ points: red }, 256))).toBe(true);
+    expect(readChannels(writeChannels(mixed), 2)).toEqual(mixed);
+    expect(joined(readChannels(red, 2))).toBe(true);
     expect(joined(mixed)).toBe(false);
   });
 
-  test("bands become points, flat, per channel, or for one channel", () => {
+  test("rows of bands are flat, per channel, or for one channel", () => {
     const ramp = Array.from({ length: 64 }, (_, j) => 64 - j);
     const flat = readChannels({ bands: [...ramp, ...ramp.map((v) => 2 * v), ...ramp] }, 64);
-    expect(pchip(flat[1] as Point[])(45)).toBeCloseTo(2 * pchip(flat[0] as Point[])(45), 0);
-    expect(readChannels({ bands: [ramp, ramp, ramp] }, 64)[2]).toEqual(flat[0]);
-    expect(readChannels({ bands: ramp, channels: "g" }, 64).map((c) => c === null)).toEqual([true, false, true]);
+    expect(flat.map((drawn) => (drawn?.bands as number[])[1])).toEqual([63, 126, 63]);
+    expect(readChannels({ factors: [ramp, ramp, ramp] }, 64)[2]).toEqual({ factors: ramp });
+    expect(readChannels({ offsets: ramp, channels: "g" }, 64)).toEqual([null, { offsets: ramp }, null]);
   });
 });
 

@@ -4,7 +4,7 @@ import type { IconName } from "../ui/Icon";
 import { Switch } from "../ui/Switch";
 import { inspectorWidth } from "../state/panels";
 import { CHANNELS, type Active } from "./channels";
-import { pointsOf, put } from "./model";
+import { copyOf, put } from "./model";
 import { active, isStretched, lights, logarithmic, stretched, tableOpen, tool, type Tool } from "./settings";
 import type { Hand } from "./tools";
 
@@ -46,10 +46,7 @@ export function CurveTools({ hand }: { hand: Hand }) {
       </div>
       {!hand.model.together && active.value === "rgb" && (
         <button
-          onClick={() => {
-            const green = pointsOf(hand.model, 1, hand.axes);
-            put(hand.model, "Join channels", () => green, [0, 1, 2]);
-          }}
+          onClick={() => put(hand.model, "Join channels", () => copyOf(hand.model, 1, hand.axes), [0, 1, 2])}
           title="Give all three channels the green curve"
         >
           Join

@@ -44,7 +44,7 @@ export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdit
   const path = curvePath.value ?? "";
   const shape = curveShape.value;
   const model = useMemo(() => curveModel(path, info, edits, shape), [path, info, edits, shape]);
-  const ready = shape !== null || model.channels.every((points) => points !== null);
+  const ready = model.curves.every((bands) => bands !== null);
   const { frame, hand, spot, pointsBlocked, dragging, handlers } = usePlot(model, width, ready);
   useEffect(() => {
     picked.value = null;

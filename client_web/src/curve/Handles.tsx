@@ -2,11 +2,11 @@
 import type { Point } from "../protocol";
 import { formatNumber } from "../ui/scale";
 import { valueAt, yFraction } from "./axes";
-import { put } from "./model";
-import { pchip } from "./pchip";
+import { valueOn } from "./edited";
+import { putPoints } from "./model";
 import { plotX, plotY, type Frame } from "./frame";
 import { movePoint, removePoint } from "./points";
-import { picked, type Hand } from "./tools";
+import { bandOf, picked, type Hand } from "./tools";
 
 interface Props {
   frame: Frame;
@@ -18,30 +18,37 @@ const FINE = 0.1;
 
 /** The generator's value at a point's angle. */
 function generatorAt(hand: Hand, degrees: number): number | null {
-  const ghost = hand.model.ghosts?.[hand.channels[0] ?? 0];
-  return ghost === undefined ? null : pchip(ghost)(degrees);
+  const generated = hand.model.generated?.[hand.channels[0] ?? 0];
+  return generated === undefined ? null : valueOn(generated, degrees);
 }
 
 export function resetPoint(hand: Hand, points: Point[], index: number): void {
   const value = generatorAt(hand, points[index]?.[0] ?? 0);
-  if (value !== null)
-    put(hand.model, "Reset point", () => movePoint(points, index, points[index]?.[0] ?? 0, value), hand.channels);
+  if (value !== null) moveTo(hand, points, index, points[index]?.[0] ?? 0, value, "Reset point");
 }
 
 export function deletePoint(hand: Hand, points: Point[], index: number): void {
-  put(hand.model, "Delete point", () => removePoint(points, index), hand.channels);
+  putPoints(hand.model, "Delete point", points, removePoint(points, index), hand.channels);
   picked.value = null;
+}
+
+export function moveTo(
+  hand: Hand,
+  points: Point[],
+  index: number,
+  degrees: number,
+  value: number,
+  label = "Move point",
+): void {
+  const moved = movePoint(points, index, degrees, value, bandOf(hand));
+  if (String(moved[index]) === String(points[index])) return; // where it was already: not a step of the history
+  putPoints(hand.model, label, points, moved, hand.channels);
 }
 
 function nudge(hand: Hand, points: Point[], index: number, dx: number, dy: number): void {
   const [x, y] = points[index] as Point;
   const height = Math.max(0, yFraction(hand.axes, y) + dy);
-  put(
-    hand.model,
-    "Move point",
-    () => movePoint(points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height)),
-    hand.channels,
-  );
+  moveTo(hand, points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height));
 }
 
 function onKey(event: KeyboardEvent, hand: Hand, points: Point[], index: number): void {

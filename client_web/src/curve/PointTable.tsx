@@ -2,25 +2,29 @@
 import type { Point } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { NumberField } from "../ui/NumberField";
-import { put } from "./model";
-import { addPoint, movePoint } from "./points";
-import { deletePoint, resetPoint } from "./Handles";
-import { pchip } from "./pchip";
-import { picked, type Hand } from "./tools";
+import { deletePoint, moveTo, resetPoint } from "./Handles";
+import { valueOn } from "./edited";
+import { putPoints } from "./model";
+import { addPoint } from "./points";
+import { bandOf, picked, type Hand } from "./tools";
 
 /** Half-way along the widest gap, on the curve. */
-function widestGap(points: Point[]): Point {
+function widestGap(points: Point[], bands: readonly number[]): Point {
   let [best, at] = [-1, 45];
   points.forEach(([x], i) => {
     const next = points[i + 1]?.[0] ?? x;
     if (next - x > best) [best, at] = [next - x, (x + next) / 2];
   });
-  return [at, pchip(points)(at)];
+  return [at, valueOn(bands, at)];
 }
 
 export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
-  const move = (index: number, degrees: number, value: number) =>
-    put(hand.model, "Move point", () => movePoint(points, index, degrees, value), hand.channels);
+  const add = () => {
+    const bands = hand.model.curves[hand.channels[0] ?? 0] ?? [];
+    const added = addPoint(points, ...widestGap(points, bands), bandOf(hand));
+    putPoints(hand.model, "Add point", points, added.points, hand.channels);
+    if (added.index >= 0) picked.value = { index: added.index, carried: false };
+  };
   return (
     <div class="point-table">
       <table>
@@ -32,11 +36,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
               <IconButton
                 icon="plus"
                 label="Add a point in the widest gap"
-                onClick={() => {
-                  const added = addPoint(points, ...widestGap(points));
-                  put(hand.model, "Add point", () => added.points, hand.channels);
-                  if (added.index >= 0) picked.value = { index: added.index, carried: false };
-                }}
+                onClick={add}
               />
             </th>
           </tr>
@@ -51,7 +51,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   minimum={0}
                   maximum={90}
                   step={0.5}
-                  onChange={(x) => move(index, x, value)}
+                  onChange={(x) => moveTo(hand, points, index, x, value)}
                 />
               </td>
               <td>
@@ -61,7 +61,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   minimum={0}
                   maximum={1e6}
                   step={Math.max(0.01, value / 50)}
-                  onChange={(y) => move(index, degrees, y)}
+                  onChange={(y) => moveTo(hand, points, index, degrees, y)}
                 />
               </td>
               <td class="row-actions">

@@ -1,14 +1,22 @@
 /** From many samples to few points: the curve that people hold in their hand. */
 import type { Point } from "../protocol";
 import { xFraction, yFraction, type Axes } from "./axes";
+import { valueOn } from "./edited";
 import { pchip } from "./pchip";
 
 export const MAX_POINTS = 64;
 const TOLERANCE = 0.004;
 
+/** No number of a curve may be greater in a look. */
+export const MAX_VALUE = 1e6;
+
 /** Six digits are more than a picture can show and keep the document readable. */
+export function tidyValue(value: number): number {
+  return Number(Math.min(MAX_VALUE, Math.max(0, value)).toPrecision(6));
+}
+
 export function tidyPoint(degrees: number, value: number): Point {
-  return [Number(degrees.toFixed(3)), Number(Math.min(1e6, Math.max(0, value)).toPrecision(6))];
+  return [Number(degrees.toFixed(3)), tidyValue(value)];
 }
 
 /** Few points whose monotone cubic stays within `TOLERANCE` of the plot's height of all `samples` (angles increasing).
@@ -41,7 +49,19 @@ export function bandSamples(bands: readonly number[], maxDegrees = 90): Point[] 
   return [[0, bands[0] ?? 0], ...inner, [maxDegrees, bands.at(-1) ?? 0]];
 }
 
-/** A freehand stroke as samples one band apart: sorted by angle, the newest pass wins, smoothed in the plot. */
+/** Band averages as samples that points may stand on: the first and the last band's at 0° and at 90°. */
+export function knotSamples(bands: readonly number[], maxDegrees = 90): Point[] {
+  const width = maxDegrees / bands.length;
+  const last = bands.length - 1;
+  return bands.map((value, j) => [j === 0 ? 0 : j === last ? maxDegrees : (j + 0.5) * width, value]);
+}
+
+/** Points at the angles of others, on the curve to the last digit. */
+export function outlineOf(points: readonly Point[], bands: readonly number[]): Point[] {
+  return points.map(([degrees]) => tidyPoint(degrees, valueOn(bands, degrees)));
+}
+
+/** A freehand stroke: a height for each band it covers; the newest pass wins, smoothed in the plot. */
 export class Stroke {
   private readonly values: Float64Array;
   private last: Point | null = null;
@@ -51,11 +71,11 @@ export class Stroke {
     private readonly axes: Axes,
   ) {
     // heights in the plot, so that smoothing means the same on linear and logarithmic axes
-    this.values = new Float64Array(numBands + 1).fill(Number.NaN);
+    this.values = new Float64Array(numBands).fill(Number.NaN);
   }
 
   private bin(degrees: number): number {
-    return Math.min(this.numBands, Math.max(0, Math.round((degrees / 90) * this.numBands)));
+    return Math.min(this.numBands - 1, Math.max(0, Math.floor((degrees / 90) * this.numBands)));
   }
 
   add(degrees: number, height: number): void {
@@ -68,21 +88,16 @@ export class Stroke {
     this.last = [degrees, height];
   }
 
-  /** First and last bin that was drawn. */
-  private range(): [number, number] | null {
+  /** First and last band that was drawn. */
+  range(): [first: number, last: number] | null {
     const a = this.values.findIndex((v) => !Number.isNaN(v));
     const b = this.values.findLastIndex((v) => !Number.isNaN(v));
     return a < 0 ? null : [a, b];
   }
 
-  /** Degrees covered so far. */
-  extent(): [from: number, to: number] | null {
-    const range = this.range();
-    return range && [(range[0] / this.numBands) * 90, (range[1] / this.numBands) * 90];
-  }
-
-  /** The stroke, smoothed by `passes` of a binomial filter; its ends stay where the hand put them. */
-  heights(passes = 6): Point[] {
+  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay where the hand
+   * put them. */
+  heights(passes = 6): number[] {
     const range = this.range();
     if (range === null) return [];
     let heights = Array.from(this.values.subarray(range[0], range[1] + 1));
@@ -92,16 +107,14 @@ export class Stroke {
         return before === undefined || after === undefined ? v : 0.25 * before + 0.5 * v + 0.25 * after;
       });
     }
-    return heights.map((height, i) => [((range[0] + i) / this.numBands) * 90, height]);
+    return heights;
   }
 
-  /** How far apart points may be fitted: nothing finer than a band is resolved. */
-  get bandDegrees(): number {
-    return 90 / this.numBands;
-  }
-
-  /** Width of the plot that a degree range takes, for deciding how many points it deserves. */
-  share(from: number, to: number): number {
-    return xFraction(this.axes, to) - xFraction(this.axes, from);
+  /** Share of the plot's width that it takes, for deciding how many points it deserves. */
+  share(): number {
+    const [first, last] = this.range() ?? [0, 0];
+    return (
+      xFraction(this.axes, (90 * (last + 1)) / this.numBands) - xFraction(this.axes, (90 * first) / this.numBands)
+    );
   }
 }

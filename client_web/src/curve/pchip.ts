@@ -54,3 +54,17 @@ export function pchip(points: readonly Point[]): (degrees: number) => number {
     return Math.max(0, y);
   };
 }
+
+/** Nodes of the three-point Gauss rule on [0, 1], and their weights: exact for cubics. */
+const GAUSS: [number, number][] = [
+  [0.5 - Math.sqrt(0.15), 5 / 18],
+  [0.5, 8 / 18],
+  [0.5 + Math.sqrt(0.15), 5 / 18],
+];
+
+/** The curve through points as averages over equal bands of 0…90°. */
+export function bandsOfPoints(points: readonly Point[], numBands: number): number[] {
+  const curve = pchip(points);
+  const at = (place: number) => curve((90 * place) / numBands);
+  return Array.from({ length: numBands }, (_, j) => GAUSS.reduce((sum, [x, w]) => sum + w * at(j + x), 0));
+}

@@ -1,10 +1,11 @@
 /** What the pointer does in the plot: draw, move points, or scale and shift a stretch. */
 import { signal } from "@preact/signals";
 import type { Point } from "../protocol";
-import { valueAt, yFraction, type Axes } from "./axes";
+import { MAX_DEGREES, valueAt, yFraction, type Axes } from "./axes";
 import { Stroke } from "./fit";
-import { pointsOf, put, type CurveModel } from "./model";
-import { addPoint, mergeStroke, movePoint, scaleStretch, shiftStretch } from "./points";
+import { pointsOf, put, putPoints, type CurveModel } from "./model";
+import { addPoint, movePoint } from "./points";
+import { drawOver, scaleOver, shiftOver, type Cloth } from "./stretches";
 
 /** A place in the plot. */
 export interface Spot {
@@ -35,17 +36,22 @@ export interface Hand {
 
 const CLICK_PX = 3;
 
+/** Width of a band, degrees: nothing finer is resolved. */
+export function bandOf(hand: Hand): number {
+  return MAX_DEGREES / hand.model.info.bands;
+}
+
+function clothOf({ model, axes }: Hand, channel: number): Cloth {
+  const [drawn, ground] = [model.channels[channel] ?? null, model.grounds[channel] ?? []];
+  return { drawn, ground, points: pointsOf(model, channel, axes), axes };
+}
+
 export function drawGesture(hand: Hand, start: Spot): Gesture {
   const stroke = new Stroke(hand.model.info.bands, hand.axes);
-  const base = hand.channels.map((c) => pointsOf(hand.model, c, hand.axes));
+  const cloths = hand.channels.map((c) => clothOf(hand, c));
   const move = (spot: Spot) => {
     stroke.add(spot.degrees, Math.max(0, spot.height));
-    put(
-      hand.model,
-      "Draw curve",
-      (c) => mergeStroke(base[hand.channels.indexOf(c)] as Point[], stroke, hand.axes),
-      hand.channels,
-    );
+    put(hand.model, "Draw curve", (c) => drawOver(cloths[hand.channels.indexOf(c)] as Cloth, stroke), hand.channels);
   };
   stroke.add(start.degrees, Math.max(0, start.height));
   return { move, up: () => undefined };
@@ -59,14 +65,16 @@ function valueOf(hand: Hand, spot: Spot): number {
 export function pointsGesture(hand: Hand, start: Spot, hit: number): Gesture {
   const first = hand.channels[0] ?? 0;
   const carried = picked.value?.carried ? picked.value.index : -1;
-  let base = pointsOf(hand.model, first, hand.axes);
+  const before = pointsOf(hand.model, first, hand.axes);
+  const band = bandOf(hand);
+  let base = before;
   let index = hit;
-  const write = (points: Point[], label: string) => put(hand.model, label, () => points, hand.channels);
+  const write = (points: Point[], label: string) => putPoints(hand.model, label, before, points, hand.channels);
   if (hit < 0 && carried >= 0) {
     index = carried;
-    write(movePoint(base, index, start.degrees, valueOf(hand, start)), "Move point");
+    write(movePoint(base, index, start.degrees, valueOf(hand, start), band), "Move point");
   } else if (hit < 0) {
-    ({ points: base, index } = addPoint(base, start.degrees, valueOf(hand, start)));
+    ({ points: base, index } = addPoint(base, start.degrees, valueOf(hand, start), band));
     if (index >= 0) write(base, "Add point");
   }
   if (hit < 0) picked.value = index < 0 ? null : { index, carried: false };
@@ -80,7 +88,8 @@ export function pointsGesture(hand: Hand, start: Spot, hit: number): Gesture {
       moved = true;
       // a hit point keeps its distance to the pointer, so taking hold of it does not move it
       const [ox, oy] = hit >= 0 ? [dx, dy] : [0, 0];
-      write(movePoint(base, index, spot.degrees + ox, valueAt(hand.axes, Math.max(0, spot.height + oy))), "Move point");
+      const value = valueAt(hand.axes, Math.max(0, spot.height + oy));
+      write(movePoint(base, index, spot.degrees + ox, value, band), "Move point");
       picked.value = { index, carried: false };
     },
     up() {
@@ -91,21 +100,13 @@ export function pointsGesture(hand: Hand, start: Spot, hit: number): Gesture {
   };
 }
 
-export function applyScale(hand: Hand, [from, to]: [number, number], factor: number, base?: Point[][]): void {
-  const band = 90 / hand.model.info.bands;
-  const of = (c: number) => base?.[hand.channels.indexOf(c)] ?? pointsOf(hand.model, c, hand.axes);
-  put(hand.model, "Scale stretch", (c) => scaleStretch(of(c), from, to, factor, band), hand.channels);
+export function applyScale(hand: Hand, [from, to]: [number, number], factor: number): void {
+  put(hand.model, "Scale stretch", (c) => scaleOver(clothOf(hand, c), from, to, factor), hand.channels);
 }
 
-export function applyShift(
-  hand: Hand,
-  [from, to]: [number, number],
-  degrees: number,
-  base?: Point[][],
-): [number, number] {
-  const shift = Math.min(90 - to, Math.max(-from, degrees));
-  const of = (c: number) => base?.[hand.channels.indexOf(c)] ?? pointsOf(hand.model, c, hand.axes);
-  put(hand.model, "Shift stretch", (c) => shiftStretch(of(c), from, to, shift), hand.channels);
+export function applyShift(hand: Hand, [from, to]: [number, number], degrees: number): [number, number] {
+  const shift = Math.min(MAX_DEGREES - to, Math.max(-from, degrees));
+  put(hand.model, "Shift stretch", (c) => shiftOver(clothOf(hand, c), from, to, shift), hand.channels);
   return [from + shift, to + shift];
 }
 
@@ -113,14 +114,13 @@ export function applyShift(
 export function stretchGesture(hand: Hand, start: Spot): Gesture {
   const chosen = selection.value;
   if (chosen === null || start.degrees < chosen[0] || start.degrees > chosen[1]) return selectGesture(start);
-  const base = hand.channels.map((c) => pointsOf(hand.model, c, hand.axes));
   let way: "scale" | "shift" | null = null;
   return {
     move(spot) {
       const [dx, dy] = [spot.x - start.x, spot.y - start.y];
       if (way === null && Math.hypot(dx, dy) >= CLICK_PX) way = Math.abs(dx) > Math.abs(dy) ? "shift" : "scale";
-      if (way === "scale") applyScale(hand, chosen, 2 ** (-dy / 50), base);
-      if (way === "shift") selection.value = applyShift(hand, chosen, spot.degrees - start.degrees, base);
+      if (way === "scale") applyScale(hand, chosen, 2 ** (-dy / 50));
+      if (way === "shift") selection.value = applyShift(hand, chosen, spot.degrees - start.degrees);
     },
     up() {
       if (way === null) selection.value = null;
