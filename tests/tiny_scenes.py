@@ -85,7 +85,7 @@ def still_life():
     """A ball and a wall on a checkered floor, two views, every BRDF model in use."""
     terms = {
         "Floor": (
-            {"model": "lambert", "color": [0.6, 0.5, 0.4]},
+            {"model": "lambert", "color": [0.6, 0.5, 0.4], "texture": "diffuse"},
             {"model": "ggx", "color": [0.8, 0.8, 0.8], "params": {"roughness": 0.4}},
         ),
         "Wall": (

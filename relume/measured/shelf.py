@@ -49,8 +49,8 @@ class MaterialRecord:
         return SHELF.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """The unedited material as terms of a look."""
-        return [{"model": model, "data": self.data} for model in ("measured_lv", "measured_hd")]
+        """The unedited material as terms of a look, without textures: what was measured is the whole colour."""
+        return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
 
 
 @dataclass(frozen=True)

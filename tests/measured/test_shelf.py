@@ -27,7 +27,8 @@ def test_an_import_is_listed_and_can_be_used(shelf, data, table, planes):
     assert (record.name, record.data) == ("Plastic", data)
     assert len(record.id) == 16
     assert max(record.lobes_error) < 0.2
-    assert record.terms() == [{"model": "measured_lv", "data": data}, {"model": "measured_hd", "data": data}]
+    models = [(term["model"], term["data"], term["texture"]) for term in record.terms()]
+    assert models == [("measured_lv", data, None), ("measured_hd", data, None)]
     np.testing.assert_array_equal(material(data).table, table)
     assert not material(data).table.flags.writeable
     assert sorted(path.name for path in shelf.iterdir()) == [record.id]

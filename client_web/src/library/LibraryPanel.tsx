@@ -76,7 +76,8 @@ export function LibraryPanel() {
       <p class="library-help">
         {selectedMaterial.value === null
           ? "Drag a ball onto an object, or select one first."
-          : `A click puts it on ${selectedMaterial.value}; drag onto any object.`}
+          : `A click puts it on ${selectedMaterial.value}; drag onto any object.`}{" "}
+        It comes without the object's images; Texture, in the inspector, brings one back.
       </p>
       <NavigationMap />
       <input

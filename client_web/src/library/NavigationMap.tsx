@@ -2,12 +2,10 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { getMaterialMap, materialAt } from "../net/api";
 import type { MaterialMapBody } from "../protocol";
-import { edit } from "../state/edit";
-import { pointer } from "../state/pointer";
 import { selectedMaterial } from "../state/store";
 import { useDrag } from "../ui/drag";
 import { attempt, note } from "../ui/toasts";
-import { library } from "./library";
+import { giveTerms, library } from "./library";
 import { placeOf, pointOf, rangeOf, type Place } from "./map";
 
 const [WIDTH, HEIGHT] = [288, 180];
@@ -24,7 +22,7 @@ function useChoice(range: ReturnType<typeof rangeOf> | null) {
     const { f0, sigma } = pointOf(place, range);
     await attempt(async () => {
       const terms = await materialAt(f0, sigma);
-      if (asked === newest.current) edit("Material map", pointer("materials", target, "terms"), terms);
+      if (asked === newest.current) giveTerms(target, "Material map", terms);
     });
   };
 }

@@ -85,11 +85,17 @@ export async function importMeasured(file: File): Promise<void> {
   });
 }
 
-/** Give an object the terms of a library material. */
+/** Give an object the terms of another material. A material is what it looks like: the object's images do not come
+ * along, the texture switch of each term brings one back. */
+export function giveTerms(target: string, label: string, terms: readonly Term[]): void {
+  const bare = terms.map((term) => ({ ...term, texture: null }));
+  edit(label, pointer("materials", target, "terms"), bare);
+}
+
 export function putOn(target: string, id: string): void {
   const entry = entries.value.find((each) => each.id === id);
   if (entry === undefined) return;
-  edit(entry.name, pointer("materials", target, "terms"), entry.terms);
+  giveTerms(target, entry.name, entry.terms);
   select(target);
 }
 

@@ -1,0 +1,70 @@
+"""The library in a browser: however a material comes onto an object, the object's images do not come along."""
+
+from __future__ import annotations
+
+import pytest
+from editor_page import Editor
+from editor_server import Server
+from merl_files import planes_of
+from playwright.sync_api import Locator, Page, expect
+
+from relume.measured.merl import write_merl
+from relume.measured.shelf import keep
+from worker.paths import materials_path
+
+
+@pytest.fixture(scope="module")
+def measured(server: Server, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Name of a measured material on the server's shelf."""
+    path = tmp_path_factory.mktemp("measured") / "paint.binary"
+    write_merl(path, planes_of())
+    keep(materials_path(server.data), path, "Blue paint")
+    return "Blue paint"
+
+
+def textures(page: Page) -> list[str]:
+    """The image that each term of the selected material takes."""
+    found = []
+    folds = page.locator(".card .fold")
+    for index in range(folds.count()):
+        folds.nth(index).click()
+        found.append(page.locator(".inspector .texture select").input_value())
+    return found
+
+
+def first_ball(page: Page) -> Locator:
+    """Of the library."""
+    return page.locator(".library-balls button").first
+
+
+def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: str) -> None:
+    page = editor.page
+    undo = page.get_by_role("button", name="Undo", exact=True)
+    editor.choose("Floor", 0)
+    assert textures(page) == ["diffuse", ""]
+    page.get_by_role("button", name="Library").click()
+    first_ball(page).wait_for()
+    expect(page.locator(".library-help").first).to_contain_text("without the object's images")
+
+    def drop(ball: Locator) -> None:
+        box = editor.canvas.bounding_box()
+        assert box is not None
+        ball.drag_to(editor.canvas, target_position={"x": 0.5 * box["width"], "y": 0.85 * box["height"]})
+
+    ways = {"click": lambda ball: ball.click(), "drop": drop}
+    for kind in ("cook_torrance", "measured"):
+        page.locator(".library-filters").get_by_label("Model").select_option(kind)
+        if kind == "measured":
+            expect(first_ball(page)).to_contain_text(measured)
+        for way, put in ways.items():
+            put(first_ball(page))
+            assert textures(page) == ["", ""], (kind, way)
+            page.locator(".inspector .texture select").select_option("diffuse")  # one click brings it back
+            assert textures(page) == ["", "diffuse"], (kind, way)
+            undo.click()
+            undo.click()
+            assert textures(page) == ["diffuse", ""], (kind, way)
+    page.get_by_role("application", name="Map of materials").press("ArrowRight")
+    expect(undo).to_be_enabled()
+    assert textures(page) == ["", ""]
+    editor.wait_until_exact()
