@@ -43,6 +43,11 @@ class Rest:
                     self._timer.daemon = True
                     self._timer.start()
 
+    def end(self) -> None:
+        """What is kept is kept until the process ends: nobody will ask for more."""
+        with self._lock:
+            self._stop()
+
     def _stop(self) -> None:
         if self._timer is not None:
             self._timer.cancel()

@@ -80,6 +80,7 @@ class BakeService:
         for thread in self._threads:
             thread.join(CLOSE_S)
         self._executors.close()
+        rest.end()
         self._board.close()
         self.ledger.close()
 

@@ -30,7 +30,8 @@ CUT_OFF = """() => {
     .map((e) => e.outerHTML.slice(0, 160));
   return document.documentElement.scrollWidth > innerWidth ? [...cut, "the page scrolls sideways"] : cut;
 }"""
-TOP_BAR = ["All scenes", "Undo", "Redo", "front", "left", "Swap", "PNG", "EXR", "Copy the address", "Inspector"]
+SHARE = "Share: copy a link to this picture"
+TOP_BAR = ["All scenes", "Undo", "Redo", "front", "left", "Swap", "PNG", "EXR", SHARE, "Inspector"]
 
 
 def assert_nothing_is_cut_off(page: Page, where: str) -> None:

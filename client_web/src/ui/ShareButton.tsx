@@ -11,9 +11,14 @@ export function ShareButton() {
     linkToCopy.value = null;
     menu.current?.querySelector("button")?.focus();
   };
+  const escape = (event: KeyboardEvent) => {
+    if (event.key !== "Escape" || link === null) return;
+    event.stopPropagation(); // a menu that the button is in stays
+    close();
+  };
   useEffect(() => field.current?.select(), [link]);
   return (
-    <div class="menu share" ref={menu} onKeyDown={(event) => event.key === "Escape" && link !== null && close()}>
+    <div class="share-link" ref={menu} onKeyDown={escape}>
       <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void share()} />
       {link !== null && (
         <div class="menu-body" role="dialog" aria-label="Link to this picture">
