@@ -18,10 +18,11 @@ function frame(view: string, complete: boolean, at: number, width = 4): Frame {
       fidelity: "preview",
       complete,
       kind: "picture",
-  alpha: false,
+      alpha: false,
       ms: { wait: 0, update: 0, encode: 0 },
     },
     payload: new Uint8Array(words.buffer),
+    alpha: null,
   };
 }
 
