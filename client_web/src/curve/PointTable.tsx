@@ -3,25 +3,26 @@ import type { Point } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { NumberField } from "../ui/NumberField";
 import { deletePoint, moveTo, resetPoint } from "./Handles";
-import { valueOn } from "./edited";
+import { outlineOf } from "./fit";
 import { putPoints } from "./model";
 import { addPoint } from "./points";
 import { bandOf, picked, type Hand } from "./tools";
 
-/** Half-way along the widest gap, on the curve. */
-function widestGap(points: Point[], bands: readonly number[]): Point {
+/** Half-way along the widest gap, degrees. */
+function widestGap(points: Point[]): number {
   let [best, at] = [-1, 45];
   points.forEach(([x], i) => {
     const next = points[i + 1]?.[0] ?? x;
     if (next - x > best) [best, at] = [next - x, (x + next) / 2];
   });
-  return [at, valueOn(bands, at)];
+  return at;
 }
 
 export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
   const add = () => {
     const bands = hand.model.curves[hand.channels[0] ?? 0] ?? [];
-    const added = addPoint(points, ...widestGap(points, bands), bandOf(hand));
+    const [[degrees, value]] = outlineOf([[widestGap(points), 0]], bands) as [Point];
+    const added = addPoint(points, degrees, value, bandOf(hand));
     putPoints(hand.model, "Add point", points, added.points, hand.channels);
     if (added.index >= 0) picked.value = { index: added.index, carried: false };
   };

@@ -56,9 +56,12 @@ export function knotSamples(bands: readonly number[], maxDegrees = 90): Point[] 
   return bands.map((value, j) => [j === 0 ? 0 : j === last ? maxDegrees : (j + 0.5) * width, value]);
 }
 
-/** Points at the angles of others, on the curve to the last digit. */
+/** Points at the angles of others, on the curve to the last digit: where they stand once their angles are tidy. */
 export function outlineOf(points: readonly Point[], bands: readonly number[]): Point[] {
-  return points.map(([degrees]) => tidyPoint(degrees, valueOn(bands, degrees)));
+  return points.map(([degrees]) => {
+    const [x] = tidyPoint(degrees, 0);
+    return tidyPoint(x, valueOn(bands, x));
+  });
 }
 
 /** A freehand stroke: a height for each band it covers; the newest pass wins, smoothed in the plot. */
