@@ -18,7 +18,8 @@ const INFO = { name: "theta_h", label: "half angle θh", bands: BANDS } as Curve
 function beckmann(sigma: number): number[] {
   return Array.from({ length: BANDS }, (_, j) => {
     const theta = (((j + 0.5) / BANDS) * Math.PI) / 2;
-    return Number((Math.exp(-(Math.tan(theta) ** 2) / sigma ** 2) / (sigma ** 2 * Math.cos(theta) ** 4)).toPrecision(6));
+    const value = Math.exp(-(Math.tan(theta) ** 2) / sigma ** 2) / (sigma ** 2 * Math.cos(theta) ** 4);
+    return Number(value.toPrecision(6));
   });
 }
 

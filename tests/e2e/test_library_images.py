@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from editor_page import Editor
+from editor_page import SETTLE, Editor
 from editor_server import Server
 from merl_files import planes_of
 from playwright.sync_api import Locator, Page, expect
@@ -32,6 +32,20 @@ def textures(page: Page) -> list[str]:
     return found
 
 
+def place_of(editor: Editor, material: str) -> tuple[float, float]:
+    """Where the picture shows a material, from the canvas's corner: the panels leave the picture little room."""
+    box = editor.canvas.bounding_box()
+    assert box is not None
+    for share in (0.9, 0.8, 0.7, 0.65, 0.6, 0.55):
+        x, y = 0.5 * box["width"], share * box["height"]
+        editor.page.mouse.move(box["x"] + x, box["y"] + y)
+        editor.page.evaluate(SETTLE)
+        shown = editor.page.locator(".picture-bar .material")
+        if shown.count() and shown.inner_text() == material:
+            return x, y
+    raise AssertionError(f"{material} is nowhere below the middle of the picture")
+
+
 def first_ball(page: Page) -> Locator:
     """Of the library."""
     return page.locator(".library-balls button").first
@@ -47,9 +61,8 @@ def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: s
     expect(page.locator(".library-help").first).to_contain_text("without the object's images")
 
     def drop(ball: Locator) -> None:
-        box = editor.canvas.bounding_box()
-        assert box is not None
-        ball.drag_to(editor.canvas, target_position={"x": 0.5 * box["width"], "y": 0.85 * box["height"]})
+        x, y = place_of(editor, "Floor")
+        ball.drag_to(editor.canvas, target_position={"x": x, "y": y})
 
     ways = {"click": lambda ball: ball.click(), "drop": drop}
     for kind in ("cook_torrance", "measured"):
@@ -57,7 +70,9 @@ def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: s
         if kind == "measured":
             expect(first_ball(page)).to_contain_text(measured)
         for way, put in ways.items():
+            expect(undo).to_be_disabled()
             put(first_ball(page))
+            expect(undo).to_be_enabled()  # a drop arrives a little later
             assert textures(page) == ["", ""], (kind, way)
             page.locator(".inspector .texture select").select_option("diffuse")  # one click brings it back
             assert textures(page) == ["", "diffuse"], (kind, way)

@@ -1,4 +1,4 @@
-/** Edits relative to what a curve was, as `relume/brdf/edited.py` computes them: of each band a factor and an offset. */
+/** Edits relative to what a curve was: a factor and an offset for each band. `relume/brdf/edited.py` computes alike. */
 import type { CurveOverride, Handle } from "../protocol";
 
 /** edited = factors · before + offsets, band by band. */
@@ -20,8 +20,9 @@ export function layerOf(drawn: CurveOverride | null, before: readonly number[]):
 
 /** The same without its handles. */
 export function bandsLayer(drawn: CurveOverride | null, numBands: number): Layer {
-  const rows = (given: unknown, plain: number) => (given as number[] | undefined) ?? Array<number>(numBands).fill(plain);
-  return { factors: rows(drawn?.factors, 1), offsets: rows(drawn?.offsets, 0) };
+  const plain = (value: number) => Array<number>(numBands).fill(value);
+  const { factors = plain(1), offsets = plain(0) } = (drawn ?? {}) as Partial<Layer>;
+  return { factors, offsets };
 }
 
 export function applied({ factors, offsets }: Layer, before: readonly number[]): number[] {

@@ -12,8 +12,8 @@ export interface CurveModel {
   path: string;
   info: CurveBody;
   channels: Channels;
-  /** Band values per channel: what edits stand on, and what is displayed. Null until the server has sent the generator's
-   * own curve, where that is needed. */
+  /** Band values per channel: what edits stand on, and what is displayed. Null until the server has sent the
+   * generator's own curve, where that is needed. */
   grounds: (number[] | null)[];
   curves: (number[] | null)[];
   /** Curves to draw: samples per channel. */
@@ -99,7 +99,12 @@ export function pointsOf(model: CurveModel, channel: number, axes: Axes): Point[
 
 /** The curve bent to go through `after`. Points that stand in `before` too are held as they were: where both
  * neighbours are, nothing changes. */
-export function bentCurve(model: CurveModel, channel: number, before: readonly Point[], after: readonly Point[]): Drawn {
+export function bentCurve(
+  model: CurveModel,
+  channel: number,
+  before: readonly Point[],
+  after: readonly Point[],
+): Drawn {
   const drawn = model.channels[channel] ?? {};
   const held = before.map(([x, y], i): Handle => drawn.handles?.[i] ?? [x, y, y]);
   const below = unbent(model, channel) ?? [];

@@ -72,7 +72,8 @@ export function drawOver(cloth: Cloth, stroke: Stroke): Drawn | null {
 
 /** Points with one at each end of a stretch. */
 function fenced(points: readonly Point[], from: number, to: number, band: number): Point[] {
-  const ends = [from, to].filter((x) => points.length < MAX_POINTS - 1 && points.every((p) => Math.abs(p[0] - x) >= band));
+  const hasRoom = points.length < MAX_POINTS - 1;
+  const ends = [from, to].filter((end) => hasRoom && points.every(([x]) => Math.abs(x - end) >= band));
   return [...points, ...ends.map((x) => tidyPoint(x, 0))].sort((a, b) => a[0] - b[0]);
 }
 
