@@ -40,6 +40,15 @@ describe("a view's first picture", () => {
     expect(arrivals.get("left")?.isWhole).toBe(true);
   });
 
+  test("keeps how much it covers", () => {
+    const [part, rest] = [frame("front", false, 1), frame("front", true, 2)];
+    const clear = (of: Frame): Frame => ({ ...of, header: { ...of.header, alpha: true }, alpha: new Uint8Array([7]) });
+    const arrivals = new Arrivals();
+    arrivals.take(clear(part));
+    expect([...(arrivals.take(clear(rest)).alpha ?? [])]).toEqual([255, 7, 7, 255]);
+    expect(arrivals.take(frame("front", true, 3)).alpha).toBeNull();
+  });
+
   test("begins anew in another size, and when the server has forgotten the view", () => {
     const arrivals = new Arrivals();
     arrivals.take(frame("front", false, 1));

@@ -2,11 +2,13 @@
  * material is there, so that no half picture takes the place of a whole one. */
 import type { Frame } from "../net/frame";
 import type { FrameHeader } from "../protocol";
-import { applyFrame, emptyPixels, type Pixels } from "./pixels";
+import { applyFrame, emptyPixels, takeAlpha, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
 
 export class Arrival {
   pixels: Pixels | null = null;
+  /** How much each pixel hides of what is behind it; null: all. */
+  alpha: Uint8Array | null = null;
   /** What came last, where that was tone-mapped by the server. */
   jpeg: Frame | null = null;
   /** Of the newest frame. */
@@ -29,6 +31,7 @@ export class Arrival {
     else {
       if (this.pixels?.width !== width || this.pixels.height !== height) this.pixels = emptyPixels(width, height);
       applyFrame(this.pixels, frame);
+      this.alpha = takeAlpha(this.alpha, frame);
       this.jpeg = null;
     }
     this.header = frame.header;

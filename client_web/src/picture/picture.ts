@@ -4,7 +4,7 @@ import type { Frame } from "../net/frame";
 import type { Fidelity, Rgb } from "../protocol";
 import type { Arrival } from "./arrival";
 import { brushed, materialNames } from "../state/store";
-import { applyFrame, brushImage, copyPixels, copyTiles, emptyPixels, normalised, type Pixels } from "./pixels";
+import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, takeAlpha, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
 import { decodeRgb9e5 } from "./rgb9e5";
 import type { Renderer } from "./renderer";
@@ -60,34 +60,30 @@ export class Picture {
   }
 
   /** Show a picture that has arrived in place of the one that is there. Resolves when it is drawn. */
-  async showArrived({ pixels, jpeg, header }: Arrival): Promise<void> {
+  async showArrived({ pixels, alpha, jpeg, header }: Arrival): Promise<void> {
     this.brush = null;
     this.revision = header.revision;
     if (pixels !== null) {
       this.pixels = pixels;
       this.display = null;
       this.screen?.renderer.setPicture(pixels);
+      this.setAlpha(alpha);
     }
     return jpeg === null ? this.screen?.present() : this.showJpeg(jpeg);
   }
 
   private takeTiles(frame: Frame): void {
     const tiles = applyFrame(this.pixels, frame);
-    this.takeAlpha(frame);
+    this.setAlpha(takeAlpha(this.alpha, frame));
     // one big upload is quicker than many small ones of the same size
     const area = tiles.reduce((sum, { words }) => sum + words.length, 0);
     if (area > this.pixels.words.length / 2) this.screen?.renderer.updatePicture(this.pixels);
     else this.screen?.renderer.uploadTiles(tiles);
   }
 
-  private takeAlpha({ header, alpha }: Frame): void {
-    if (alpha === null) {
-      this.alpha = null;
-      return;
-    }
-    this.alpha ??= new Uint8Array(header.width * header.height).fill(255);
-    copyTiles(this.alpha, header.width, header.tiles, alpha);
-    this.screen?.renderer.setAlpha(header.width, header.height, this.alpha);
+  private setAlpha(alpha: Uint8Array | null): void {
+    this.alpha = alpha;
+    if (alpha !== null) this.screen?.renderer.setAlpha(this.pixels.width, this.pixels.height, alpha);
   }
 
   private showBrush(frame: Frame): void {

@@ -74,6 +74,15 @@ export function copyTiles(target: Uint8Array, width: number, tiles: readonly Til
   }
 }
 
+/** Coverage of a whole picture once a frame has come: null where it is opaque everywhere. `before` may be written. */
+export function takeAlpha(before: Uint8Array | null, { header, alpha }: Frame): Uint8Array | null {
+  if (alpha === null) return header.tiles.length > 0 ? null : before;
+  const size = header.width * header.height;
+  const all = before?.length === size ? before : new Uint8Array(size).fill(255);
+  copyTiles(all, header.width, header.tiles, alpha);
+  return all;
+}
+
 /** A brush frame (how much of each pixel comes from a stretch of the curve) as one image, 255 = all of it. */
 export function brushImage(frame: Frame): Uint8Array {
   const { width, height, tiles } = frame.header;
