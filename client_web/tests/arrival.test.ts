@@ -49,6 +49,14 @@ describe("a view's first picture", () => {
     expect(arrivals.take(frame("front", true, 3)).alpha).toBeNull();
   });
 
+  test("is the image that the server has tone-mapped, unless tiles have come since", () => {
+    const arrivals = new Arrivals();
+    const tiles = frame("front", true, 2);
+    const jpeg: Frame = { header: { ...tiles.header, format: "jpeg", revision: 3 }, payload: new Uint8Array(9), alpha: null };
+    expect(arrivals.take(jpeg)).toMatchObject({ isWhole: true, jpeg, pixels: null });
+    expect(arrivals.take(tiles)).toMatchObject({ jpeg: null, header: { revision: 2 } });
+  });
+
   test("begins anew in another size, and when the server has forgotten the view", () => {
     const arrivals = new Arrivals();
     arrivals.take(frame("front", false, 1));
