@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from numpy.typing import NDArray
 
@@ -25,3 +25,31 @@ def save(path: Path, image: NDArray[Any], look: Any) -> None:
     from relume.imageio import write_image
 
     write_image(path, image, look.display.exposure, look.display.tone_map)
+
+
+def save_exr(
+    path: Path, transfer: Any, view: str, look: Any, origin: Any, with_layers: bool, precision: Literal["half", "float"]
+) -> None:
+    """Render a look, with a layer for each light and each kind of light path if asked, and say how far it is."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from relume.exr.attributes import attributes_of
+    from relume.exr.layers import layers_of
+    from relume.exr.picture import export_exr
+    from relume.transfer.render import render_image
+
+    of = transfer.views[view]
+    layers = layers_of(look, reflects=transfer.method == "gather") if with_layers else []
+    attributes = attributes_of(origin, of.camera, (of.width, of.height), look, layers)
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("render", total=1.0)
+        export_exr(
+            path,
+            lambda shown, tell: render_image(transfer, view, shown, progress=tell),
+            look,
+            layers,
+            attributes,
+            precision,
+            lambda share: progress.update(bar, completed=share),
+        )

@@ -12,14 +12,27 @@ from cli.options import Data, LookFile, SceneName, View, read_look
 Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")]
 
 
-def render(scene: SceneName, output: Output, look: LookFile = None, view: View = None, data: Data = None) -> None:
+def render(
+    scene: SceneName,
+    output: Output,
+    look: LookFile = None,
+    view: View = None,
+    layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
+    full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
+    data: Data = None,
+) -> None:
     """Render one exact frame of a baked scene."""
     from cli.house import complete_look, find_bake, find_scene, open_bakes, open_settings
-    from cli.picture import check_output, save
+    from cli.picture import check_output, save, save_exr
+    from relume.errors import ParameterError
+    from relume.exr.attributes import Origin
     from relume.transfer.opened import open_transfer
     from relume.transfer.render import render_image
 
     check_output(output)
+    is_exr = output.suffix.lower() == ".exr"
+    if (layers or full_float) and not is_exr:
+        raise ParameterError("--output", output.name, "a file name that ends in .exr, for --layers and --float")
     partial = read_look(look)
     service = open_bakes(open_settings(data))
     try:
@@ -29,7 +42,10 @@ def render(scene: SceneName, output: Output, look: LookFile = None, view: View =
         document = complete_look(partial, transfer.default_look)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
-        for_display = output.suffix.lower() != ".exr"
-        save(output, render_image(transfer, view_name, document, for_display=for_display), document)
+        if is_exr:
+            origin = Origin(record.id, record.name, bake.id)
+            save_exr(output, transfer, view_name, document, origin, layers, "float" if full_float else "half")
+        else:
+            save(output, render_image(transfer, view_name, document, for_display=True), document)
     finally:
         service.close()

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import io
-import os
-import uuid
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.errors import ParameterError, RelumeError, ShapeMismatchError
+from relume.errors import ParameterError, ShapeMismatchError
+from relume.exr.writer import channels_of, write_scanlines
+from relume.replacing import write_whole
 from relume.tonemap import tone_map
 
 __all__ = ["png_bytes", "to_bytes", "tone_map", "write_image"]
@@ -51,33 +50,11 @@ def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: st
         raise ParameterError("the image format", path.suffix, f"a file name ending in {', '.join(_WRITERS)}")
     if image.ndim != 3 or image.shape[2] not in (3, 4) or image.size == 0:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3 or 4), not {image.shape}; reshape it")
-    try:
-        _write_whole(path, lambda unfinished: write(unfinished, image, exposure, tone_map_name))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
-
-
-def _write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    unfinished = path.with_name(f".unfinished-{uuid.uuid4().hex}{path.suffix.lower()}")
-    try:
-        write(unfinished)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    write_whole(path, lambda unfinished: write(unfinished, image, exposure, tone_map_name))
 
 
 def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
-    height, width, channels = image.shape
-    specification = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
-    specification.attribute("compression", "zip")
-    specification.attribute("oiio:ColorSpace", "lin_rec709_scene")
-    output = OpenImageIO.ImageOutput.create(str(path))
-    if output is None or not output.open(str(path), specification):
-        raise OSError(OpenImageIO.geterror() if output is None else output.geterror())
-    written = output.write_image(np.ascontiguousarray(image, np.float32))
-    if not output.close() or not written:
-        raise OSError(output.geterror())
+    write_scanlines(path, channels_of(image), {}, "float")
 
 
 def _displayed(image: F32, exposure: float, tone_map_name: str) -> NDArray[np.uint8]:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 import tempfile
+import uuid
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
+
+from relume.errors import RelumeError
 
 
 class Replacing:
@@ -29,3 +33,22 @@ class Replacing:
                 os.replace(self._temporary, self._path)
         finally:
             Path(self._temporary).unlink(missing_ok=True)
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Let a library that wants a path write a file, beside the one that it becomes.
+
+    Args:
+        write: called with the path to write to, whose suffix is that of `path`.
+    Raises:
+        RelumeError: the file cannot be written.
+    """
+    unfinished = path.with_name(f".unfinished-{uuid.uuid4().hex}{path.suffix.lower()}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -28,6 +28,7 @@ from server.tables import WorkRow
 log = logging.getLogger(__name__)
 MAX_QUEUED = 100
 _LOOK_AGAIN_S = 2.0
+_ASK_AGAIN_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ class Backlog:
         self._sessions, self._row, self._noun, self._work = sessions, row, noun, work
         self.folder = folder
         self._wake, self._closing = threading.Event(), threading.Event()
+        self._wanted: tuple[str, float] = "", 0.0
         self._thread = threading.Thread(target=self._run, name=f"relume-{noun}s", daemon=True)
 
     def start(self) -> None:
@@ -109,9 +111,16 @@ class Backlog:
         return self._closing.is_set()
 
     def is_wanted(self, identity: str) -> bool:
-        """Whether nobody has deleted the row and the server goes on."""
+        """Whether nobody has stopped the work or deleted its row, some moments ago, and the server goes on."""
+        if self.is_closing:
+            return False
+        if self._wanted[0] == identity and time.monotonic() < self._wanted[1]:
+            return True  # work asks thousands of times a second
         with self._sessions() as session:
-            return not self.is_closing and session.get(self._row, identity) is not None
+            row = session.get(self._row, identity)
+            is_wanted = row is not None and row.state in ("queued", "running")
+        self._wanted = identity if is_wanted else "", time.monotonic() + _ASK_AGAIN_S
+        return is_wanted
 
     def _update(self, identity: str, **values: Any) -> bool:
         statement = update(self._row).where(self._row.id == identity).values(**values)

@@ -11,7 +11,8 @@ from server.protocol import MAX_VIEWS_SHOWN
 from worker.status import Phase
 
 Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
-Name = Annotated[str, Field(min_length=1, max_length=256)]
+MAX_NAME = 256
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
 Side = Annotated[int, Field(ge=1, le=16384)]
 Preset = Literal["preview", "good", "final"]
 ImageFormat = Literal["exr", "png", "webp"]
@@ -241,17 +242,24 @@ class DryRunBody(Body):
 
 
 class RenderRequest(Body):
-    """A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default."""
+    """A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default.
+
+    `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and
+    each kind of light path beside the picture, and `precision` of the values.
+    """
 
     bake: Id
     view: Name
     looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
     format: ImageFormat
     size: tuple[Side, Side] | None = None
+    name: Name | None = None
+    layers: bool = False
+    precision: Literal["half", "float"] = "half"
 
 
 class RenderBody(Body):
-    """A batch; `done` of `total` frames are finished."""
+    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too."""
 
     id: str
     bake: str

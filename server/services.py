@@ -29,6 +29,7 @@ from server.renders import RenderQueue
 from server.settings import Settings
 from server.shares import ShareShelf
 from server.truths import TruthQueue
+from worker.scenes import get_scene
 from worker.service import BakeService
 from worker.tasks import kept_bytes
 
@@ -77,7 +78,9 @@ async def open_services(
     library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
-    renders = RenderQueue(service.ledger.sessions, settings.data, library)
+    renders = RenderQueue(
+        service.ledger.sessions, settings.data, library, lambda scene: get_scene(service.ledger, scene).name
+    )
     truths = TruthQueue(service.ledger.sessions, settings.data, library)
     house = House(
         library=library,

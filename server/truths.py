@@ -80,7 +80,9 @@ class TruthQueue:
         try:
             if frame is None or estimate is None:
                 self._backlog.note(work.id, 0)
-                frame = self._library.render(transfer, request.view, look)
+                frame = self._library.render(
+                    transfer, request.view, look, lambda share: None, lambda: not self._backlog.is_wanted(work.id)
+                )
                 estimate = Estimate.nothing(*frame.shape[:2])
             size = frame.shape[1], frame.shape[0]
             while estimate.passes < request.passes:

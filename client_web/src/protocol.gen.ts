@@ -63,13 +63,16 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. */
 export interface RenderRequest {
   bake: string;
   view: string;
   looks: Record<string, unknown>[];
   format: "exr" | "png" | "webp";
   size?: [number, number] | null;
+  name?: string | null;
+  layers?: boolean;
+  precision?: "half" | "float";
 }
 
 /** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. */
@@ -346,7 +349,7 @@ export interface RecipeBody {
   relightable: boolean;
 }
 
-/** A batch; `done` of `total` frames are finished. */
+/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. */
 export interface RenderBody {
   id: string;
   bake: string;

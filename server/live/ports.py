@@ -109,7 +109,8 @@ class Library:
         open_transfer: path of a published store -> transfer; heavy.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
-            where the look's background is transparent; `for_display` as of `render_image`; heavy.
+            where the look's background is transparent; `progress`, `cancelled` and `for_display` as of `render_image`;
+            heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
         reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,

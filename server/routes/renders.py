@@ -10,12 +10,13 @@ from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import MAX_LOOKS, Id, RenderBody, RenderRequest
+from server.bodies import MAX_LOOKS, MAX_NAME, Id, RenderBody, RenderRequest
 from server.errors import NotReadyError
 from server.live.ports import Transfer
 from server.renders import RenderStatus
 from server.routes.bakes import ready_bake
 from server.services import Shared
+from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
 MEDIA_TYPES = {"exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
@@ -27,6 +28,9 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
         await run_in_threadpool(_check, request, transfer)
+        if request.name is None:
+            scene = await run_in_threadpool(get_scene, services.bakes.ledger, transfer.scene_id)
+            request.name = f"{scene.name} {request.view}"[:MAX_NAME]
     identity = await run_in_threadpool(services.renders.submit, request)
     response.headers["Location"] = f"/api/renders/{identity}"
     return _body(await run_in_threadpool(services.renders.get, identity))
@@ -49,6 +53,8 @@ def check_look(partial: dict[str, Any], transfer: Transfer, pointer: str) -> Non
 
 def _check(request: RenderRequest, transfer: Transfer) -> None:
     view = baked_view(request.view, transfer)
+    if request.format != "exr" and request.layers:
+        raise ParameterError("layers", True, "false for this format; only EXR files have layers")
     if request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
@@ -78,7 +84,8 @@ def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_LOOKS)], servi
     path = services.renders.frame_path(status, index)
     if not path.exists():
         raise NotReadyError(f"frame {index} is not finished; {_state(status)}")
-    return FileResponse(path, media_type=MEDIA_TYPES[status.request.format], filename=path.name)
+    name = services.renders.download_name(status, index)
+    return FileResponse(path, media_type=MEDIA_TYPES[status.request.format], filename=name)
 
 
 @router.get("/{render}/archive.zip", response_class=FileResponse)
@@ -104,5 +111,4 @@ def _body(status: RenderStatus) -> RenderBody:
         format=request.format,
         size=request.size,
         total=total,
-        progress=status.done / total,
     )

@@ -173,6 +173,26 @@ def test_render_writes_the_picture_that_the_light_says(data: Path, tmp_path: Pat
     np.testing.assert_allclose(pixels[12, 16, :3], [0.5, 0.25, 1.0], rtol=0.02)
 
 
+def test_render_writes_layers_and_says_what_cannot_have_them(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import OpenImageIO
+
+    assert main(["bake", "quad", "--view", "front", *TINY]) == 0
+    look, output = tmp_path / "look.json", tmp_path / "x.exr"
+    look.write_text(json.dumps({"lights": {"Key": {"kind": "point", "position": [0, 0, 2]}}}))
+    assert main(["render", "quad", "--look", str(look), "--layers", "--output", str(output)]) == 0
+    spec = OpenImageIO.ImageBuf(str(output)).spec()
+    layers = ("light_Key", "light_environment")
+    assert set(spec.channelnames) == {"R", "G", "B", *(f"{name}.{c}" for name in layers for c in "RGB")}
+    assert str(spec.format) == "half"
+    assert json.loads(spec.get_string_attribute("relume:sceneName")) == "quad"
+    assert main(["render", "quad", "--float", "--output", str(output)]) == 0
+    assert str(OpenImageIO.ImageBuf(str(output)).spec().format) == "float"
+    assert main(["render", "quad", "--layers", "--output", str(tmp_path / "x.png")]) == 1
+    assert ".exr" in capsys.readouterr().err
+
+
 def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])

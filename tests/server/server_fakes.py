@@ -208,6 +208,12 @@ class FakePicture:
         return np.full((self.view.height, self.view.width), (to_deg - from_deg) / 90.0, np.float32)
 
 
+def _open_gate() -> threading.Event:
+    gate = threading.Event()
+    gate.set()
+    return gate
+
+
 @dataclass
 class Control:
     """What tests set and see."""
@@ -221,6 +227,7 @@ class Control:
     may_freeze: threading.Event = field(default_factory=threading.Event)
     may_trace: threading.Event = field(default_factory=threading.Event)
     stores_kept: list[set[Path]] = field(default_factory=list)
+    render_gate: threading.Event = field(default_factory=_open_gate)
     passes_asked: list[int] = field(default_factory=list)
     reflections_asked: list[bool] = field(default_factory=list)
 
@@ -237,7 +244,21 @@ class Control:
     def _picture(self, transfer: FakeTransfer, view: str) -> FakePicture:
         return FakePicture(transfer, transfer.views[view], self)
 
-    def _render(self, transfer: FakeTransfer, view: str, look: Any, *, for_display: bool = False) -> np.ndarray:
+    def _render(
+        self,
+        transfer: FakeTransfer,
+        view: str,
+        look: Any,
+        progress: Callable[[float], object] = lambda share: None,
+        cancelled: Callable[[], bool] = lambda: False,
+        for_display: bool = False,
+    ) -> np.ndarray:
+        """It waits half way while `render_gate` is clear."""
+        progress(0.5)
+        while not self.render_gate.wait(0.01):
+            if cancelled():
+                raise CancelledError("stopped")
+        progress(1.0)
         shape = transfer.views[view].height, transfer.views[view].width, 3
         return np.full(shape, exact_pixel(look), np.float32)
 

@@ -77,7 +77,7 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, image, name, mon
     def no_space(source, destination):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("relume.imageio.os.replace", no_space)
+    monkeypatch.setattr("os.replace", no_space)
     with pytest.raises(RelumeError, match="No space left"):
         write_image(target, image * 2)
     assert [p.name for p in tmp_path.iterdir()] == [name]

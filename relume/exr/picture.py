@@ -1,0 +1,55 @@
+"""A picture and its layers in one OpenEXR file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.exr.layers import Layer
+from relume.exr.writer import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
+from relume.look import Look
+
+Progress = Callable[[float], object]
+Render = Callable[[Look, Progress], NDArray[np.float32]]
+"""Renders a look, (height, width, 3) or with alpha (height, width, 4), and tells the share done."""
+
+
+def export_exr(
+    path: Path,
+    render: Render,
+    look: Look,
+    layers: Sequence[Layer],
+    attributes: Attributes,
+    precision: Precision = "half",
+    progress: Progress = lambda share: None,
+) -> None:
+    """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
+
+    Args:
+        progress: called with the share done.
+    Raises:
+        RelumeError: the file cannot be written. What `render` raises; then there is no file.
+    """
+    pictures = [("", look), *((layer.name, layer.look) for layer in layers)]
+    with tempfile.TemporaryDirectory(prefix=".layers-", dir=path.parent) as folder:
+        channels: list[tuple[str, NDArray[np.floating]]] = []
+        for k, (name, of) in enumerate(pictures):
+
+            def share_of_all(share: float, k: int = k) -> None:
+                progress((k + share) / len(pictures))
+
+            image = render(of, share_of_all)
+            image = image[..., :3] if name else image  # coverage is the picture's
+            channels += channels_of(_on_disk(Path(folder) / f"{k}.npy", image, precision), name)
+        write_exr(path, channels, attributes, precision)
+
+
+def _on_disk(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:
+    """The same picture, in the values that are written, as a file that is read where it is needed."""
+    kept = np.minimum(image, LARGEST_HALF).astype(np.float16) if precision == "half" else image
+    np.save(path, kept, allow_pickle=False)
+    return np.load(path, mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]

@@ -1,0 +1,55 @@
+"""Pictures to take away: what their files are called, layers and attributes of EXR, progress and an end of them."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import OpenImageIO
+from fastapi.testclient import TestClient
+from server_fakes import Control
+from session_client import Baked
+from test_truths import is_done, wait_until
+
+
+def test_renders_are_called_like_the_scene_or_as_asked(client: TestClient, baked: Baked) -> None:
+    request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr"}
+
+    def name_of(more: dict[str, Any]) -> str:
+        url = client.post("/api/renders", json=request | more).headers["location"]
+        assert wait_until(client, url, is_done)["state"] == "ready"
+        return unquote(client.get(f"{url}/frames/0").headers["content-disposition"])
+
+    assert name_of({}) == 'attachment; filename="triangle-front.exr"'
+    assert name_of({"name": "../a\r\nb \"c\"/灯"}) == "attachment; filename*=utf-8''a-b-c-灯.exr"
+    assert name_of({"name": "...", "format": "png"}) == 'attachment; filename="picture.png"'
+    assert name_of({"name": "x" * 256}) == f'attachment; filename="{"x" * 120}.exr"'
+    assert name_of({"looks": [{}, {}]}) == 'attachment; filename="triangle-front-0000.exr"'
+
+
+def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
+    client: TestClient, control: Control, baked: Baked, tmp_path: Path
+) -> None:
+    lights = {name: {"kind": "point", "position": [0, 1, 0]} for name in ("Key", "key")}
+    request = {"bake": baked.bake, "view": "front", "looks": [{"lights": lights}], "format": "exr", "size": [32, 16]}
+    assert client.post("/api/renders", json=request | {"format": "png", "layers": True}).status_code == 422
+    control.render_gate.clear()
+    stopped, url = (
+        client.post("/api/renders", json=request | {"layers": True, "precision": "float"}).headers["location"]
+        for _ in range(2)
+    )
+    while client.get(stopped).json()["progress"] != 0.5 / 4:
+        time.sleep(0.02)
+    assert client.delete(stopped).status_code == 204
+    while client.get(url).json()["progress"] == 0.0:  # the next one is begun without waiting for the stopped one
+        time.sleep(0.02)
+    control.render_gate.set()
+    assert wait_until(client, url, is_done)["progress"] == 1.0
+    (tmp_path / "a.exr").write_bytes(client.get(f"{url}/frames/0").content)
+    spec = OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).spec()
+    assert (spec.width, spec.height, str(spec.format)) == (32, 16, "float")
+    assert {name.partition(".")[0] for name in spec.channelnames} >= {"light_environment", "light_Key", "light_key_2"}
+    assert spec.get_string_attribute("relume:bake") == baked.bake
+    assert json.loads(spec.get_string_attribute("relume:look"))["lights"]["key"]["position"] == [0, 1, 0]
+    assert len(list((client.app.state.services.settings.data / "renders").iterdir())) == 1

@@ -1,0 +1,145 @@
+"""OpenEXR files read back by OpenImageIO: layers and their names, attributes, half and full floats."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import OpenImageIO
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny_scenes import looking, still_life
+
+from relume.exr.attributes import Origin, attributes_of, world_to_ndc
+from relume.exr.layers import layers_of
+from relume.exr.picture import export_exr
+from relume.exr.writer import channels_of, write_exr
+from relume.look import default_look, validate
+from relume.trace.primary import camera_directions
+
+POINT = {"kind": "point", "position": [0, 1, 0]}
+SIZE = (48, 32)
+
+
+def look_with(**changes):
+    return validate(changes, default_look(still_life().materials))
+
+
+def names_of(layers):
+    return [layer.name for layer in layers]
+
+
+def read(path):
+    buffer = OpenImageIO.ImageBuf(str(path))
+    return buffer.spec(), buffer.get_pixels(OpenImageIO.FLOAT)
+
+
+def test_halves_are_rounded_and_nothing_becomes_infinite(tmp_path):
+    image = np.random.default_rng(4).uniform(0, 3, (200, 48, 3)).astype(np.float32)
+    image[0, 0] = (1e6, 1e-6, 0)
+    write_exr(tmp_path / "a.exr", channels_of(image), {})
+    spec, found = read(tmp_path / "a.exr")
+    assert str(spec.format) == "half"
+    assert list(spec.channelnames) == ["R", "G", "B"]
+    np.testing.assert_array_equal(found, np.minimum(image, 65504).astype(np.float16).astype(np.float32))
+    write_exr(tmp_path / "b.exr", channels_of(image), {}, "float")
+    np.testing.assert_array_equal(read(tmp_path / "b.exr")[1], image)
+
+
+def test_alpha_and_layers_are_channels_of_their_names(tmp_path):
+    image = np.random.default_rng(4).uniform(0, 3, (32, 48, 4)).astype(np.float32)
+    write_exr(tmp_path / "a.exr", [*channels_of(image), *channels_of(image[..., :3], "light_Key")], {}, "float")
+    spec, found = read(tmp_path / "a.exr")
+    order = [spec.channelnames.index(name) for name in ("R", "G", "B", "A", "light_Key.R", "light_Key.B")]
+    np.testing.assert_array_equal(found[..., order], image[..., [0, 1, 2, 3, 0, 2]])
+
+
+def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
+    lights = {"Key": POINT, "Off": POINT | {"on": False}, "Black": POINT | {"scale": 0}}
+    look = look_with(lights=lights)
+    lit = ["light_environment", "light_Key"]
+    assert names_of(layers_of(look, reflects=False)) == lit
+    paths = ["path_direct", "path_first_bounce", "path_further_bounces"]
+    assert names_of(layers_of(look, reflects=True)) == [*lit, *paths]
+    assert names_of(layers_of(look_with(), reflects=False)) == []
+    assert names_of(layers_of(look_with(), reflects=True)) == paths
+    assert names_of(layers_of(look_with(transport={"bounces": 1}), reflects=True)) == paths[:2]
+    assert names_of(layers_of(look_with(transport={"show": "first_bounce"}), reflects=True)) == []
+    assert names_of(layers_of(look_with(lights=lights, environment={"scale": 0.0}), reflects=False)) == []
+
+
+def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():
+    names = ["a.b/c", "a b c", "A-B-C", "灯", "🙂", "environment", "x" * 79, "x" * 80, "../..", "key\nR", "Lampe é"]
+    layers = layers_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=False)
+    assert [layer.of for layer in layers] == ["environment", *names]
+    assert names_of(layers)[:6] == [
+        "light_environment", "light_a_b_c", "light_a_b_c_2", "light_A_B_C_3", "light_unnamed", "light_unnamed_2",
+    ]  # fmt: skip
+    assert names_of(layers)[-1] == "light_Lampe_e"
+
+
+@given(st.lists(st.text(min_size=1, max_size=80), min_size=2, max_size=12, unique=True))
+def test_layer_names_are_plain_short_and_different(names):
+    layers = names_of(layers_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=True))
+    assert all(re.fullmatch(r"(light|path)_[A-Za-z0-9_]{1,23}", name) for name in layers)
+    assert len({name.casefold() for name in layers}) == len(names) + 4
+
+
+def test_the_picture_of_a_light_has_that_light_alone():
+    look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"on": False}})
+    for layer in layers_of(look, reflects=False):
+        shining = [name for name, light in layer.look.lights.items() if any(light.gain)]
+        shining += ["environment"] if any(layer.look.environment.gain) else []
+        assert shining == [layer.of]
+
+
+def test_attributes_say_where_the_picture_comes_from(tmp_path):
+    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    look = look_with(environment={"map": "studio"}, lights={"灯": POINT})
+    layers = layers_of(look, reflects=False)
+    attributes = attributes_of(Origin("5" * 16, "still\0life 灯", "b" * 16), camera, SIZE, look, layers)
+    image = np.ones((SIZE[1], SIZE[0], 3), np.float32)
+    export_exr(tmp_path / "a.exr", lambda look, progress: image, look, layers, attributes)
+    spec, _ = read(tmp_path / "a.exr")
+    found = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    assert validate(json.loads(found["relume:look"]), default_look(still_life().materials)) == look
+    assert json.loads(found["relume:layers"]) == {"light_environment": "environment", "light_unnamed": "灯"}
+    assert json.loads(found["relume:sceneName"]) == "still\0life 灯"
+    assert (found["relume:scene"], found["relume:bake"]) == ("5" * 16, "b" * 16)
+    assert found["relume:environment"] == "studio"
+    assert "W/(sr m^2)" in found["relume:units"]
+    assert found["Software"].startswith("relume ")
+    np.testing.assert_allclose(found["chromaticities"][:2], (0.64, 0.33))
+    np.testing.assert_allclose(json.loads(found["relume:camera"])["to_world"], camera.to_world.ravel())
+    np.testing.assert_allclose(found["worldToNDC"], world_to_ndc(camera, SIZE).ravel(), rtol=1e-5, atol=1e-6)
+    eye = np.append(camera.to_world[:3, 3], 1) @ np.reshape(found["worldToCamera"], (4, 4))
+    np.testing.assert_allclose(eye, [0, 0, 0, 1], atol=1e-5)
+
+
+def test_points_in_the_world_are_found_in_the_picture():
+    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    x, y = np.array([0, 48, 0, 12], np.float32), np.array([0, 32, 32, 24], np.float32)
+    world = camera.to_world[:3, 3] + 2.5 * camera_directions(camera, SIZE, x, y)
+    projected = np.append(world, np.ones((4, 1)), axis=1) @ world_to_ndc(camera, SIZE)
+    np.testing.assert_allclose(projected[:, :2] / projected[:, 3:], np.stack([x / 48, y / 32], axis=1), atol=1e-5)
+
+
+def test_export_tells_how_far_it_is_and_leaves_nothing_where_it_fails(tmp_path):
+    look = look_with(lights={"Key": POINT})
+    layers = layers_of(look, reflects=False)
+    told: list[float] = []
+
+    def render(look, progress):
+        progress(0.5)
+        progress(1.0)
+        if len(told) > 5:
+            raise RuntimeError("stopped")
+        return np.ones((4, 6, 3), np.float32)
+
+    export_exr(tmp_path / "a.exr", render, look, layers[:1], {}, progress=told.append)
+    assert told == [0.25, 0.5, 0.75, 1.0]
+    with pytest.raises(RuntimeError):
+        export_exr(tmp_path / "b.exr", render, look, layers, {}, progress=told.append)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
