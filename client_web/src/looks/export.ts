@@ -1,6 +1,7 @@
 /** Export: PNG as displayed, made here; EXR in linear radiance, rendered by the server. Both are of the light that is
  * shown: one source alone, or some of its paths. */
-import { getRender, problemText, startRender } from "../net/api";
+import { signal } from "@preact/signals";
+import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { lightLimits, lightLimitWords } from "../picture/limits";
 import { stage } from "../picture/stage";
 import type { RenderBody } from "../protocol";
@@ -12,10 +13,13 @@ import { pngBlob } from "./image";
 
 const POLL_MS = 300;
 
-function fileName(suffix: string): string {
+/** The EXR that the server renders now: how far it is, and a way to stop it. */
+export const exporting = signal<{ progress: number; stop(): void } | null>(null);
+
+function fileStem(): string {
   const limits = lightLimits.value.map((limit) => limit.words);
-  const stem = [scene.value?.name ?? "picture", viewName.value, ...limits].join(" ").trim().replace(/[^\p{L}\p{N}._-]+/gu, "-");
-  return `${stem}.${suffix}`;
+  const words = [scene.value?.name ?? "picture", viewName.value, ...limits].join(" ").trim();
+  return words.replace(/[^\p{L}\p{N}._-]+/gu, "-");
 }
 
 function download(href: string, name: string): void {
@@ -31,30 +35,39 @@ export async function exportPng(): Promise<void> {
   await attempt(async () => {
     await whenExact();
     const url = URL.createObjectURL(await pngBlob(stage.active.pixels, stage.active.alpha, current.display));
-    download(url, fileName("png"));
+    download(url, `${fileStem()}.png`);
     window.setTimeout(() => URL.revokeObjectURL(url), 10_000);
   });
 }
 
-async function finished(render: RenderBody): Promise<RenderBody> {
-  let state = render;
-  while (state.state === "queued" || state.state === "running") {
+/** Follow a render to its end; null where it was stopped on the way. */
+async function finished(render: RenderBody): Promise<RenderBody | null> {
+  let [state, isStopped] = [render, false];
+  const stop = () => {
+    isStopped = true;
+    exporting.value = null;
+    void attempt(() => deleteRender(render.id));
+  };
+  while (!isStopped && (state.state === "queued" || state.state === "running")) {
+    exporting.value = { progress: state.progress, stop };
     await new Promise((done) => setTimeout(done, POLL_MS));
-    state = await getRender(state.id);
+    if (!isStopped) state = await getRender(render.id);
   }
+  if (isStopped) return null;
   if (state.state === "failed") throw new Error(`The EXR could not be rendered: ${problemText(state.problem)}`);
   return state;
 }
 
-export async function exportExr(): Promise<void> {
+/** With layers: one for each light and each kind of light path, where there are several. */
+export async function exportExr(layers: boolean): Promise<void> {
   const [id, current] = [bake.value, look.value];
-  if (id === null || current === null) return;
+  if (id === null || current === null || exporting.value !== null) return;
   await attempt(async () => {
-    const [name, shown] = [fileName("exr"), seenOf(current)];
+    const shown = seenOf(current);
     note(`Rendering the EXR on the server${lightLimitWords()}…`);
-    const render = await finished(
-      await startRender({ bake: id, view: viewName.value, looks: [{ ...shown }], format: "exr" }),
-    );
-    download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, name);
-  });
+    const looks = [{ ...shown }];
+    const asked = await startRender({ bake: id, view: viewName.value, looks, format: "exr", layers, name: fileStem() });
+    const render = await finished(asked);
+    if (render !== null) download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, "");
+  }).finally(() => (exporting.value = null));
 }

@@ -109,6 +109,9 @@ export async function cancelBake(id: string): Promise<void> {
 export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
 }
+export async function deleteRender(id: string): Promise<void> {
+  await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
 export const getRender = (id: string) => get<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
 
 export async function makeShare(body: ShareRequest): Promise<ShareEntry> {

@@ -1,6 +1,7 @@
 /** What is going on, in words: connection, latency, exactness, freezing, bakes, memory. */
 import { useComputed } from "@preact/signals";
 import { cancelBake } from "../net/api";
+import { exporting } from "../looks/export";
 import { limits } from "../picture/limits";
 import { reconnectNow } from "../state/live";
 import { useMemory } from "../state/memory";
@@ -76,6 +77,13 @@ export function StatusBar() {
       </button>
       {freezing.value !== null && <progress max={1} value={freezing.value.progress} aria-label={pictureWords()} />}
       <span class="spacer" />
+      {exporting.value !== null && (
+        <span class="bake">
+          EXR {Math.round(100 * exporting.value.progress)} %
+          <progress max={1} value={exporting.value.progress} aria-label="EXR" />
+          <button onClick={exporting.value.stop}>Stop</button>
+        </span>
+      )}
       {coming.value !== null && (
         <span class="bake">
           {bakeWords(elapsed)}

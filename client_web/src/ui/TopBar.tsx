@@ -1,7 +1,5 @@
 /** Scene, views, undo, comparison, display, export. */
 import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
-import { exportExr, exportPng } from "../looks/export";
-import { lightLimitWords } from "../picture/limits";
 import { TONE_MAPS } from "../picture/tonemap";
 import { edit } from "../state/edit";
 import { leave } from "../state/open";
@@ -13,6 +11,7 @@ import { showAlone, toggleSideBySide } from "../state/views";
 import { IconButton } from "./Button";
 import { BakeMenu } from "./BakeMenu";
 import { useDrag } from "./drag";
+import { ExportMenu } from "./ExportMenu";
 import { Overflow } from "./Overflow";
 import { ShareButton } from "./ShareButton";
 import { Slider } from "./Slider";
@@ -41,11 +40,6 @@ function Views() {
       />
     </div>
   );
-}
-
-/** What an export is of: with several views shown it must be said. */
-function whichView(): string {
-  return sideBySide.value ? `the view “${viewName.value}”` : "the picture";
 }
 
 function Compare() {
@@ -126,19 +120,6 @@ function History() {
   );
 }
 
-function Export() {
-  return (
-    <div class="group" role="group" aria-label="Export">
-      <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`} onClick={() => void exportPng()}>
-        PNG
-      </button>
-      <button title={`Export the linear radiance of ${whichView()}${lightLimitWords()}`} onClick={() => void exportExr()}>
-        EXR
-      </button>
-    </div>
-  );
-}
-
 function Side({ icon, label, panel }: { icon: "left" | "right"; label: string; panel: SidePanel }) {
   const shown = shownPanels.value.includes(panel);
   return <IconButton icon={icon} label={label} pressed={shown} onClick={() => togglePanel(panel)} />;
@@ -160,7 +141,7 @@ const CONTROLS = [
   { name: "steps", rank: 5, Content: History },
   { name: "compare", rank: 2, Content: Compare },
   { name: "display", rank: 3, Content: Display },
-  { name: "export", rank: 1, Content: Export },
+  { name: "export", rank: 1, Content: ExportMenu },
   { name: "share", rank: 0, Content: ShareButton },
 ];
 
