@@ -1,7 +1,7 @@
 """Long work that outlives the server: rows of a table, one thread that works through them, oldest first.
 
-A row is queued, running, ready or failed. What a killed server left running is gone on with at the next start; the
-work itself must keep on disk what it has done.
+A row is queued, running, ready, failed or stopped. What a killed server left running is gone on with at the next
+start; the work itself must keep on disk what it has done.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 MAX_QUEUED = 100
 _LOOK_AGAIN_S = 2.0
 _ASK_AGAIN_S = 0.1
+_ACTIVE = ("queued", "running")
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Backlog:
         """Queue a request, JSON that was checked. Raises BusyError."""
         identity, row = secrets.token_hex(8), self._row
         with self._sessions.begin() as session:
-            waiting = session.scalars(select(row.id).where(row.state.in_(("queued", "running"))))
+            waiting = session.scalars(select(row.id).where(row.state.in_(_ACTIVE)))
             if len(waiting.all()) >= MAX_QUEUED:
                 raise BusyError(f"{MAX_QUEUED} {self._noun}s are waiting; try again when some are done")
             session.add(row(id=identity, request=request, state="queued", done=0, created=time.time()))
@@ -100,9 +101,20 @@ class Backlog:
                 session.delete(row)
         shutil.rmtree(self.folder / identity, ignore_errors=True)
 
+    def stop(self, identity: str) -> None:
+        """End work that waits or goes on; its files stay, `resume` goes on with them. Raises NotFoundError."""
+        self.get(identity)
+        self._update(identity, _ACTIVE, state="stopped")
+
+    def resume(self, identity: str) -> None:
+        """Queue what was stopped again. Raises NotFoundError."""
+        self.get(identity)
+        self._update(identity, ("stopped",), state="queued")
+        self._wake.set()
+
     def note(self, identity: str, done: int, state: str = "running") -> None:
-        """Record progress. Raises CancelledError where the row was deleted or the server closes."""
-        if not self._update(identity, state=state, done=done) or (self.is_closing and state == "running"):
+        """Record progress. Raises CancelledError where the work was stopped, its row deleted, or the server closes."""
+        if not self._update(identity, _ACTIVE, state=state, done=done) or (self.is_closing and state == "running"):
             raise CancelledError(f"the {self._noun} was stopped")
 
     @property
@@ -118,12 +130,13 @@ class Backlog:
             return True  # work asks thousands of times a second
         with self._sessions() as session:
             row = session.get(self._row, identity)
-            is_wanted = row is not None and row.state in ("queued", "running")
+            is_wanted = row is not None and row.state in _ACTIVE
         self._wanted = identity if is_wanted else "", time.monotonic() + _ASK_AGAIN_S
         return is_wanted
 
-    def _update(self, identity: str, **values: Any) -> bool:
-        statement = update(self._row).where(self._row.id == identity).values(**values)
+    def _update(self, identity: str, states: Sequence[str], **values: Any) -> bool:
+        row = self._row
+        statement = update(row).where(row.id == identity, row.state.in_(states)).values(**values)
         with self._sessions.begin() as session:
             return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
 
@@ -142,7 +155,7 @@ class Backlog:
 
     def _next(self) -> str | None:
         row = self._row
-        query = select(row.id).where(row.state.in_(("queued", "running"))).order_by(row.created)
+        query = select(row.id).where(row.state.in_(_ACTIVE)).order_by(row.created)
         with self._sessions() as session:
             return session.scalars(query.limit(1)).first()
 
@@ -152,10 +165,14 @@ class Backlog:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._work(work)
-        except CancelledError:  # closing, or deleted
-            if not self.is_closing:
+        except CancelledError:  # closing, stopped, or deleted
+            if not self._is_there(work.id):
                 shutil.rmtree(folder, ignore_errors=True)
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self._noun, work.id)
-            self._update(work.id, state="failed", problem=problem_of(error).detail)
+            self._update(work.id, _ACTIVE, state="failed", problem=problem_of(error).detail)
+
+    def _is_there(self, identity: str) -> bool:
+        with self._sessions() as session:
+            return session.get(self._row, identity) is not None

@@ -319,30 +319,41 @@ class TruthRequest(Body):
     view: Name
     look: dict[str, Any] = {}
     passes: Annotated[int, Field(ge=2, le=1024)] = 16
+    dry_run: bool = False
+
+
+class TruthPlanBody(Body):
+    """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn."""
+
+    passes: int
+    seconds: float
 
 
 class TruthFigures(Body):
     """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
 
-    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off; `significant`:
-    share of pixels whose difference the noise does not explain, 0.01 by chance.
+    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off: null where that
+    cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the
+    noise does not explain, at most a hundredth of them by chance.
     """
 
     rmse: float
     noise: float
-    error: float
+    error: float | None
+    limit: float
     significant: float
 
 
 class TruthBody(Body):
-    """A comparison; `passes` are done."""
+    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet."""
 
     id: str
     bake: str
     view: str
-    state: Literal["queued", "running", "ready", "failed"]
+    state: Literal["queued", "running", "ready", "failed", "stopped"]
     passes: int
     total: int
     progress: float
+    seconds_left: float | None
     found: TruthFigures | None
     problem: str | None

@@ -58,6 +58,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.DryRunBody,
     bodies.RenderBody,
     bodies.TruthBody,
+    bodies.TruthPlanBody,
     bodies.LookEntry,
     bodies.ShareEntry,
     bodies.ShareBody,

@@ -105,6 +105,7 @@ export interface TruthRequest {
   view: string;
   look?: Record<string, unknown>;
   passes?: number;
+  dry_run?: boolean;
 }
 
 /** client → server: show this view alone. `size` is the space the client has; frames come in the baked size. */
@@ -426,25 +427,33 @@ export interface StatusMessage {
   progress: number;
 }
 
-/** A comparison; `passes` are done. */
+/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. */
 export interface TruthBody {
   id: string;
   bake: string;
   view: string;
-  state: "queued" | "running" | "ready" | "failed";
+  state: "queued" | "running" | "ready" | "failed" | "stopped";
   passes: number;
   total: number;
   progress: number;
+  seconds_left: number | null;
   found: TruthFigures | null;
   problem: string | null;
 }
 
-/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off; `significant`: share of pixels whose difference the noise does not explain, 0.01 by chance. */
+/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
 export interface TruthFigures {
   rmse: number;
   noise: number;
-  error: number;
+  error: number | null;
+  limit: number;
   significant: number;
+}
+
+/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. */
+export interface TruthPlanBody {
+  passes: number;
+  seconds: number;
 }
 
 /** A baked view, its size in pixels and its camera. */

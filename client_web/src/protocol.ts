@@ -27,6 +27,7 @@ export type {
   ShareRequest,
   StatusMessage,
   TruthBody,
+  TruthPlanBody,
   TruthRequest,
 } from "./protocol.gen";
 export { MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL } from "./protocol.gen";

@@ -17,6 +17,7 @@ from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import trace_from
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _BEHIND = 1e9  # metres: where directional light comes from
@@ -47,12 +48,7 @@ class LocalLamp:
         direction = away / distance[..., None]
         flat = direction.reshape(-1, 3).astype(np.float32)
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
-        free = np.concatenate(
-            [
-                trace_from(geometry.embree, start[k : k + _RAYS_AT_ONCE], flat[k : k + _RAYS_AT_ONCE]).distance
-                for k in range(0, len(flat), _RAYS_AT_ONCE)
-            ]
-        ).reshape(distance.shape)
+        free = free_distance(geometry, start, flat).reshape(distance.shape)
         is_seen = free > distance - _SLACK * geometry.epsilon - 1e-5 * distance
         return Arriving(direction, (factor * is_seen)[..., None] * np.array(self.look.gain))
 
@@ -97,6 +93,12 @@ def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
         if any(light.gain) and not is_dark:
             lamps.append(LocalLamp(light, triangles, is_two_sided))
     return lamps
+
+
+def free_distance(geometry: Geometry, start: F32, direction: F32) -> F32:
+    """How far rays from points fly, infinite where nothing is hit. start, direction: (n, 3). Returns: (n,) float32"""
+    some = (slice(k, k + _RAYS_AT_ONCE) for k in range(0, len(direction), _RAYS_AT_ONCE))
+    return np.concatenate([trace_from(geometry.embree, start[rows], direction[rows]).distance for rows in some])
 
 
 def emission_of(lamps: Sequence[LocalLamp], material: str) -> F64:

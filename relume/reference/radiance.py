@@ -16,7 +16,8 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.parallel import for_steps
 from relume.reference.kernel import add_lights, list_visible
-from relume.reference.local import Arriving, LocalLamp
+from relume.reference.lobes import Lobe, cosine_lobe, lobe_of
+from relume.reference.local import Arriving, LocalLamp, free_distance
 from relume.reference.texels import Texels
 from relume.trace.geometry import Geometry
 from relume.trace.visibility import trace_visibility
@@ -30,6 +31,7 @@ _POINTS_A_PACKET = 16  # neighbours that Embree traces together; where texels ar
 _TEXELS_AT_ONCE = 8192
 _MOST_OF_LAMP = 4096  # places of a local light, where every texel is asked for
 _SEED = 2006
+_COSINE_SHARE, _LOBES_SHARE = 1 / 8, 1 / 4  # of the texels drawn: so many directions more by the cosine and by lobes
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,12 @@ class Points:
     def num_points(self) -> int:
         """n."""
         return len(self.position)
+
+    def frames(self) -> F64:
+        """To the local frames, z = normal, x = tangent. (n, 3, 3)"""
+        normal = self.normal / np.linalg.norm(self.normal.astype(np.float64), axis=1, keepdims=True)
+        tangent = self.tangent / np.linalg.norm(self.tangent.astype(np.float64), axis=1, keepdims=True)
+        return np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
 
     def rows(self, index: slice | NDArray[np.intp]) -> Points:
         """Some of the points."""
@@ -107,8 +115,8 @@ def reference_radiance(
 
     Args:
         materials: of each its terms, as they stand in a complete look.
-        spp: texels drawn by power for each point, and places drawn of each lamp that has an extent; 0, or as many as
-            there are, for all texels.
+        spp: texels drawn by power for each point, with some directions more by how the materials reflect, and places
+            drawn of each lamp that has an extent; 0, or as many as there are, for the middles of all texels.
         pass_index: passes with other indices draw independently.
     Returns:
         (materials, n, 3) float64
@@ -117,16 +125,17 @@ def reference_radiance(
     Cost: O(n · min(spp, texels) · (log triangles + terms)) time; some MB of memory a thread.
     """
     tables = [[_tabulate(document) for document in terms] for terms in materials]
+    lobes = _lobes_of(tables, spp) if 0 < spp < texels.num_texels else []
     radiance = np.zeros((len(materials), points.num_points, 3))
 
     def packet(start: int, stop: int) -> None:
-        lights = texels
-        if 0 < spp < texels.num_texels:
-            lights = texels.chosen(spp, np.random.default_rng((_SEED, pass_index, start)))
         some = points.rows(slice(start, stop))
-        for first in range(0, lights.num_texels, _TEXELS_AT_ONCE):
+        if lobes:
+            rng = np.random.default_rng((_SEED, pass_index, start))
+            _add_drawn(geometry, texels, spp, lobes, some, tables, rng, radiance[:, start:stop])
+        for first in range(0, 0 if lobes else texels.num_texels, _TEXELS_AT_ONCE):
             rows = slice(first, first + _TEXELS_AT_ONCE)
-            _add_texels(geometry, lights.direction[rows], lights.power[rows], some, tables, radiance[:, start:stop])
+            _add_texels(geometry, texels.direction[rows], texels.power[rows], some, tables, radiance[:, start:stop])
         rng = np.random.default_rng((_SEED, pass_index, start, 1))
         for lamp in lamps:
             arriving = lamp.arriving(geometry, some.position.astype(np.float64), spp or _MOST_OF_LAMP, rng)
@@ -144,6 +153,49 @@ def _add_texels(
     visible = trace_visibility(geometry.embree, points.position, points.normal, towards).visible
     for p in range(points.num_points):
         _add_lights(points, p, direction, power, visible[p], tables, out[:, p])
+
+
+def _lobes_of(tables: Sequence[Sequence[_Tables]], spp: int) -> list[tuple[Lobe, int]]:
+    """What reflects much of the materials, and how many directions are drawn of each."""
+    narrow = []
+    for table in (table for terms in tables for table in terms):
+        curves = [curve for curve in table.term.curves if not curve.outgoing]
+        for curve, values in zip(curves, table.values, strict=True):
+            if (lobe := lobe_of(curve.angle, curve.axes, values.mean(axis=0))) is not None:
+                narrow.append(lobe)
+    each = max(1, round(_LOBES_SHARE * spp / max(1, len(narrow))))
+    return [(cosine_lobe(), max(1, round(_COSINE_SHARE * spp))), *((lobe, each) for lobe in narrow)]
+
+
+def _add_drawn(
+    geometry: Geometry,
+    texels: Texels,
+    spp: int,
+    lobes: Sequence[tuple[Lobe, int]],
+    points: Points,
+    tables: Sequence[Sequence[_Tables]],
+    rng: np.random.Generator,
+    out: F64,
+) -> None:
+    """Add the environment's light to a packet of points: directions drawn by power, which they share, and directions
+    drawn of each point's lobes; each is divided by how often all of them together draw it. out: (materials, points, 3)
+    """
+    frames = points.frames()
+    wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
+    shared = texels.drawn(spp, rng)
+    seen = trace_visibility(geometry.embree, points.position, points.normal, shared.astype(np.float32)).visible
+    is_seen = np.unpackbits(seen, axis=1, count=spp, bitorder="little").astype(bool)
+    own = np.concatenate([lobe.draw(wo, num, rng) for lobe, num in lobes], axis=1)
+    wi = np.concatenate([np.einsum("nij,mj->nmi", frames, shared), own], axis=1)
+    own = np.einsum("nji,nmj->nmi", frames, own)
+    starts = np.repeat(points.position, own.shape[1], axis=0)
+    free = free_distance(geometry, starts, own.reshape(-1, 3).astype(np.float32)).reshape(own.shape[:2])
+    is_free = np.concatenate([is_seen, np.isinf(free)], axis=1)
+    direction = np.concatenate([np.broadcast_to(shared, (points.num_points, *shared.shape)), own], axis=1)
+    radiance, density = texels.radiance(direction)
+    expected = spp * density + sum(num * lobe.density_of(wi, wo) for lobe, num in lobes)
+    power = radiance * (is_free / np.maximum(expected, 1e-300))[..., None]
+    _add_lamp(Arriving(direction, power), points, tables, out)
 
 
 def _add_lamp(arriving: Arriving, points: Points, tables: Sequence[Sequence[_Tables]], out: F64) -> None:

@@ -1,8 +1,13 @@
 """How true a frame is: its difference from brute force, with the noise of brute force told apart from it.
 
-Independent passes x_1 … x_n of the reference give, per pixel, a mean m and the variance s²/n of that mean. Then
-E (f − m)² = (f − E m)² + s²/n, so that the frame's own error is what is left when the noise is taken off. A pixel
-differs significantly where |f − m| / (s/√n) is beyond Student's t with n − 1 degrees of freedom.
+Passes of the reference are independent, but their noise has heavy tails: that a highlight finds a small light is rare,
+and bright. So nothing here trusts a table of Student's t. Passes are added up in batches, and the batches say by
+themselves how far noise alone carries their mean: with the signs of half of them turned, the truth cancels and noise of
+the same spread is left. What a frame differs by, over its own noise, is compared with what such turned batches give,
+over pixels and over blocks of them, and the largest set is called different of which at most `CHANCE` is so by chance
+(the false discovery rate of Benjamini and Hochberg 1995, counted as with decoys, Elias and Gygi 2007).
+
+All that is said of a frame follows from that set: where it is empty no error was found, however large the differences.
 """
 
 from __future__ import annotations
@@ -11,14 +16,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.ndimage import uniform_filter
 
 from relume.color import luminance
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
-SIGNIFICANCE = 0.01  # of the pixels of a perfect frame are called different
+CHANCE = 0.01  # of what is called different, at most
+_BLOCKS = (1, 4, 16)  # pixels across
+_TURNS = 16  # of the batches' signs
+_SEED = 1995
+_MOST_BATCHES, _FEWEST_BATCHES, _BATCH_BYTES = 16, 4, 256 << 20
+_ROUNDING = 1e-6  # of float32, relative: no difference
 _FULL_COLOUR_STOPS = 0.25
 _DARK = 0.01  # of the picture's mean: darker than that, stops say nothing
 _GREY, _TOO_BRIGHT, _TOO_DARK = (np.array(c, float) for c in ((56, 56, 56), (235, 94, 52), (66, 135, 245)))
@@ -26,37 +37,39 @@ _GREY, _TOO_BRIGHT, _TOO_DARK = (np.array(c, float) for c in ((56, 56, 56), (235
 
 @dataclass(frozen=True)
 class Estimate:
-    """Sums over passes of the reference.
+    """Passes of the reference, added up in batches: pass k in batch k modulo their number.
 
     Attributes:
-        total, squares: of red, green, blue and luminance. (height, width, 4) float64
+        sums: of red, green and blue. (batches, height, width, 3) float32
         passes: number of them.
     """
 
-    total: F64
-    squares: F64
+    sums: F32
     passes: int
 
     @classmethod
     def nothing(cls, height: int, width: int) -> Estimate:
-        """No pass yet."""
-        return cls(np.zeros((height, width, 4)), np.zeros((height, width, 4)), 0)
+        """No pass yet; so many batches that they take a bounded part of the memory."""
+        fitting = _BATCH_BYTES // max(1, 12 * height * width)
+        num = min(max(fitting, _FEWEST_BATCHES), _MOST_BATCHES)
+        return cls(np.zeros((num, height, width, 3), np.float32), 0)
 
-    def with_pass(self, picture: F32) -> Estimate:
-        """One more pass. picture: (height, width, 3)"""
-        values = _with_luminance(picture)
-        return Estimate(self.total + values, self.squares + values**2, self.passes + 1)
-
-    @property
-    def mean(self) -> F64:
-        """(height, width, 4)"""
-        return self.total / self.passes
+    def add(self, picture: F32) -> Estimate:
+        """One more pass, (height, width, 3); what this estimate held is the new one's."""
+        self.sums[self.passes % len(self.sums)] += picture
+        return Estimate(self.sums, self.passes + 1)
 
     @property
-    def variance(self) -> F64:
-        """Of the mean; at least two passes are needed. (height, width, 4)"""
-        spread = np.maximum(self.squares - self.total**2 / self.passes, 0.0)
-        return spread / (self.passes - 1) / self.passes
+    def means(self) -> F32:
+        """Of each batch that has a pass. (batches, height, width, 3)"""
+        num = min(self.passes, len(self.sums))
+        count = self.passes // len(self.sums) + (np.arange(num) < self.passes % len(self.sums))
+        return np.asarray(self.sums[:num] / count.astype(np.float32)[:, None, None, None])
+
+    @property
+    def mean(self) -> F32:
+        """Of all passes. (height, width, 3)"""
+        return np.asarray(self.sums.sum(axis=0, dtype=np.float64) / self.passes, np.float32)
 
 
 @dataclass(frozen=True)
@@ -64,49 +77,152 @@ class Comparison:
     """A frame against an estimate of the truth, each relative to the truth's root mean square over pixels and channels.
 
     Attributes:
-        rmse: of the difference, noise included. noise: of the estimate. error: of the frame, noise taken off.
-        significant: share of pixels that differ significantly; `SIGNIFICANCE` of them would by chance.
+        rmse: of the difference, noise included. noise: of the estimate.
+        error: of the frame, noise taken off; None where that cannot be told from the noise.
+        limit: what the error is very likely below.
+        significant: share of pixels that differ by more than noise explains; at most `CHANCE` of these by chance.
     """
 
     rmse: float
     noise: float
-    error: float
+    error: float | None
+    limit: float
     significant: float
 
 
-def compare(frame: F32, estimate: Estimate) -> Comparison:
-    """Compare a frame, (height, width, 3), with an estimate of at least two passes."""
-    mean, variance = estimate.mean[..., :3], estimate.variance[..., :3]
-    scale = max(float(np.mean(mean**2)), 1e-300)
-    square, noise = float(np.mean((frame - mean) ** 2)), float(np.mean(variance))
-    return Comparison(
-        rmse=float(np.sqrt(square / scale)),
-        noise=float(np.sqrt(noise / scale)),
-        error=float(np.sqrt(max(0.0, square - noise) / scale)),
-        significant=float(np.mean(_is_significant(frame, estimate))),
+def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
+    """Compare a frame, (height, width, 3), with an estimate of at least two passes.
+
+    Returns:
+        The figures, and which pixels differ. (height, width)
+    """
+    means = estimate.means
+    differs = _different(frame, means)
+    num = len(means)
+    mean_square = float(np.mean(means.mean(axis=0, dtype=np.float64) ** 2))
+    gram = _gram(frame, means) / max(mean_square, 1e-300)
+    square = float(gram.mean())
+    noise = max(0.0, (float(np.trace(gram)) / num - square) / (num - 1))
+    error, deviation = _error_squared(gram)
+    is_told = bool(differs.any()) and error > 2 * deviation
+    figures = Comparison(
+        rmse=float(np.sqrt(square)),
+        noise=float(np.sqrt(noise)),
+        error=float(np.sqrt(error)) if is_told else None,
+        limit=float(np.sqrt(max(0.0, error) + 2 * deviation)),
+        significant=float(differs.mean()),
     )
+    return figures, differs
 
 
-def error_map(frame: F32, estimate: Estimate) -> NDArray[np.uint8]:
+def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8]:
     """Where the frame is too bright (orange) or too dark (blue), in full colour from a quarter of a stop on.
 
-    Pixels whose difference the noise explains are grey. Returns: (height, width, 3)
+    Args:
+        differs: as `compare` has found it; all other pixels are grey.
+    Returns:
+        (height, width, 3)
     """
-    mean = estimate.mean[..., 3]
+    mean = luminance(estimate.mean).astype(np.float64)
     floor = _DARK * max(float(mean.mean()), 1e-300)
-    stops = np.log2((_with_luminance(frame)[..., 3] + floor) / (mean + floor))
-    amount = np.clip(np.abs(stops) / _FULL_COLOUR_STOPS, 0.0, 1.0) * _is_significant(frame, estimate)
+    stops = np.log2((luminance(frame).astype(np.float64) + floor) / (mean + floor))
+    amount = np.clip(np.abs(stops) / _FULL_COLOUR_STOPS, 0.0, 1.0) * differs
     colour = np.where(stops[..., None] > 0, _TOO_BRIGHT, _TOO_DARK)
     return np.asarray(_GREY + amount[..., None] * (colour - _GREY) + 0.5, np.uint8)
 
 
-def _is_significant(frame: F32, estimate: Estimate) -> NDArray[np.bool_]:
-    """By luminance. Rounding of float32 is no difference. (height, width)"""
-    mean, deviation = estimate.mean[..., 3], np.sqrt(estimate.variance[..., 3])
-    limit = float(student.ppf(1.0 - SIGNIFICANCE / 2, estimate.passes - 1))
-    difference = np.abs(_with_luminance(frame)[..., 3] - mean)
-    return np.asarray(difference > np.maximum(limit * deviation, 1e-6 * np.abs(mean)))
+def _gram(frame: F32, means: F32) -> F64:
+    """Mean products of the batches' differences from the frame, over pixels and channels. (batches, batches)"""
+    differences = (frame[None] - means).reshape(len(means), -1)
+    step, total = 1 << 20, np.zeros((len(means), len(means)))
+    for start in range(0, differences.shape[1], step):
+        some = differences[:, start : start + step].astype(np.float64)
+        total += some @ some.T
+    return total / differences.shape[1]
 
 
-def _with_luminance(picture: F32) -> F64:
-    return np.concatenate([picture, luminance(picture)[..., None]], axis=-1).astype(np.float64)
+def _error_squared(gram: F64) -> tuple[float, float]:
+    """The frame's own error, squared, and its standard deviation: products of different batches have no noise in
+    their mean, and leaving each batch out in turn tells how they scatter."""
+    num = len(gram)
+    all_pairs = gram.sum() - np.trace(gram)
+    error = float(all_pairs / (num * (num - 1)))
+    if num == 2:
+        return error, float(np.trace(gram) / 4)
+    without = (all_pairs - 2 * (gram.sum(axis=1) - np.diag(gram))) / ((num - 1) * (num - 2))
+    return error, float(np.sqrt((num - 1) * np.mean((without - without.mean()) ** 2)))
+
+
+def _different(frame: F32, means: F32) -> Mask:
+    """Pixels that differ by themselves, or else as part of a block of such as do not. (height, width)"""
+    height, width = frame.shape[:2]
+    batches, shown = luminance(means), luminance(frame)
+    found = np.zeros((height, width), np.bool_)
+    for size in _BLOCKS:
+        of = (~found).astype(np.float64)
+        blocks = _discovered(_block_means(shown, of, size), np.stack([_block_means(b, of, size) for b in batches]))
+        found |= np.repeat(np.repeat(blocks, size, axis=0), size, axis=1)[:height, :width]
+    return found
+
+
+def _block_means(values: F32, of: F64, size: int) -> F64:
+    """Means over blocks of size × size, weighted by `of`; 0 where that is. values, of: (h, w). Returns: (rows, columns)
+    """
+    rows, columns = (np.arange(0, length, size) for length in values.shape)
+    sums, weights = (
+        np.add.reduceat(np.add.reduceat(each, rows, axis=0), columns, axis=1) for each in (values * of, of)
+    )
+    return np.asarray(sums / np.maximum(weights, 1e-300))
+
+
+def _discovered(shown: F64, batches: F64) -> Mask:
+    """Blocks that differ; none where there are too few batches. shown: (rows, columns). batches: (n, rows, columns)"""
+    num = len(batches)
+    if num < _FEWEST_BATCHES:
+        return np.zeros(shown.shape, np.bool_)
+    mean = batches.mean(axis=0)
+    around = batches - mean
+    squares = (around**2).sum(axis=0)
+    found = _over_noise(shown - mean, squares / (num * (num - 1)), mean)
+    by_chance = []
+    for turn in _turns(num):
+        noise = np.tensordot(turn, around, 1)
+        rest = np.maximum(squares - num * noise**2, 0.0)  # what is left of the spread does not depend on this noise
+        by_chance.append(_over_noise(noise, rest / (num * (num - 2)), mean))
+    return found >= _threshold(found.ravel(), np.concatenate(by_chance, axis=None))
+
+
+def _over_noise(difference: F64, variance: F64, mean: F64) -> F64:
+    """How many standard deviations a difference is; 0 where it is rounding. Arguments: (rows, columns)
+
+    An event that neighbours have seen may have been missed here: their variance counts too, scaled to this brightness.
+    """
+    square = mean**2 + 1e-300
+    around = square * uniform_filter(variance / square, 3, mode="nearest")
+    least = _ROUNDING * np.abs(mean) + 1e-300
+    size, deviation = np.abs(difference), np.sqrt(np.maximum(variance, around))
+    return np.asarray(np.where(size > least, size / np.maximum(deviation, least), 0.0))
+
+
+def _turns(num: int) -> list[F64]:
+    """Weights of batches by which their means cancel and their noise has that of the mean of all. (num,) each"""
+    rng = np.random.default_rng((_SEED, num))
+    turns = []
+    for _ in range(_TURNS):
+        signs = rng.permutation(np.where(np.arange(num) % 2 == 0, 1.0, -1.0))
+        signs -= signs.mean()
+        turns.append(signs / np.sqrt(num * (signs**2).sum()))
+    return turns
+
+
+def _threshold(found: F64, by_chance: F64) -> float:
+    """The least value from which on at most `CHANCE` of those found are expected by chance; infinite if there is none.
+
+    Args:
+        by_chance: of so many trials as `_turns` has.
+    """
+    values = np.sort(found[found > 0])
+    num_found = len(values) - np.arange(len(values))
+    num_by_chance = len(by_chance) - np.searchsorted(np.sort(by_chance), values, side="left")
+    fitting = np.nonzero((num_by_chance + 1) / _TURNS <= CHANCE * num_found)[0]
+    return float(values[fitting[0]]) if len(fitting) else np.inf

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from server.bodies import Id, TruthBody, TruthFigures, TruthRequest
+from server.bodies import Id, TruthBody, TruthFigures, TruthPlanBody, TruthRequest
 from server.errors import NotReadyError
 from server.live.ports import Transfer
 from server.routes.bakes import ready_bake
@@ -20,12 +20,16 @@ from server.truths import TruthStatus
 router = APIRouter(prefix="/api/truths", tags=["truths"])
 
 
-@router.post("", status_code=202)
-async def submit_truth(request: TruthRequest, services: Shared, response: Response) -> TruthBody:
-    """Queue a comparison; the look is checked first."""
+@router.post("", status_code=202, responses={200: {"model": TruthPlanBody, "description": "A dry run's answer"}})
+async def submit_truth(request: TruthRequest, services: Shared, response: Response) -> TruthBody | TruthPlanBody:
+    """Queue a comparison, or say how long it would take; the look is checked first."""
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
         await run_in_threadpool(_check, request, transfer)
+        if request.dry_run:
+            response.status_code = 200
+            seconds = await run_in_threadpool(services.truths.seconds, request, transfer)
+            return TruthPlanBody(passes=request.passes, seconds=seconds)
     identity = await run_in_threadpool(services.truths.submit, request)
     response.headers["Location"] = f"/api/truths/{identity}"
     return _body(await run_in_threadpool(services.truths.get, identity))
@@ -43,10 +47,17 @@ def get_truth(truth: Id, services: Shared) -> TruthBody:
 
 
 @router.delete("/{truth}", status_code=204)
-def delete_truth(truth: Id, services: Shared) -> Response:
-    """Stop a comparison and forget it."""
-    services.truths.delete(truth)
+def stop_truth(truth: Id, services: Shared, forget: bool = False) -> Response:
+    """Stop a comparison; what was found so far is kept, unless `forget` says that nobody needs it."""
+    (services.truths.delete if forget else services.truths.stop)(truth)
     return Response(status_code=204)
+
+
+@router.post("/{truth}/resume", status_code=202)
+def resume_truth(truth: Id, services: Shared) -> TruthBody:
+    """Go on with a comparison that was stopped, after its last finished pass."""
+    services.truths.resume(truth)
+    return _body(services.truths.get(truth))
 
 
 @router.get("/{truth}/{name}.png", response_class=FileResponse)
@@ -69,6 +80,7 @@ def _body(status: TruthStatus) -> TruthBody:
         passes=status.passes,
         total=status.request.passes,
         progress=status.progress,
+        seconds_left=status.seconds_left,
         found=found,
         problem=status.problem,
     )

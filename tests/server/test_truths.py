@@ -45,6 +45,7 @@ def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Co
     assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
     # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth
     assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
+    assert body["found"]["error"] < body["found"]["limit"] < 0.11
     assert body["found"]["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
     assert body["found"]["significant"] > 0.99
     error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/error.png").content)), int)
@@ -63,7 +64,8 @@ def test_comparison_goes_on_after_a_restart(
     queue = client.app.state.services.truths
     identity = url.rsplit("/", 1)[1]
     request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
-    queue._backlog._update(identity, state="running", request=request)  # as a kill after three passes leaves it
+    # as a kill after three passes leaves it
+    queue._backlog._update(identity, ("ready",), state="running", request=request)
     later = Control()
     later.may_trace.set()
     with TestClient(create_app(settings, open_library=later.open_library)) as restarted:
@@ -75,12 +77,47 @@ def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, contr
     url = submit(client, baked, 1000)
     wait_until(client, url, lambda body: body["state"] == "running")
     assert client.get(f"{url}/error.png").status_code == 409
-    assert client.delete(url).status_code == 204
+    assert client.delete(url, params={"forget": True}).status_code == 204
     assert client.get(url).status_code == 404
     control.may_trace.set()  # the next one is worked on
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
     folder = client.app.state.services.settings.data / "truths"
     assert len(list(folder.iterdir())) == 1
+
+
+def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 1000)
+    wait_until(client, url, lambda body: body["passes"] >= 3 and body["found"] is not None)
+    assert client.delete(url).status_code == 204
+    stopped = client.get(url).json()
+    assert (stopped["state"], stopped["seconds_left"]) == ("stopped", None)
+    assert stopped["found"]["noise"] > 0
+    assert client.get(f"{url}/error.png").status_code == 200
+    assert client.delete(url).status_code == 204  # again: nothing more to stop
+    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next one has its turn
+    passes = client.get(url).json()["passes"]
+    resumed = client.post(f"{url}/resume")
+    assert (resumed.status_code, resumed.json()["state"]) == (202, "queued")
+    on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
+    assert on["seconds_left"] > 0
+    assert len(control.passes_asked) - len(set(control.passes_asked)) <= 3  # no finished pass was made again
+    assert client.delete(url, params={"forget": True}).status_code == 204
+    assert client.post(f"{url}/resume").status_code == 404
+
+
+def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    request = {"bake": baked.bake, "view": "front", "passes": 10, "dry_run": True}
+    planned = client.post("/api/truths", json=request)
+    assert planned.status_code == 200
+    assert planned.json()["passes"] == 10
+    assert planned.json()["seconds"] > 0
+    assert len(control.passes_asked) == 1  # a small picture; the second time its pace is known
+    again = client.post("/api/truths", json=request | {"passes": 20}).json()
+    assert again["seconds"] == pytest.approx(2 * planned.json()["seconds"])
+    assert len(control.passes_asked) == 1
+    assert client.post("/api/truths", json=request | {"view": "nowhere"}).status_code == 422
 
 
 @pytest.mark.parametrize(

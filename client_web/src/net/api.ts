@@ -17,6 +17,7 @@ import type {
   ShareRequest,
   Term,
   TruthBody,
+  TruthPlanBody,
   TruthRequest,
 } from "../protocol";
 
@@ -125,8 +126,19 @@ export async function startTruth(body: TruthRequest): Promise<TruthBody> {
   return (await (await request("/api/truths", json("POST", body))).json()) as TruthBody;
 }
 export const getTruth = (id: string) => get<TruthBody>(truthPath(id));
-export async function deleteTruth(id: string): Promise<void> {
+/** How long a comparison would take; nothing is begun. */
+export async function planTruth(body: TruthRequest): Promise<TruthPlanBody> {
+  return (await (await request("/api/truths", json("POST", { ...body, dry_run: true }))).json()) as TruthPlanBody;
+}
+/** Its passes so far are kept. */
+export async function stopTruth(id: string): Promise<void> {
   await request(truthPath(id), { method: "DELETE" });
+}
+export async function resumeTruth(id: string): Promise<TruthBody> {
+  return (await (await request(`${truthPath(id)}/resume`, { method: "POST" })).json()) as TruthBody;
+}
+export async function forgetTruth(id: string): Promise<void> {
+  await request(`${truthPath(id)}?forget=true`, { method: "DELETE" });
 }
 /** The address of a comparison's picture as it is after so many passes. */
 export const truthPicture = (id: string, name: "error" | "reference", passes: number) =>

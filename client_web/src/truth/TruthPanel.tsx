@@ -2,8 +2,8 @@
 import { useState } from "preact/hooks";
 import { truthPicture } from "../net/api";
 import { IconButton } from "../ui/Button";
-import { askTruth, judged, toggleTruth, truth } from "./truth";
-import { findings, progressWords } from "./words";
+import { askTruth, goOnWithTruth, haltTruth, isGoingOn, judged, toggleTruth, truth, truthPlan } from "./truth";
+import { findings, planWords, progressWords } from "./words";
 
 const PICTURES = [
   ["error", "Error"],
@@ -20,6 +20,19 @@ function Scale() {
   );
 }
 
+/** What can be done now: begin, stop, go on, begin again. */
+function Steps({ isOld }: { isOld: boolean }) {
+  const body = truth.value?.body;
+  if (body === undefined) return <button onClick={() => void askTruth()}>Begin</button>;
+  return (
+    <div class="group" role="group" aria-label="Comparison">
+      {isGoingOn(body) && <button onClick={() => void haltTruth()}>Stop</button>}
+      {body.state === "stopped" && <button onClick={() => void goOnWithTruth()}>Go on</button>}
+      <button onClick={() => void askTruth()}>{isOld ? "Ask again for this look" : "Begin again"}</button>
+    </div>
+  );
+}
+
 export function TruthPanel() {
   const [shown, setShown] = useState<"error" | "reference">("error");
   const body = truth.value?.body;
@@ -30,12 +43,16 @@ export function TruthPanel() {
         <h2>How true is this?</h2>
         <IconButton icon="close" label="Close" onClick={toggleTruth} />
       </header>
+      {body === undefined && (
+        <>
+          <p>Compares the picture with one made the slow way, by a ray for every light that is drawn.</p>
+          <p role="status">{truthPlan.value === null ? "Finding out how long it takes…" : planWords(truthPlan.value)}</p>
+        </>
+      )}
       {body !== undefined && (
         <>
           <p>{progressWords(body)}</p>
-          {body.state !== "ready" && body.state !== "failed" && (
-            <progress max={1} value={body.progress} aria-label="Brute force" />
-          )}
+          {isGoingOn(body) && <progress max={1} value={body.progress} aria-label="Brute force" />}
           {body.found !== null && (
             <>
               <img src={truthPicture(body.id, shown, body.passes)} alt={shown === "error" ? "Error map" : "Brute force"} />
@@ -57,7 +74,7 @@ export function TruthPanel() {
         </>
       )}
       {isOld && <p class="truth-old">The look has changed since.</p>}
-      <button onClick={() => void askTruth()}>{isOld ? "Ask again for this look" : "Begin again"}</button>
+      <Steps isOld={isOld} />
     </aside>
   );
 }

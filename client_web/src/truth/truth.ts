@@ -1,7 +1,7 @@
 /** "How true is this?": one comparison of the picture with brute force, followed while its panel is open. */
 import { signal } from "@preact/signals";
-import { deleteTruth, getTruth, startTruth } from "../net/api";
-import type { TruthBody } from "../protocol";
+import { forgetTruth, getTruth, planTruth, resumeTruth, startTruth, stopTruth } from "../net/api";
+import type { TruthBody, TruthPlanBody, TruthRequest } from "../protocol";
 import { truthOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
 import { seenOf } from "../state/solo";
@@ -10,6 +10,8 @@ import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;
 
+/** What a comparison would take; null while that is not known. */
+export const truthPlan = signal<TruthPlanBody | null>(null);
 /** The comparison, and the look that it judges. */
 export const truth = signal<{ body: TruthBody; look: string } | null>(null);
 
@@ -19,7 +21,7 @@ export function judged(): string {
   return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: viewName.value, seen });
 }
 
-function isGoingOn(body: TruthBody): boolean {
+export function isGoingOn(body: TruthBody): boolean {
   return body.state === "queued" || body.state === "running";
 }
 
@@ -33,26 +35,57 @@ async function follow(id: string): Promise<void> {
   }
 }
 
-export async function askTruth(): Promise<void> {
+function asked(): TruthRequest | null {
   const [id, current] = [bake.value, look.value];
-  if (id === null || current === null) return;
-  await forgetTruth();
+  return id === null || current === null ? null : { bake: id, view: viewName.value, look: { ...seenOf(current) } };
+}
+
+/** Say how long it would take; nothing begins. */
+async function plan(): Promise<void> {
+  const request = asked();
+  truthPlan.value = null;
+  if (request !== null) await attempt(async () => (truthPlan.value = await planTruth(request)));
+}
+
+export async function askTruth(): Promise<void> {
+  const request = asked();
+  if (request === null) return;
+  await forget();
   await attempt(async () => {
-    const body = await startTruth({ bake: id, view: viewName.value, look: { ...seenOf(current) } });
+    const body = await startTruth(request);
     truth.value = { body, look: judged() };
     await follow(body.id);
   });
 }
 
+/** Stop; what was found so far stays. */
+export async function haltTruth(): Promise<void> {
+  const known = truth.value;
+  if (known === null) return;
+  await attempt(async () => {
+    await stopTruth(known.body.id);
+    truth.value = { ...known, body: await getTruth(known.body.id) };
+  });
+}
+
+export async function goOnWithTruth(): Promise<void> {
+  const known = truth.value;
+  if (known === null) return;
+  await attempt(async () => {
+    truth.value = { ...known, body: await resumeTruth(known.body.id) };
+    await follow(known.body.id);
+  });
+}
+
 /** Stop the server's work: nobody looks at it any more. */
-async function forgetTruth(): Promise<void> {
+async function forget(): Promise<void> {
   const known = truth.value;
   truth.value = null;
-  if (known !== null) await deleteTruth(known.body.id).catch(() => undefined); // it may have ended by itself
+  if (known !== null) await forgetTruth(known.body.id).catch(() => undefined); // it may have ended by itself
 }
 
 export function toggleTruth(): void {
   const before = truthOpen.value;
   togglePanel("truth");
-  if (truthOpen.value !== before) void (truthOpen.value ? askTruth() : forgetTruth());
+  if (truthOpen.value !== before) void (truthOpen.value ? plan() : forget());
 }

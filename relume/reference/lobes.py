@@ -1,0 +1,110 @@
+"""Directions in which a term reflects much: drawn beside those of lights, so that neither a narrow highlight under a
+wide sky nor a small sun above a dull floor is left to chance.
+
+Local frame, z = normal. The density of a lobe is that of one of the term's own curves, constant between entries of its
+table; what is drawn by any of several lobes is weighed by the densities of all (Veach and Guibas 1995).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Angle
+
+F64 = NDArray[np.float64]
+
+_HALF_ANGLES = (Angle.THETA_H, Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
+_MIRRORED = (-1.0, -1.0, 1.0)
+_NEVER = 1e-300
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """Directions, or half vectors, about an axis.
+
+    Attributes:
+        axes: what multiplies wo, axis by axis, to make the axis; None: the normal.
+        is_half: half vectors are drawn and wo is mirrored by them.
+        share: running sum over equal steps of the angle from the axis, 0 first, 1 last. (steps + 1,) float64
+        density: within each step, per steradian. (steps,) float64
+    """
+
+    axes: tuple[float, float, float] | None
+    is_half: bool
+    share: F64
+    density: F64
+
+    def draw(self, wo: F64, num: int, rng: np.random.Generator) -> F64:
+        """`num` directions for each wo (n, 3), some of them below the horizon. (n, num, 3)"""
+        strata = (np.arange(num) + rng.random((len(wo), num))) / num
+        step = np.minimum(np.searchsorted(self.share, strata, side="right") - 1, len(self.density) - 1)
+        low, high = (np.cos(edge * 0.5 * np.pi / len(self.density)) for edge in (step, step + 1))
+        cosine = low + rng.random(step.shape) * (high - low)
+        sine, phi = np.sqrt(np.maximum(0.0, 1 - cosine**2)), 2 * np.pi * rng.random(step.shape)
+        around = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+        if self.axes is not None:
+            return _turned(around, self._axis(wo))
+        if not self.is_half:
+            return np.asarray(around)
+        return np.asarray(2 * np.einsum("nmc,nc->nm", around, wo)[..., None] * around - wo[:, None])
+
+    def density_of(self, wi: F64, wo: F64) -> F64:
+        """Per steradian, of directions wi (n, m, 3) for wo (n, 3). (n, m)"""
+        if not self.is_half:
+            cosine = wi[..., 2] if self.axes is None else np.einsum("nmc,nc->nm", wi, self._axis(wo))
+            return self._at(cosine)
+        half = wi + wo[:, None]
+        length = np.maximum(np.linalg.norm(half, axis=-1), 1e-12)
+        return np.asarray(self._at(half[..., 2] / length) / (2 * length))  # |wi + wo| = 2 cos θd
+
+    def _axis(self, wo: F64) -> F64:
+        axis = wo * np.array(self.axes)
+        return np.asarray(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), _NEVER))
+
+    def _at(self, cosine: F64) -> F64:
+        """The density at an angle from the axis; none beyond 90°."""
+        angle = np.arccos(np.clip(cosine, 0.0, 1.0))
+        step = np.minimum((angle * (len(self.density) / (0.5 * np.pi))).astype(np.intp), len(self.density) - 1)
+        return np.asarray(np.where(cosine > 0, self.density[step], 0.0))
+
+
+def cosine_lobe(steps: int = 1024) -> Lobe:
+    """About the normal, as a surface sees light that it scatters everywhere."""
+    edges = np.cos(np.linspace(0.0, 0.5 * np.pi, steps + 1))
+    return _lobe(0.5 * (edges[1:] + edges[:-1]), None, is_half=False)  # type: ignore[return-value]
+
+
+def lobe_of(angle: Angle, axes: tuple[float, float, float], values: F64) -> Lobe | None:
+    """That of a curve; None where it turns with no direction that has a lobe, or is nothing.
+
+    Args:
+        axes: of the curve. values: at equal steps over [0, π/2], the mean of the channels. (steps + 1,)
+    """
+    between = 0.5 * (values[1:] + values[:-1])
+    if angle in _HALF_ANGLES:
+        edges = np.cos(np.linspace(0.0, 0.5 * np.pi, len(values)))
+        return _lobe(between * 0.5 * (edges[1:] + edges[:-1]), None, is_half=True)
+    if angle in (Angle.THETA_R, Angle.LOBE):
+        return _lobe(between, _MIRRORED if angle is Angle.THETA_R else axes, is_half=False)
+    return None
+
+
+def _lobe(values: F64, axes: tuple[float, float, float] | None, *, is_half: bool) -> Lobe | None:
+    edges = np.cos(np.linspace(0.0, 0.5 * np.pi, len(values) + 1))
+    weight = values * 2 * np.pi * (edges[:-1] - edges[1:])
+    total = float(weight.sum())
+    if not total > 0:
+        return None
+    share = np.concatenate([[0.0], np.cumsum(weight) / total])
+    return Lobe(axes, is_half, share / share[-1], values / total)
+
+
+def _turned(around: F64, axis: F64) -> F64:
+    """Directions about +z (n, m, 3) turned to be about unit axes (n, 3)."""
+    other = np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    x = np.cross(other, axis)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.asarray(np.einsum("nmc,ncd->nmd", around, np.stack([x, np.cross(axis, x), axis], axis=1)))

@@ -1,0 +1,31 @@
+"""How true is this? Asked in a browser: how long it takes, what it finds, stopping it, and going on."""
+
+from __future__ import annotations
+
+import re
+
+from editor_page import Editor
+from playwright.sync_api import expect
+
+
+def test_truth_says_how_long_it_takes_and_can_be_stopped_and_gone_on_with(editor: Editor) -> None:
+    page = editor.page
+    page.get_by_role("button", name="How true is this?").click()
+    panel = page.get_by_role("complementary", name="How true is this picture?")
+    expect(panel).to_contain_text(re.compile(r"16 passes of brute force: about \d"))
+    expect(panel.get_by_role("progressbar")).to_have_count(0)  # nothing has begun
+    panel.get_by_role("button", name="Begin", exact=True).click()
+    expect(panel).to_contain_text(re.compile(r"pass \d+ of 16, \d.* left"))
+    expect(panel.get_by_role("img", name="Error map")).to_be_visible()
+    panel.get_by_role("button", name="Stop").press("Enter")
+    expect(panel).to_contain_text(re.compile(r"Stopped after \d+ of 16 passes"))
+    expect(panel.get_by_role("img", name="Error map")).to_be_visible()
+    expect(panel.get_by_role("listitem").last).to_contain_text("The noise of brute force is")
+    said = panel.get_by_role("list").inner_text()
+    assert ("No difference was found" in said) != ("of the pixels differ" in said)
+    assert not ("No difference was found" in said and "errs by" in said)
+    panel.get_by_role("button", name="Go on").press("Enter")
+    expect(panel).to_contain_text(re.compile(r"pass \d+ of 16, \d.* left"))
+    with page.expect_request(lambda request: request.method == "DELETE" and "forget=true" in request.url):
+        panel.get_by_role("button", name="Close").click()
+    expect(panel).to_have_count(0)
