@@ -48,6 +48,7 @@ GROUPS = (
     Group("bench.curve_switch_terms", ("freeze.terms_s",)),
     Group("bench.glimpse", ("glimpse.speedup", "glimpse.error")),
     Group("bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
+    Group("bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),
     Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
     Group(
         "bench.accuracy_terms",

@@ -6,13 +6,12 @@ values of the parameter that span it,
 
     R(p) = Σ_s c_s(p) R(p_s),
 
-with c(p) by least squares, as many as hold the worst relative RMS of the curves over the range, by
-solid angle, to 10⁻³.
+with as many as hold every band of the product to `MAX_ERROR`, and so every pixel
+(docs/adr/0032-nodes-that-hold-every-pixel.md).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -21,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.pca import Nodes, choose_nodes, joint, joint_rows, span
+from relume.basis.nodes import Nodes, choose_nodes
+from relume.basis.pca import joint
 from relume.brdf.curves import curve_bands, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
@@ -37,10 +37,11 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Settings = tuple[tuple[str, float | tuple[float, ...]], ...]
 
-MAX_ERROR = 1e-3
-MAX_NODES = 24
+MAX_ERROR = 2e-2
+MAX_NODES = 32
+_ENOUGH = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
 _NUM_VALUES = 97
-_MAX_PRODUCT = 1 << 15  # dimensions of all moved curves multiplied; 50 MB while nodes are chosen
+_BANDS_BESIDE = 12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
 _SAMPLES_A_STEP = 512
 
 
@@ -51,15 +52,13 @@ class Linearised:
     Attributes:
         others: parameters that move the same curves, with their values.
         curves: those it moves.
-        spans: of each channel's curves, each weighed by solid angle, an orthonormal basis. (r, J) each
-        nodes: of R, G and B, equally many; their curves are `joint` coordinates in the spans.
+        nodes: of R, G and B, equally many; their curves are products of those moved (`_product`).
     """
 
     model: str
     parameter: str
     others: Settings
     curves: tuple[Curve, ...] = field(compare=False)
-    spans: tuple[tuple[F64, ...], ...] = field(compare=False)
     nodes: tuple[Nodes, Nodes, Nodes] = field(compare=False)
 
     is_complete = False
@@ -85,13 +84,9 @@ class Linearised:
 
     def coefficients(self, bands: Mapping[str, F64]) -> F64:
         """c of a term's curves, (3, J) each. (3, S)"""
-        weighed = [bands[curve.name] * solid_angles(curve) for curve in self.curves]
-        return np.array(
-            [
-                nodes.coefficients(joint([basis @ rows[channel] for basis, rows in zip(bases, weighed, strict=True)]))
-                for channel, (nodes, bases) in enumerate(zip(self.nodes, self.spans, strict=True))
-            ]
-        )
+        moved = [bands[curve.name] for curve in self.curves]
+        products = [_product([rows[channel] for rows in moved]) for channel in range(3)]
+        return np.array([nodes.coefficients(curve) for nodes, curve in zip(self.nodes, products, strict=True)])
 
     def bands_at_nodes(self) -> dict[str, F64]:
         """Bands of the moved curves at all nodes. (3, S, J) each"""
@@ -145,7 +140,7 @@ class Linearised:
 
 
 def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:
-    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or 24 are too few."""
+    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or 32 are too few."""
     others = _others(document, parameter)
     return None if others is None else _linearised(document["model"], parameter, others)
 
@@ -168,22 +163,37 @@ def _linearised(model: str, parameter: str, others: Settings) -> Linearised | No
     declared, curves = term.parameter(parameter), moved_curves(term, parameter)
     values = slider_values(declared, _NUM_VALUES)
     between = slider_values(declared, _NUM_VALUES - 1, between=True)
-    weighed = [_weighed(model, others, parameter, curve, np.concatenate([values, between])) for curve in curves]
-    alike = all(bool(np.all(rows == rows[0])) for rows in weighed)
-    spans, chosen = [], []
-    for channel in (0,) if alike else (0, 1, 2):
-        spans.append(tuple(span(rows[channel]) for rows in weighed))
-        if math.prod(len(basis) for basis in spans[-1]) > _MAX_PRODUCT:
-            return None
-        products = joint_rows([rows[channel] @ basis.T for rows, basis in zip(weighed, spans[-1], strict=True)])
-        chosen.append(choose_nodes(values, products[: len(values)], products[len(values) :], MAX_NODES))
-    if any(nodes.errors[-1] > MAX_ERROR for nodes in chosen):
+    documents = [_at(model, others, parameter, (value, value, value)) for value in (*values, *between)]
+    # (n, 3, J) of each curve
+    rows = [np.array([curve_bands(document, curve) for document in documents]) for curve in curves]
+    weights = _product([solid_angles(curve) for curve in curves])
+    alike = all(bool(np.all(of_curve == of_curve[:, :1])) for of_curve in rows)
+    found = _nodes_of_channels(1 if alike else 3, values, rows, weights)
+    if found is None:
         return None
-    num = max(1 + int(np.argmax(nodes.errors <= MAX_ERROR)) for nodes in chosen)
-    if any(len(nodes.values) < num for nodes in chosen):
+    red, green, blue = found * 3 if alike else found
+    return Linearised(model, parameter, others, curves, (red, green, blue))
+
+
+def _nodes_of_channels(num: int, values: F64, rows: Sequence[F64], weights: F64) -> list[Nodes] | None:
+    """Equally many nodes of each channel, as few as are enough; None where `MAX_NODES` are not.
+
+    Args:
+        rows: of each curve, at the values and between them. (2 n − 1, 3, J) each
+    """
+    products = [np.array([_product(bands) for bands in zip(*(r[:, c] for r in rows), strict=True)]) for c in range(num)]
+
+    def chosen(enough: float, most: int) -> list[Nodes]:
+        n = len(values)
+        return [choose_nodes(values, curves[:n], curves[n:], weights, most, enough) for curves in products]
+
+    found = chosen(_ENOUGH, MAX_NODES)
+    if any(nodes.error > _ENOUGH for nodes in found):
         return None
-    red, green, blue = (nodes.first(num) for nodes in (chosen * 3 if alike else chosen))
-    return Linearised(model, parameter, others, curves, tuple(spans * 3 if alike else spans), (red, green, blue))
+    most = max(len(nodes.values) for nodes in found)
+    if any(len(nodes.values) < most for nodes in found):
+        found = chosen(0.0, most)
+    return found
 
 
 def _at(model: str, others: Settings, parameter: str, values: Sequence[float]) -> dict[str, Any]:
@@ -191,8 +201,12 @@ def _at(model: str, others: Settings, parameter: str, values: Sequence[float]) -
     return {"model": model, "params": {**dict(others), parameter: [float(value) for value in values]}}
 
 
-def _weighed(model: str, others: Settings, parameter: str, curve: Curve, values: F64) -> F64:
-    """A curve at values of a parameter, each band weighed by the directions it has: errors are those of light. (3, n,
-    J)"""
-    at_values = [curve_bands(_at(model, others, parameter, (value, value, value)), curve) for value in values]
-    return np.stack(at_values, axis=1) * solid_angles(curve)
+def _product(bands: Sequence[F64]) -> F64:
+    """Products of bands of all moved curves: all of the first, some of each other. (J_1,), … -> (J,)"""
+    first, *beside = bands
+    return joint([first, *(rows[_bands_beside(len(rows))] for rows in beside)])
+
+
+def _bands_beside(num: int) -> NDArray[np.intp]:
+    """Some of so many bands, denser towards the horizon, where masking turns."""
+    return num - np.unique(np.geomspace(1, num, _BANDS_BESIDE).astype(np.intp))
