@@ -49,6 +49,20 @@ def sphere(name, centre, radius, material, rings=12, inside=False):
     return mesh(name, positions, faces, material, normals, tangents, uvs)
 
 
+def torus(name, radius, tube, material, steps=192, around=24, tilt=0.5):
+    """A ring about the origin, smooth normals, its axis tilted from +Y towards the viewer on +Z, radians."""
+    u, v = np.linspace(0, 2 * np.pi, steps + 1), np.linspace(0, 2 * np.pi, around + 1)
+    u, v = (grid.ravel() for grid in np.meshgrid(u, v, indexing="ij"))
+    normals = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=1)
+    positions = radius * np.stack([np.cos(u), 0 * u, np.sin(u)], axis=1) + tube * normals
+    cos, sin = np.cos(tilt), np.sin(tilt)
+    turn = np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
+    a = (np.arange(steps)[:, None] * (around + 1) + np.arange(around)).ravel()
+    b = a + around + 1
+    faces = np.concatenate([np.stack([a, a + 1, b], axis=1), np.stack([a + 1, b + 1, b], axis=1)])
+    return mesh(name, positions @ turn, faces, material, normals @ turn)
+
+
 def looking(name, eye, target, yfov):
     """A camera at `eye` that has `target` in its middle, upright."""
     eye, target = np.asarray(eye, float), np.asarray(target, float)

@@ -1,8 +1,8 @@
 """View samples: the points of a view whose radiance makes its pixels.
 
 One sample a pixel, more where material, normal or depth change across it (docs/method.md, "View samples"): eight
-positions are traced in such a pixel and those that see the same thing are merged into the most central of them: a
-silhouette has eight levels of coverage for two or three samples.
+positions are traced in such a pixel and those that see the same thing, turned alike, are merged into the most central
+of them: a silhouette has eight levels of coverage for a few samples, and thin chrome several reflections.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ BACKGROUND = 65_535
 
 # eight positions that no row or column shares (a rook pattern), pixel units
 _POSITIONS = (np.array([(0, 5), (1, 2), (2, 7), (3, 0), (4, 4), (5, 1), (6, 6), (7, 3)]) + 0.5) / 8
-_COS_EDGE = np.cos(np.radians(20.0))
-_DEPTH_EDGE = 0.02
+_COS_EDGE = np.cos(np.radians(20.0))  # a crease
+_COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
+_DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
+_MOST_TURNING = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
 
 
 @dataclass(frozen=True)
@@ -47,21 +49,46 @@ class ViewSamples:
     num_rays: int
 
 
-def _edges(face: NDArray[np.int32], key: NDArray[np.int64], normal: F32, distance: F32) -> NDArray[np.bool_]:
-    """Pixels that differ from a neighbour. All arguments and the result are (height, width, …)."""
-    edge = np.zeros(face.shape, np.bool_)
+def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) -> tuple[NDArray[np.bool_], F32]:
+    """Pixels that differ from a neighbour, and the least cosine between the normals of each and of its neighbours.
+
+    Args:
+        key: what is hit. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
+    Returns:
+        (height, width) both
+    """
+    edge, cosine = np.zeros(key.shape, np.bool_), np.ones(key.shape, np.float32)
     for axis in (0, 1):
         here = tuple(slice(None, -1) if a == axis else slice(None) for a in (0, 1))
         there = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
-        with np.errstate(invalid="ignore"):  # background is infinitely far: inf - inf
-            depth = np.abs(distance[here] - distance[there]) > _DEPTH_EDGE * np.minimum(distance[here], distance[there])
-        bent = np.einsum("ijk,ijk->ij", normal[here], normal[there]) < _COS_EDGE
-        # a large step in depth along one smooth surface seen at a grazing angle is no edge
-        facing_same = (key[here] == key[there]) & ~bent
-        differs = (key[here] != key[there]) | bent | (depth & ~facing_same)
-        edge[here] |= differs
-        edge[there] |= differs
-    return edge
+        between = np.einsum("ijk,ijk->ij", normal[here], normal[there])
+        off = [
+            _is_off_plane(normal[one], distance[one], directions[one], distance[other], directions[other])
+            for one, other in ((here, there), (there, here))
+        ]
+        # off both planes: of one alone may be a surface that is seen along itself
+        differs = (key[here] != key[there]) | (between < _COS_EDGE) | (off[0] & off[1])
+        for side in (here, there):
+            edge[side] |= differs
+            cosine[side] = np.minimum(cosine[side], between)
+    return edge, cosine
+
+
+def _is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F32, other: F32) -> NDArray[np.bool_]:
+    """Whether what another ray of the same eye hits is off the plane of a hit by more than a small share of the way."""
+    with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
+        slope = np.sum(direction * normal, axis=-1) / np.sum(other * normal, axis=-1)
+        nearer = np.minimum(distance, other_distance)
+        return np.asarray(np.abs(other_distance - distance * slope) > _DEPTH_EDGE * nearer)
+
+
+def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Pixels that are no edges, but whose normals turn enough for sharp reflections to alias. (height, width)"""
+    turning = ~edge & (cosine < _COS_TURN) & (key >= 0)
+    most = int(_MOST_TURNING * edge.size)
+    if np.count_nonzero(turning) > most:
+        turning &= cosine < np.partition(cosine[turning], most)[most]
+    return turning
 
 
 def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
@@ -87,11 +114,15 @@ def _merge(
     mesh = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
     mesh = mesh.reshape(num_pixels, positions_a_pixel)
     normal = surface_at(geometry, hits, directions).normal.reshape(num_pixels, positions_a_pixel, 3)
+    distance = hits.distance.reshape(num_pixels, positions_a_pixel)
+    rays = directions.reshape(num_pixels, positions_a_pixel, 3)
     group = np.full((num_pixels, positions_a_pixel), -1)
     for candidate in range(positions_a_pixel):
-        # rays of the same mesh with nearly the same normal as the first that has no group yet
+        # rays of the same mesh, turned alike and near the plane of the first that has no group yet
+        first = slice(candidate, candidate + 1)
         cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
-        same = (group < 0) & (mesh == mesh[:, candidate : candidate + 1]) & ((cosine > _COS_EDGE) | (mesh < 0))
+        off = _is_off_plane(normal[:, first], distance[:, first], rays[:, first], distance, rays)
+        same = (group < 0) & (mesh == mesh[:, first]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
         same &= (group[:, candidate] < 0)[:, None]
         group[same] = candidate
     pixel, first = np.nonzero(group == np.arange(positions_a_pixel))
@@ -130,9 +161,11 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     surface = surface_at(geometry, hits, directions)
     key = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1).astype(np.int64)
     shape = (height, width)
-    edge = _edges(
-        hits.face.reshape(shape), key.reshape(shape), surface.normal.reshape(*shape, 3), hits.distance.reshape(shape)
-    ).ravel()
+    seen = key.reshape(shape)
+    differs, cosine = _edges(
+        seen, surface.normal.reshape(*shape, 3), hits.distance.reshape(shape), directions.reshape(*shape, 3)
+    )
+    edge = (differs | _turning(differs, cosine, seen)).ravel()
 
     edge_pixel = np.nonzero(edge)[0]
     more_x = (x[edge_pixel, None] + _POSITIONS[:, 0]).astype(np.float32).ravel()

@@ -35,7 +35,7 @@ from relume.transfer.stored import SHARD_ROWS, read_lights, read_traced_directio
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
-_SAMPLES_A_PIXEL = 1.5  # upper bound over the scenes measured; edges have two or three
+_SAMPLES_A_PIXEL = 2.0  # upper bound over the scenes measured; edges and what turns quickly have two to five
 _SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
 
 
