@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, PPoly
 
 from relume.basis.bands import MAX_ANGLE, band_averages, band_edges
 from relume.brdf.edited import at_angles, is_relative, relative_edit
@@ -37,18 +37,19 @@ def channel_params(term_document: Mapping[str, Any], curve: Curve) -> list[dict[
 def _generated(model: str, curve_name: str, params: tuple[tuple[str, float], ...]) -> F64:
     curve = TERMS[model].curve(curve_name)
     settings: Params = dict(params)
-    bands = band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands)
+    about_pole = curve.angle.has_highlights
+    bands = band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands, about_pole=about_pole)
     np.maximum(bands, 0.0, out=bands)  # quadrature may undershoot where a curve vanishes
     bands.flags.writeable = False
     return bands
 
 
 @lru_cache(maxsize=64)
-def _given_bands(factor: Callable[[F64], F64], num_bands: int) -> F64:
+def _given_bands(factor: Callable[[F64], F64], num_bands: int, about_pole: bool) -> F64:
     """Band averages of a curve that data give. (3, J)"""
 
     def average(channel: int) -> F64:
-        return band_averages(lambda gamma: np.asarray(factor(gamma)[channel]), num_bands)
+        return band_averages(lambda gamma: np.asarray(factor(gamma)[channel]), num_bands, about_pole=about_pole)
 
     return np.stack([average(channel) for channel in range(3)])
 
@@ -56,7 +57,7 @@ def _given_bands(factor: Callable[[F64], F64], num_bands: int) -> F64:
 def generated_bands(term_document: Mapping[str, Any], curve: Curve) -> F64:
     """What the parameters or data alone would give: band averages. (3, J) float64, not negative."""
     if curve.factor is not None:
-        return _given_bands(curve.factor, curve.num_bands).copy()
+        return _given_bands(curve.factor, curve.num_bands, curve.angle.has_highlights).copy()
     model = term_document["model"]
     return np.stack([_generated(model, curve.name, tuple(p.items())) for p in channel_params(term_document, curve)])
 
@@ -84,21 +85,30 @@ def _points(drawn: Mapping[str, Any]) -> tuple[F64, PchipInterpolator]:
     return gamma, PchipInterpolator(gamma, points[:, 1])
 
 
-def _point_averages(drawn: Mapping[str, Any], num_bands: int) -> F64:
-    """Exact band averages of a drawn curve, by its antiderivative."""
+def _point_averages(drawn: Mapping[str, Any], curve: Curve) -> F64:
+    """Exact band averages of a drawn curve, by its antiderivative; weighed as those of generated curves."""
     gamma, spline = _points(drawn)
-    edges = band_edges(num_bands)
-    integral = spline.antiderivative()
+    edges = band_edges(curve.num_bands)
+    power = 2 if curve.angle.has_highlights else 1
+    integral = (_times_angle(spline) if power == 2 else spline).antiderivative()
     inside = np.clip(edges, gamma[0], gamma[-1])
     # constant outside the first and last point
-    outside = (edges - inside) * np.where(edges < gamma[0], spline(gamma[0]), spline(gamma[-1]))
-    return np.asarray(np.diff(integral(inside) + outside) * (num_bands / MAX_ANGLE))
+    outside = (edges**power - inside**power) / power * np.where(edges < gamma[0], spline(gamma[0]), spline(gamma[-1]))
+    return np.asarray(np.diff(integral(inside) + outside) * power / np.diff(edges**power))
 
 
-def _ground_bands(drawn: Mapping[str, Any], generated: F64) -> F64:
+def _times_angle(spline: PPoly) -> PPoly:
+    """γ f(γ) of a piecewise cubic f."""
+    coefficients = np.zeros((len(spline.c) + 1, spline.c.shape[1]))
+    coefficients[:-1] += spline.c
+    coefficients[1:] += spline.c * spline.x[:-1]
+    return PPoly(coefficients, spline.x)
+
+
+def _ground_bands(drawn: Mapping[str, Any], curve: Curve, generated: F64) -> F64:
     """What an object's relative edits stand on: its points, its bands, or what is generated. (3, J)"""
     if "points" in drawn:
-        return np.broadcast_to(_point_averages(drawn, generated.shape[1]), generated.shape)
+        return np.broadcast_to(_point_averages(drawn, curve), generated.shape)
     return _drawn_bands(drawn, generated.shape[1]) if "bands" in drawn else generated
 
 
@@ -113,7 +123,7 @@ def curve_bands(term_document: Mapping[str, Any], curve: Curve) -> F64:
     """
     bands = generated_bands(term_document, curve)
     for drawn in drawn_curves(term_document, curve):
-        values = np.maximum(_ground_bands(drawn, bands), 0.0)
+        values = np.maximum(_ground_bands(drawn, curve, bands), 0.0)
         if is_relative(drawn):
             factor, offset = relative_edit(drawn, values)
             values = factor * values + offset
@@ -137,7 +147,7 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     for drawn in drawn_curves(term_document, curve):
         exact = _ground_values(drawn, values, gamma, curve.num_bands)
         if is_relative(drawn):
-            ground = np.maximum(_ground_bands(drawn, generated_bands(term_document, curve)), 0.0)
+            ground = np.maximum(_ground_bands(drawn, curve, generated_bands(term_document, curve)), 0.0)
             # what multiplies the finished pixel is never averaged over bands, so their steps would be seen
             factor, offset = (
                 at_angles(rows, gamma, MAX_ANGLE, smooth=curve.outgoing) for rows in relative_edit(drawn, ground)

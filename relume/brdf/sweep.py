@@ -29,7 +29,10 @@ def slider_values(parameter: Parameter, num: int, *, between: bool = False) -> F
 def bands_at(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
     """Band averages of one curve, what `params` leaves out at its default. (J,)"""
     settings = {name: params.get(name, term.parameter(name).default) for name in curve.parameters}
-    return np.maximum(band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands), 0)
+    about_pole = curve.angle.has_highlights
+    return np.maximum(
+        band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands, about_pole=about_pole), 0
+    )
 
 
 def solid_angles(curve: Curve) -> F64:

@@ -32,6 +32,11 @@ class Angle(IntEnum):
     TILT_X = 8
     TILT_Y = 9
 
+    @property
+    def has_highlights(self) -> bool:
+        """Whether curves of it may be narrower than a band, about the direction where it is zero."""
+        return self in (Angle.THETA_H, Angle.THETA_R, Angle.LOBE)
+
 
 @dataclass(frozen=True)
 class Parameter:

@@ -23,10 +23,10 @@ _HALF = np.float32(0.5)
 _BELOW_ONE = np.float32(1 - 2**-24)
 # An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
 # away from the pole, where curves are wider, a share of the angle more.
-_TOLERANCE_BANDS = np.float32(0.12)
+_TOLERANCE_BANDS = np.float32(0.04)
 _TOLERANCE_SHARE = np.float32(0.015)
 _QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
-_MAX_DEPTH = 4
+_MAX_DEPTH = 6
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)

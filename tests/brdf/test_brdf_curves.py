@@ -10,16 +10,19 @@ from scipy.interpolate import PchipInterpolator
 from relume.basis.bands import band_averages, band_edges
 from relume.brdf.curves import channel_params, curve_bands, curve_values, generated_bands
 from relume.brdf.registry import TERMS
+from relume.brdf.term import Angle
 
 CURVES = [(t.model, c.name) for t in ANALYTIC.values() for c in t.curves]
 
 
-def slow_averages(function, num_bands, panels=512):
-    """Midpoint-free oracle: 4-point rule on 512 panels in each band."""
-    fine = np.linspace(0, np.pi / 2, num_bands * panels + 1)
+def slow_averages(function, curve, panels=512):
+    """Midpoint-free oracle: 4-point rule on 512 panels in each band; about a pole weighed by the angle."""
+    fine = np.linspace(0, np.pi / 2, curve.num_bands * panels + 1)
     x, w = np.polynomial.legendre.leggauss(4)
-    values = function(fine[:-1, None] + 0.5 * np.diff(fine)[:, None] * (1 + x)) @ (0.5 * w)
-    return values.reshape(num_bands, panels).mean(axis=1)
+    nodes = fine[:-1, None] + 0.5 * np.diff(fine)[:, None] * (1 + x)
+    weights = nodes if curve.angle in (Angle.THETA_H, Angle.THETA_R, Angle.LOBE) else np.ones_like(nodes)
+    values, total = (function(nodes) * weights) @ w, weights @ w
+    return values.reshape(-1, panels).sum(axis=1) / total.reshape(-1, panels).sum(axis=1)
 
 
 def sweep(model):
@@ -43,18 +46,20 @@ def test_generated_bands_are_averages_over_the_bands(model, name):
         assert bands.shape == (3, curve.num_bands)
         assert bands.dtype == np.float64
         assert (bands >= 0).all()
-        expected = slow_averages(lambda gamma, p=params: curve.generator(gamma, p), curve.num_bands)
+        expected = slow_averages(lambda gamma, p=params: curve.generator(gamma, p), curve)
         np.testing.assert_allclose(bands[0], expected, rtol=1e-6, atol=1e-9 * expected.max())
 
 
-def test_narrow_highlights_are_not_point_sampled():
-    # σ = 0.02: the highlight is over within four bands; its middle sample alone would be off by a third
+@pytest.mark.parametrize("sigma", [0.005, 0.02, 0.2])
+def test_narrow_highlights_keep_their_light(sigma):
+    # σ = 0.005: the highlight is over within the first band; by its mean over angles it would be 1.6 times as bright
     curve = TERMS["cook_torrance"].curve("theta_h")
-    params = {"sigma": 0.02}
-    bands = generated_bands({"model": "cook_torrance", "params": params}, curve)[0]
-    total = bands.sum() * (np.pi / 2 / 256)
-    # ∫ exp(-tan²/σ²)/(σ² cos⁴) dθ = ∫ (1 + t²) exp(-t²/σ²)/σ² dt, t = tan θ
-    assert total == pytest.approx(np.sqrt(np.pi) / 2 * (1 / 0.02 + 0.02 / 2), rel=1e-10)
+    bands = generated_bands({"model": "cook_torrance", "params": {"sigma": sigma}}, curve)[0]
+    total = (bands * np.diff(np.square(band_edges(256)) / 2)).sum()
+    gamma = np.concatenate([np.linspace(0, 20 * sigma, 400_001)[:-1], np.linspace(20 * sigma, np.pi / 2, 1001)[:-1]])
+    gamma = np.unique(np.minimum(gamma, np.pi / 2 - 1e-3))
+    values = curve.generator(gamma, {"sigma": sigma}) * gamma
+    assert total == pytest.approx(np.trapezoid(values, gamma), rel=1e-3)
 
 
 @pytest.mark.parametrize("num_bands", [1, 4, 64, 256])
@@ -62,6 +67,10 @@ def test_band_averages_are_exact_for_polynomials(num_bands):
     edges = band_edges(num_bands)
     expected = np.diff(edges**6 / 6) / np.diff(edges)
     np.testing.assert_allclose(band_averages(lambda x: x**5, num_bands), expected, rtol=1e-12, atol=1e-15)
+    weighed = np.diff(edges**7 / 7) / np.diff(edges**2 / 2)
+    np.testing.assert_allclose(
+        band_averages(lambda x: x**5, num_bands, about_pole=True), weighed, rtol=1e-12, atol=1e-15
+    )
 
 
 def test_parameters_may_differ_by_channel():
@@ -103,7 +112,7 @@ def test_points_are_averaged_exactly_and_continue_constantly():
         return spline(np.clip(gamma, np.radians(x[0]), np.radians(x[-1])))
 
     bands = curve_bands(term, curve)
-    np.testing.assert_allclose(bands[0], slow_averages(displayed, 256), atol=1e-6)
+    np.testing.assert_allclose(bands[0], slow_averages(displayed, curve), atol=1e-6)
     np.testing.assert_allclose(bands[:, :14], 4.0, rtol=1e-12)  # up to 4.9°
     np.testing.assert_allclose(bands[:, 242:], 0.2, rtol=1e-9)  # from 85.1°
     gamma = np.linspace(0, np.pi / 2, 500)
@@ -112,7 +121,11 @@ def test_points_are_averaged_exactly_and_continue_constantly():
 
 def test_two_points_make_a_straight_line():
     term, curve = drawn({"points": [[0, 0], [90, 9]]})
-    np.testing.assert_allclose(curve_bands(term, curve)[2], 9 * (np.arange(256) + 0.5) / 256, rtol=1e-9)
+    edges = np.linspace(0, 9, 257)
+    middles = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # where half the directions of a band lie, nearly its middle
+    np.testing.assert_allclose(curve_bands(term, curve)[2], middles, rtol=1e-9)
+    term, curve = drawn({"points": [[0, 0], [90, 9]]}, name="theta_d")
+    np.testing.assert_allclose(curve_bands(term, curve)[2], 9 * (np.arange(64) + 0.5) / 64, rtol=1e-9)
 
 
 def test_channels_not_drawn_are_generated():

@@ -84,7 +84,8 @@ def test_transport_is_linear_in_each_dormant_curve(model, curve, lights, receive
     for dormant in {c.name for c in TERMS[model].curves if not c.outgoing} - {curve}:
         parts = [project(model, {**one, dormant: of[dormant]}, curve, lights, receivers) for of in (one, two)]
         both = {**one, dormant: 2 * one[dormant] + 3 * two[dormant]}
-        assert relative(project(model, both, curve, lights, receivers), 2 * parts[0] + 3 * parts[1]) < 3e-6
+        # thousands of leaves about a pole, each rounded to float32
+        assert relative(project(model, both, curve, lights, receivers), 2 * parts[0] + 3 * parts[1]) < 6e-6
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
@@ -148,7 +149,7 @@ def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model,
         for active in (curve, None):
             short = project(model, bands, active, lights, receivers)
             whole = project(model, kept, active, lights, receivers)
-            assert relative(short, whole) < 1e-6
+            assert relative(short, whole) < 4e-6
             assert short.max() > 0
 
 
@@ -176,7 +177,7 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
         )
         for seen in (some, receivers.visible & ~some, receivers.visible, np.zeros_like(some))
     ]
-    assert relative(parts[0] + parts[1], parts[2]) < 1e-6
+    assert relative(parts[0] + parts[1], parts[2]) < 3e-6
     assert not parts[3].any()
 
 
