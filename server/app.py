@@ -19,6 +19,7 @@ from server.metrics import Metrics
 from server.protocol import MAX_MESSAGE_BYTES
 from server.routes import (
     bakes,
+    built_ins,
     client,
     environments,
     health,
@@ -38,6 +39,7 @@ from worker.paths import environments_path, materials_path
 
 ROUTE_GROUPS = (
     scenes,
+    built_ins,
     models,
     materials,
     library,

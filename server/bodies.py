@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from relume.scene.remarks import Effect
 from server.protocol import MAX_VIEWS_SHOWN
 from worker.status import Phase
 
@@ -59,8 +60,18 @@ class SceneVariant(Body):
     look: dict[str, Any]
 
 
+class SceneRemark(Body):
+    """What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it."""
+
+    text: str
+    effect: Effect
+
+
 class SceneBody(Body):
-    """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first."""
+    """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
+
+    `remarks` are the `warnings` with what each does to the picture, the worst first.
+    """
 
     id: str
     name: str
@@ -70,9 +81,20 @@ class SceneBody(Body):
     lights: list[str]
     variants: list[SceneVariant]
     warnings: list[str]
+    remarks: list[SceneRemark]
     triangles: int
     thumbnail: str | None
     bakes: list[str]
+
+
+class BuiltInBody(Body):
+    """A scene made by code; `size` and `method` of a bake show it well."""
+
+    name: str
+    label: str
+    description: str
+    size: tuple[int, int]
+    method: str
 
 
 class ParameterBody(Body):

@@ -10,22 +10,26 @@ import json
 import os
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from relume.errors import RelumeError, SceneError
 
-if TYPE_CHECKING:  # the import process itself has no use for it
+if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
+    from relume.scene.model import Scene
     from server.settings import Settings
 
 MAX_OUTPUT_BYTES = 64 * 1024
+DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 UPLOAD_PREFIX = "upload-"
-Kind = Literal["scene", "environment", "grounded"]
+Kind = Literal["scene", "environment", "built_in", "grounded"]
 
 
 @dataclass(frozen=True)
@@ -33,9 +37,12 @@ class Order:
     """What to import.
 
     Attributes:
-        kind, file: what it is, and its path; of a scene to be "grounded" the folder that it is kept in.
+        kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
+            is kept in.
         environment: path of a scene's environment map, or None.
-        name: what people will call it.
+        name: what people will call it; of a built-in scene, which one it is.
+        scene: the name that a scene's file had, folders included. companions: paths of the files that came with it, by
+            theirs.
         ground: whether a scene is put on one.
         seconds: of processor and wall. max_bytes: of address space.
     """
@@ -49,19 +56,32 @@ class Order:
     seconds: int
     max_bytes: int
     ground: bool = False
+    scene: str = ""
+    companions: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, settings: Settings, kind: Kind, file: Path, name: str, environment: Path | None = None) -> Order:
+    def of(
+        cls,
+        settings: Settings,
+        kind: Kind,
+        file: Path | None,
+        name: str,
+        environment: Path | None = None,
+        scene: str = "",
+        companions: Mapping[str, Path] | None = None,
+    ) -> Order:
         """An order within a server's limits."""
         return cls(
             data=str(settings.data.resolve()),
             database=settings.database_url,
             kind=kind,
-            file=str(file),
+            file="" if file is None else str(file),
             environment=None if environment is None else str(environment),
             name=name,
             seconds=settings.import_seconds,
             max_bytes=settings.import_bytes,
+            scene=scene,
+            companions={named: str(path) for named, path in (companions or {}).items()},
         )
 
 
@@ -80,6 +100,8 @@ def import_in_process(order: Order) -> str:
         done = subprocess.run(  # noqa: S603
             command, input=told, capture_output=True, timeout=order.seconds, check=False, env=environ
         )
+        if -done.returncode in DAMAGED:
+            raise SceneError("the file made its reader fail, it is damaged; export it again")
         answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
     except (subprocess.TimeoutExpired, ValueError, IndexError):
         raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file") from None
@@ -115,7 +137,7 @@ def main() -> int:
 def _import(order: Order) -> str:
     if order.kind == "grounded":
         return _put_on_ground(order)
-    return _import_scene(order) if order.kind == "scene" else _import_environment(order)
+    return _import_environment(order) if order.kind == "environment" else _import_scene(order)
 
 
 def _import_environment(order: Order) -> str:
@@ -126,15 +148,13 @@ def _import_environment(order: Order) -> str:
 
 
 def _import_scene(order: Order) -> str:
-    from relume.light.environment import read_environment
+    from relume.scene.built_in import built_in
     from relume.scene.ground import with_ground
-    from relume.scene.importer import import_scene, read_file
     from worker.database import open_database
     from worker.ledger import Ledger
     from worker.scenes import register_scene
 
-    environment = None if order.environment is None else read_environment(order.environment, "Environment")
-    scene = import_scene(read_file(order.file), order.name, environment)  # bytes: what lies beside it is not its own
+    scene = built_in(order.name) if order.kind == "built_in" else _read_scene(order)
     scene = with_ground(scene) if order.ground else scene
     return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
 
@@ -148,6 +168,17 @@ def _put_on_ground(order: Order) -> str:
 
     scene = with_ground(load_scene(order.file), order.name)
     return register_scene(Path(order.data), Ledger(open_database(order.database)), scene)
+
+
+def _read_scene(order: Order) -> Scene:
+    from relume.light.environment import read_environment
+    from relume.scene.companions import Sent
+    from relume.scene.importer import import_scene, read_file
+
+    environment = None if order.environment is None else read_environment(order.environment, "Environment")
+    sent = Sent({name: Path(path) for name, path in order.companions.items()}, order.scene)
+    # bytes: what lies beside the file on this disk is not its own
+    return import_scene(read_file(order.file), order.name, environment, sent)
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     *SERVER_MESSAGES,
     protocol.FrameHeader,
     bodies.SceneBody,
+    bodies.BuiltInBody,
     bodies.ModelBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,

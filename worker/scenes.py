@@ -15,6 +15,7 @@ from sqlalchemy.exc import IntegrityError
 from relume.errors import NotFoundError
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
+from relume.scene.remarks import Remark, remark_of
 from worker.ledger import Ledger
 from worker.models import SceneRow
 from worker.paths import bake_path, scene_path, staging_path
@@ -37,7 +38,7 @@ class SceneRecord:
     created: float
     views: tuple[str, ...]
     materials: tuple[dict[str, Any], ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
     num_triangles: int
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
@@ -52,7 +53,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
             {"name": material.name, "terms": list(material.terms), "catcher": material.catcher}
             for material in scene.materials
         ],
-        "warnings": list(scene.warnings),
+        "warnings": [remark.document() for remark in scene.warnings],
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
@@ -105,7 +106,7 @@ def _record(row: SceneRow) -> SceneRecord:
         created=row.created,
         views=tuple(summary["views"]),
         materials=tuple(summary["materials"]),
-        warnings=tuple(summary["warnings"]),
+        warnings=tuple(remark_of(warning) for warning in summary["warnings"]),
         num_triangles=summary["num_triangles"],
         variants=summary.get("variants", {}),  # rows of before there were any
         lights=tuple(summary.get("lights", ())),

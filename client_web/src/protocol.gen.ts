@@ -149,6 +149,15 @@ export interface BakeMessage {
   seconds_left: number | null;
 }
 
+/** A scene made by code; `size` and `method` of a bake show it well. */
+export interface BuiltInBody {
+  name: string;
+  label: string;
+  description: string;
+  size: [number, number];
+  method: string;
+}
+
 /** Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians. */
 export interface CameraInfo {
   to_world: number[];
@@ -364,7 +373,7 @@ export interface RenderBody {
   problem: string | null;
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `remarks` are the `warnings` with what each does to the picture, the worst first. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -374,6 +383,7 @@ export interface SceneBody {
   lights: string[];
   variants: SceneVariant[];
   warnings: string[];
+  remarks: SceneRemark[];
   triangles: number;
   thumbnail: string | null;
   bakes: string[];
@@ -384,6 +394,12 @@ export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
   catcher: boolean;
+}
+
+/** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */
+export interface SceneRemark {
+  text: string;
+  effect: "wrong" | "simplified" | "unused";
 }
 
 /** A look that came with the scene's file; partial, in look-document form. */

@@ -20,6 +20,7 @@ from relume.environments.thumbnail import write_thumbnail
 from relume.errors import SceneError
 from relume.light.environment import read_environment
 from relume.scene.model import Environment
+from relume.scene.remarks import Remark, remark_of, simplified
 from relume.shelf import Shelf
 from relume.shrink import shrink
 
@@ -39,7 +40,7 @@ class EnvironmentRecord:
     id: str
     name: str
     created: float
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     @property
     def map(self) -> str:
@@ -58,7 +59,7 @@ def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
     def fill(made: Path) -> dict[str, Any]:
         np.save(made / _RADIANCE, environment.radiance)
         write_thumbnail(made / _THUMBNAIL, environment.radiance)
-        return {"warnings": list(environment.warnings)}
+        return {"warnings": [remark.document() for remark in environment.warnings]}
 
     return get_record(folder, SHELF.keep(folder, source, name, fill))
 
@@ -76,7 +77,7 @@ def get_record(folder: Path, identity: str) -> EnvironmentRecord:
     warnings = document.get("warnings")
     if not isinstance(warnings, list):
         raise SHELF.damaged(path)
-    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(str, warnings)))
+    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(remark_of, warnings)))
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
@@ -111,5 +112,5 @@ def _reduced(environment: Environment) -> Environment:
     if width <= MAX_WIDTH:
         return environment
     size = MAX_WIDTH, MAX_WIDTH // 2
-    said = f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}"
+    said = simplified(f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}")
     return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, said))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.model import F32, Environment
+from relume.scene.remarks import simplified, wrong
 
 F64 = NDArray[np.float64]
 
@@ -199,13 +200,19 @@ def _repaired(pixels: F32, name: str) -> Environment:
     warnings = []
     broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
     if broken.any():
-        warnings.append(f"{int(broken.sum()):,} texels of environment {name!r} are not finite; they are black now")
+        warnings.append(
+            wrong(f"{int(broken.sum()):,} texels of environment {name!r} are not finite; they are black now")
+        )
         pixels = np.where(broken, np.float32(0), pixels)
     negative = (pixels < 0).any(axis=-1)
     if negative.any():
-        warnings.append(f"{int(negative.sum()):,} texels of environment {name!r} are negative; they are 0 there now")
+        warnings.append(
+            simplified(f"{int(negative.sum()):,} texels of environment {name!r} are negative; they are 0 there now")
+        )
     if (pixels > MAX_RADIANCE).any():
-        warnings.append(f"environment {name!r} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that")
+        warnings.append(
+            simplified(f"environment {name!r} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that")
+        )
     pixels = np.clip(pixels, 0, MAX_RADIANCE)
     if not pixels.any():
         raise SceneError(f"environment {name!r} is black everywhere; choose one with light in it")

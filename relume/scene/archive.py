@@ -19,6 +19,7 @@ from relume.errors import SceneError
 from relume.replacing import Replacing
 from relume.scene.checks import check_scene
 from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
+from relume.scene.remarks import Remark, remark_of
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -35,7 +36,7 @@ def make_scene(
     materials: Sequence[Material],
     cameras: Sequence[Camera],
     environment: Environment,
-    warnings: Sequence[str] = (),
+    warnings: Sequence[Remark] = (),
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
@@ -128,7 +129,7 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         ],
         "cameras": [{"name": c.name, "to_world": c.to_world.tolist(), "yfov": c.yfov} for c in scene.cameras],
         "environment": {"name": scene.environment.name},
-        "warnings": list(scene.warnings),
+        "warnings": [remark.document() for remark in scene.warnings],
     }
     if scene.variants:
         document["variants"] = scene.variants
@@ -153,7 +154,7 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
         tuple(_assemble_material(i, m, arrays) for i, m in enumerate(document["materials"])),
         tuple(cameras),
         Environment(str(document["environment"]["name"]), arrays["environment"]),
-        tuple(str(warning) for warning in document["warnings"]),
+        tuple(remark_of(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
         tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
     )

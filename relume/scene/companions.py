@@ -1,16 +1,18 @@
-"""The files that a scene file names: beside it in its folder, in the same archive, or nowhere."""
+"""The files that a scene file names: beside it in its folder, in the same archive or upload, or nowhere."""
 
 from __future__ import annotations
 
 import posixpath
 import zipfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 from urllib.parse import unquote
 
 from relume.errors import SceneError
 
 MAX_BYTES = 512 << 20  # of all companions of a scene together
+Entry = TypeVar("Entry")
 
 
 class Companions(Protocol):
@@ -74,13 +76,16 @@ class Folder:
         return None
 
 
-class Archive:
-    """The other entries of a .zip file, read in memory; nothing is ever unpacked to the disk."""
+class Listed(Generic[Entry]):
+    """Files known by their names, folders included, none of which is a path on this disk."""
 
-    def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
-        self._archive = archive
-        self._folder = folder
-        self._entries = {posixpath.normpath(info.filename).lower(): info for info in archive.infolist()}
+    def __init__(self, entries: Mapping[str, Entry], folder: str, read: Callable[[Entry], bytes]) -> None:
+        """
+        Args:
+            entries: what `read` takes, by name. folder: of the scene file, among those names.
+        """
+        self._entries = {posixpath.normpath(name.replace("\\", "/")).lower(): entry for name, entry in entries.items()}
+        self._folder, self._read = folder, read
 
     def read(self, name: str, what: str) -> bytes | None:
         """As `Companions.read`; upper and lower case are the same."""
@@ -88,8 +93,32 @@ class Archive:
             plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
             entry = self._entries.get(inside(plain, what).lower())
             if entry is not None:
-                return read_entry(self._archive, entry)
+                return self._read(entry)
         return None
+
+
+class Archive(Listed[zipfile.ZipInfo]):
+    """The other entries of a .zip file, read in memory; nothing is ever unpacked to the disk."""
+
+    def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
+        entries = {info.filename: info for info in archive.infolist()}
+        super().__init__(entries, folder, lambda entry: read_entry(archive, entry))
+
+
+class Sent(Listed[Path]):
+    """The files that were uploaded with a scene."""
+
+    def __init__(self, files: Mapping[str, Path], scene: str) -> None:
+        """
+        Args:
+            files: where they lie now, by the names they had. scene: the name of the scene's own file.
+
+        Raises:
+            SceneError: together they are too large.
+        """
+        if sum(path.stat().st_size for path in files.values()) > MAX_BYTES:
+            raise SceneError(f"the files beside the scene have over {MAX_BYTES >> 20} MB; scale them down")
+        super().__init__(files, posixpath.dirname(scene.replace("\\", "/")), Path.read_bytes)
 
 
 def read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:

@@ -16,19 +16,26 @@ MAX_FILE_BYTES = 512 << 20
 OBJ_LINE = re.compile(rb"^(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
 
 
-def import_scene(source: str | Path | bytes, name: str, environment: Environment | None = None) -> Scene:
+def import_scene(
+    source: str | Path | bytes,
+    name: str,
+    environment: Environment | None = None,
+    companions: Companions | None = None,
+) -> Scene:
     """Reads .glb, .gltf, .obj, .ply, or a .zip with one of them and the files that it names.
 
     Args:
         source: a path, whose folder may hold the files that the scene names; or bytes, which stand alone.
         name: what people call the scene.
         environment: the light; the studio of the built-in scene where None.
+        companions: the files that came with it, where they do not lie in its folder or in the same archive.
 
     Raises:
         SceneError: the file cannot be used; the message says why and what to do.
     """
     data = read_file(source)
-    companions: Companions = Alone() if isinstance(source, bytes) else Folder(Path(source).parent)
+    if companions is None:
+        companions = Alone() if isinstance(source, bytes) else Folder(Path(source).parent)
     if data.startswith(b"PK"):
         data, companions = open_zip(data)
     if data.startswith(b"ply"):

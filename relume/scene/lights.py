@@ -13,6 +13,7 @@ from relume.look.lights import MAX_EMISSION
 from relume.scene.checks import MAX_LIGHTS
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import Light, Material, Mesh
+from relume.scene.remarks import Remark, simplified, unused
 
 F64 = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ F64 = NDArray[np.float64]
 class LightCollector:
     """Collects the lights of one file, whatever its format."""
 
-    def __init__(self, warnings: list[str]) -> None:
+    def __init__(self, warnings: list[Remark]) -> None:
         self._warnings = warnings
         self._names: dict[str, int] = {}
         self.lights: list[Light] = []
@@ -41,7 +42,7 @@ class LightCollector:
                 "matter least, or light it by an environment"
             )
         if emission.max() > MAX_EMISSION:
-            self._warnings.append(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that")
+            self._warnings.append(simplified(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that"))
         self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
 
     def shine(self, materials: Sequence[Material], emissions: Sequence[F64], meshes: Sequence[Mesh]) -> None:
@@ -62,4 +63,4 @@ class LightCollector:
             if number in shown:
                 self.add(self.name(material.name), {"kind": "mesh", "material": material.name}, emission)
             else:
-                self._warnings.append(f"material {material.name!r} shines, but no surface is left of it")
+                self._warnings.append(unused(f"material {material.name!r} shines, but no surface is left of it"))

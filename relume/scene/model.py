@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.scene.remarks import Remark
+
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 
@@ -97,7 +99,7 @@ class Environment:
 
     name: str
     radiance: F32
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,6 @@ class Scene:
     materials: tuple[Material, ...]
     cameras: tuple[Camera, ...]
     environment: Environment
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
     variants: dict[str, dict[str, Any]] = field(default_factory=dict)
     lights: tuple[Light, ...] = ()

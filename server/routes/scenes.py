@@ -14,7 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import Id, SceneBody, SceneMaterial, SceneVariant, SceneView, moment
+from server.bodies import Id, SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
 from server.importing import UPLOAD_PREFIX, Order, import_in_process
 from server.services import Services, Shared
 from server.thumbnails import MAX_WIDTH, thumbnail
@@ -31,29 +31,54 @@ SceneFile = Annotated[
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]
 Ground = Annotated[bool, Form(description="whether it is put on a ground, which catches its shadows")]
+Companions = Annotated[
+    list[UploadFile],
+    File(description="the files that the scene names; their names and the scene's say the folders they lie in"),
+]
+MAX_COMPANIONS, MAX_PATH = 900, 1_024
 
 
 @router.post("", status_code=201)
 async def import_scene(
-    scene: SceneFile, services: Shared, response: Response, environment: EnvironmentFile = None, name: SceneName = "",
+    scene: SceneFile,
+    services: Shared,
+    response: Response,
+    environment: EnvironmentFile = None,
+    name: SceneName = "",
+    companions: Companions = [],  # noqa: B006  (never changed)
     ground: Ground = False,
 ) -> SceneBody:
     """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
     async with services.import_slots:
-        identity = await run_in_threadpool(_import, scene, environment, name, ground, services)
+        identity = await run_in_threadpool(_import, scene, environment, name, companions, ground, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 
 
-def _import(scene: UploadFile, environment: UploadFile | None, name: str, ground: bool, services: Services) -> str:
+def _import(
+    scene: UploadFile,
+    environment: UploadFile | None,
+    name: str,
+    companions: Sequence[UploadFile],
+    ground: bool,
+    services: Services,
+) -> str:
     settings = services.settings
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
+    if len(companions) > MAX_COMPANIONS or any(len(each.filename or "") > MAX_PATH for each in companions):
+        allowed = f"at most {MAX_COMPANIONS} files, their names of at most {MAX_PATH:,} characters"
+        raise ParameterError("companions", f"{len(companions)} files", allowed)
     with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
         file = keep_upload(scene, Path(folder) / "scene")
         lit_by = None if environment is None else keep_upload(environment, Path(folder) / "environment")
+        beside = {
+            each.filename or "": keep_upload(each, Path(folder) / f"companion-{number}")
+            for number, each in enumerate(companions)
+        }
         name = name.strip() or plain_stem(scene.filename) or "Scene"
-        return import_in_process(replace(Order.of(settings, "scene", file, name, lit_by), ground=ground))
+        order = Order.of(settings, "scene", file, name, lit_by, scene.filename or "", beside)
+        return import_in_process(replace(order, ground=ground))
 
 
 @router.post("/{scene}/ground", status_code=201)
@@ -120,6 +145,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=list(record.warnings),
+        remarks=[SceneRemark(text=str(remark), effect=remark.effect) for remark in record.warnings],
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
         bakes=[status.id for status in bakes],

@@ -21,6 +21,18 @@ def test_file_that_is_no_scene_is_refused(client: TestClient, data: bytes) -> No
     assert client.get("/api/scenes").json() == []
 
 
+def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: TestClient, settings: Any) -> None:
+    obj = b"mtllib ../../relume.db\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    beside = [("companions", (f"{number}.png", b"")) for number in range(901)]
+    refused = client.post("/api/scenes", files=[("scene", ("a.obj", obj)), *beside])
+    assert problem_of(refused)["type"] == "urn:relume:problem:parameter"
+    climbing = [("scene", ("a/b/c.obj", obj)), ("companions", ("../../../../tmp/x", b"newmtl Red\n"))]
+    taken = client.post("/api/scenes", files=climbing).json()
+    assert ["relume.db' is not beside" in warning for warning in taken["warnings"]] == [True]
+    client.delete(f"/api/scenes/{taken['id']}")
+    assert list(settings.data.glob("upload-*")) == []
+
+
 def test_import_that_takes_too_much_is_stopped(client: TestClient, settings: Any) -> None:
     settings.import_bytes = 64 * 1024**2  # less than an interpreter with NumPy needs
     response = client.post("/api/scenes", files={"scene": ("x.glb", b"glTF")})

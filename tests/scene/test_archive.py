@@ -13,6 +13,7 @@ import pytest
 from relume.errors import SceneError
 from relume.scene.archive import load_scene, make_scene, save_scene
 from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
+from relume.scene.remarks import simplified
 
 
 def small_scene(**changes: object) -> Scene:
@@ -36,7 +37,7 @@ def small_scene(**changes: object) -> Scene:
         "materials": [material],
         "cameras": [Camera("front", np.eye(4), 0.5)],
         "environment": Environment("sky", rng.random((2, 4, 3), np.float32)),
-        "warnings": ["one thing"],
+        "warnings": [simplified("one thing")],
         "lights": [Light("Key", {"kind": "spot", "position": [0.1, 2.0, -3.5]})],
     }
     return make_scene(**(parts | changes))  # type: ignore[arg-type]
@@ -47,6 +48,7 @@ def test_archive_round_trip_keeps_everything(tmp_path: Path) -> None:
     save_scene(scene, tmp_path / "scene")
     loaded = load_scene(tmp_path / "scene")
     assert (loaded.id, loaded.name, loaded.warnings) == (scene.id, scene.name, scene.warnings)
+    assert [warning.effect for warning in loaded.warnings] == ["simplified"]
     for field in ("positions", "normals", "tangents", "uvs", "faces"):
         before, after = getattr(scene.meshes[0], field), getattr(loaded.meshes[0], field)
         assert before.dtype == after.dtype

@@ -15,6 +15,7 @@ from relume.errors import SceneError
 from relume.scene.gltf.accessors import AccessorReader
 from relume.scene.gltf.document import Document, Primitive
 from relume.scene.model import F32, U32
+from relume.scene.remarks import Remark, simplified, unused, wrong
 
 I64 = NDArray[np.int64]
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -38,17 +39,17 @@ def num_corners(document: Document, primitive: Primitive) -> int:
     return document.accessors[index].count if index is not None and index < len(document.accessors) else 0
 
 
-def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warnings: list[str]) -> Geometry | None:
+def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warnings: list[Remark]) -> Geometry | None:
     """The primitive's triangles with only the vertices they use; None where it has none (a warning says so).
 
     Raises:
         SceneError: positions are missing or not finite, or indices are out of range.
     """
     if primitive.mode < TRIANGLES:
-        warnings.append(f"{what} is made of points or lines; it is left out")
+        warnings.append(wrong(f"{what} is made of points or lines; it is left out"))
         return None
     if "POSITION" not in primitive.attributes:
-        warnings.append(f"{what} has no positions; it is left out")
+        warnings.append(wrong(f"{what} has no positions; it is left out"))
         return None
     positions = reader.floats(primitive.attributes["POSITION"], (3,), f"positions of {what}")
     if primitive.indices is None:
@@ -63,7 +64,7 @@ def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warn
         raise SceneError(f"{what} has positions that are not finite; repair the mesh and export it again")
     faces = faces[without_degenerate(positions[used], faces, what, warnings)]
     if len(faces) == 0:
-        warnings.append(f"{what} has no triangles; it is left out")
+        warnings.append(wrong(f"{what} has no triangles; it is left out"))
         return None
     return _with_attributes(reader, primitive, used, faces, positions, what, warnings)
 
@@ -75,7 +76,7 @@ def _with_attributes(
     faces: I64,
     positions: F32,
     what: str,
-    warnings: list[str],
+    warnings: list[Remark],
 ) -> Geometry:
     def attribute(name: str, width: int) -> F32 | None:
         if name not in primitive.attributes:
@@ -84,22 +85,24 @@ def _with_attributes(
         if len(values) != len(positions):
             raise SceneError(f"{name} of {what} are not as many as its positions; export the scene again")
         if not usable(values[used]):
-            warnings.append(f"{name} of {what} are not all finite; they are not used")
+            warnings.append(wrong(f"{name} of {what} are not all finite; they are not used"))
             return None
         return values[used]
 
     normals, tangents = attribute("NORMAL", 3), attribute("TANGENT", 4)
     uvs = tuple(uv for uv in (attribute("TEXCOORD_0", 2), attribute("TEXCOORD_1", 2)) if uv is not None)
     if any(name.startswith("COLOR_") for name in primitive.attributes):
-        warnings.append(f"vertex colours of {what} are not used")
+        warnings.append(wrong(f"vertex colours of {what} are not used"))
     if primitive.targets:
-        warnings.append(f"morph targets of {what} are not used; it has its basic shape")
+        warnings.append(simplified(f"morph targets of {what} are not used; it has its basic shape"))
     points = positions[used]
     if normals is None:
         return _flat(points, uvs, faces)
     missing = np.linalg.norm(normals, axis=1) < 1e-6
     if missing.any():
-        warnings.append(f"{int(missing.sum()):,} normals of {what} have no length; they are made from its triangles")
+        warnings.append(
+            simplified(f"{int(missing.sum()):,} normals of {what} have no length; they are made from its triangles")
+        )
         normals = np.where(missing[:, None], _smooth_normals(points, faces), normals)
     tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
     return Geometry(points, normals, tangents, uvs, faces.astype(np.uint32))
@@ -131,7 +134,7 @@ def usable(values: NDArray[np.floating]) -> bool:
 
 
 def without_degenerate(
-    positions: NDArray[np.floating], faces: I64, what: str, warnings: list[str]
+    positions: NDArray[np.floating], faces: I64, what: str, warnings: list[Remark]
 ) -> NDArray[np.bool_]:
     """Which triangles have area, measured against their longest edge. (num_faces,)"""
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
@@ -139,7 +142,7 @@ def without_degenerate(
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     solid = np.asarray((area > 1e-10 * edge) & (edge > 0))
     if not solid.all():
-        warnings.append(f"{int((~solid).sum()):,} triangles of {what} have no area; they are left out")
+        warnings.append(unused(f"{int((~solid).sum()):,} triangles of {what} have no area; they are left out"))
     return solid
 
 

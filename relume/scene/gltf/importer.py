@@ -28,6 +28,7 @@ from relume.scene.gltf.uvs import made_tangents, turned_tangents
 from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
 from relume.scene.lights import LightCollector
 from relume.scene.model import Camera, Environment, Mesh, Scene
+from relume.scene.remarks import Remark, simplified, unused, wrong
 
 F64 = NDArray[np.float64]
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
@@ -64,7 +65,7 @@ class _Reading:
     def __init__(self, container: Container) -> None:
         self._document = container.document
         self._accessors = AccessorReader(container)
-        self.warnings: list[str] = []
+        self.warnings: list[Remark] = []
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
         self._collector = LightCollector(self.warnings)
         self._light_reader = LightReader(container.document, self._collector, self.warnings)
@@ -94,13 +95,13 @@ class _Reading:
             self._place_camera(node, to_world)
         self._light_reader.place(node, to_world)
         if "EXT_mesh_gpu_instancing" in node.extensions:
-            self.warnings.append(f"the instances of node {node.name[:80]!r} are not used; it appears once")
+            self.warnings.append(wrong(f"the instances of node {node.name[:80]!r} are not used; it appears once"))
         if node.mesh is None:
             return
         if node.mesh >= len(self._document.meshes):
             raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
         if node.skin is not None:
-            self.warnings.append(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose")
+            self.warnings.append(simplified(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose"))
         mesh = self._document.meshes[node.mesh]
         self._places_left -= len(mesh.primitives)
         if self._places_left < 0:
@@ -125,7 +126,7 @@ class _Reading:
         material = self._material(primitive)
         placed = _placed(geometry, self.materials[material], to_world, name, material)
         if placed is None:
-            self.warnings.append(f"mesh {name!r} is scaled to nothing or out of range; it is left out")
+            self.warnings.append(wrong(f"mesh {name!r} is scaled to nothing or out of range; it is left out"))
         else:
             self.meshes.append(placed)
 
@@ -158,20 +159,22 @@ class _Reading:
         name = camera.name or node.name or "camera"
         frame = rigid(to_world)
         if camera.perspective is None or camera.type != "perspective":
-            self.warnings.append(f"camera {name[:80]!r} is not a perspective one; it is left out")
+            self.warnings.append(wrong(f"camera {name[:80]!r} is not a perspective one; it is left out"))
         elif frame is None:
-            self.warnings.append(f"camera {name[:80]!r} is scaled to nothing; it is left out")
+            self.warnings.append(wrong(f"camera {name[:80]!r} is scaled to nothing; it is left out"))
         else:
             self.cameras.append(Camera(slug(name, self._camera_names), frame, camera.perspective.yfov))
 
     def _warn_of_the_rest(self) -> None:
         document = self._document
         if document.animations:
-            self.warnings.append(f"{len(document.animations)} animations are not used; everything has its rest pose")
+            self.warnings.append(
+                unused(f"{len(document.animations)} animations are not used; everything has its rest pose")
+            )
         for extension in document.extensionsRequired:
             if extension not in READ_EXTENSIONS:
                 self.warnings.append(
-                    f"the file requires {extension[:60]!r}, which is not understood; it may look wrong"
+                    wrong(f"the file requires {extension[:60]!r}, which is not understood; it may look wrong")
                 )
 
 

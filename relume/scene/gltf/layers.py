@@ -11,6 +11,7 @@ from typing import Annotated, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.scene.gltf.document import Extensions, Factor, Number, TextureInfo
+from relume.scene.remarks import Remark, wrong
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
 Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
@@ -79,7 +80,7 @@ class Layers(BaseModel, frozen=True):
 UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields}
 
 
-def read_layers(extensions: Extensions, what: str, warnings: list[str]) -> Layers:
+def read_layers(extensions: Extensions, what: str, warnings: list[Remark]) -> Layers:
     """The extensions that are understood; a warning for each that is not, or is not valid."""
 
     def read(model: type[M]) -> M:
@@ -87,12 +88,11 @@ def read_layers(extensions: Extensions, what: str, warnings: list[str]) -> Layer
         try:
             return model.model_validate(extensions.get(extension, {}))
         except (ValidationError, RecursionError):
-            warnings.append(f"extension {extension!r} of {what} is not valid; it is not used")
+            warnings.append(wrong(f"extension {extension!r} of {what} is not valid; it is not used"))
             return model()
 
-    warnings.extend(
-        f"extension {extension[:60]!r} of {what} is not used" for extension in sorted(extensions.keys() - UNDERSTOOD)
-    )
+    others = sorted(extensions.keys() - UNDERSTOOD)
+    warnings.extend(wrong(f"extension {extension[:60]!r} of {what} is not used") for extension in others)
     return Layers(
         ior=read(Ior),
         specular=read(Specular),

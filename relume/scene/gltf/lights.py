@@ -16,13 +16,16 @@ from relume.errors import SceneError
 from relume.look.lights import MAX_METRES
 from relume.scene.gltf.document import Document, Factor, Index, Name, Node, Number
 from relume.scene.lights import LightCollector
+from relume.scene.remarks import Remark, simplified, wrong
 
 F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
 LUMENS_A_WATT = 683.0
 _MAX_DEFINED = 10_000
-_UNITS = f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts"
+_UNITS = simplified(
+    f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts"
+)
 
 
 class _Spot(BaseModel, frozen=True):
@@ -58,7 +61,7 @@ class _Placed(BaseModel, frozen=True):
 class LightReader:
     """Reads the lamps at the nodes of one file."""
 
-    def __init__(self, document: Document, collector: LightCollector, warnings: list[str]) -> None:
+    def __init__(self, document: Document, collector: LightCollector, warnings: list[Remark]) -> None:
         self._collector = collector
         self._warnings = warnings
         try:
@@ -84,7 +87,7 @@ class LightReader:
         direction, position = -to_world[:3, 2], to_world[:3, 3]
         length = float(np.linalg.norm(direction))
         if np.abs(position).max() > MAX_METRES or (light.type != "point" and length < 1e-12):
-            self._warnings.append(f"light {name!r} is scaled to nothing or out of range; it is left out")
+            self._warnings.append(wrong(f"light {name!r} is scaled to nothing or out of range; it is left out"))
             return
         fields: dict[str, Any] = {"kind": light.type}
         if light.type != "directional":
@@ -95,6 +98,6 @@ class LightReader:
             outer = min(np.degrees(light.spot.outerConeAngle), 90.0)
             fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
         if light.range is not None:
-            self._warnings.append(f"the range of light {name!r} is not used; its light ends nowhere")
+            self._warnings.append(simplified(f"the range of light {name!r} is not used; its light ends nowhere"))
         self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
         self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_A_WATT)

@@ -22,6 +22,7 @@ from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
 from relume.scene.model import Material, Texture
+from relume.scene.remarks import Remark, simplified, unused, wrong
 
 MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
 
@@ -44,7 +45,7 @@ class Understood:
 class MaterialReader:
     """Turns the materials of one file into relume's, counting the texels it makes."""
 
-    def __init__(self, images: ImageReader, warnings: list[str]) -> None:
+    def __init__(self, images: ImageReader, warnings: list[Remark]) -> None:
         self._images = images
         self._warnings = warnings
         self._names: dict[str, int] = {}
@@ -66,7 +67,9 @@ class MaterialReader:
         over = self._over(layers, strength, what)
         normal_map = self._normal_map(material.normalTexture, turn, what)
         if over.coat > 0 and normal_map is not None:
-            self._warnings.append(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
+            self._warnings.append(
+                simplified(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
+            )
         made = Material(name, make_terms(surface, over), surface.textures, normal_map, material.doubleSided)
         return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
 
@@ -85,7 +88,9 @@ class MaterialReader:
         raster = self._raster(material, layers, what)
         roughness = raster.mean("packed", 1) * pbr.roughnessFactor
         if raster.varies("packed", 1):
-            self._warnings.append(f"the roughness texture of {what} is replaced by its mean, {roughness:.2f}")
+            self._warnings.append(
+                simplified(f"the roughness texture of {what} is replaced by its mean, {roughness:.2f}")
+            )
         if raster.empty:
             metallic, weight = pbr.metallicFactor, specular.specularFactor
             f0 = _mix(weight * np.minimum(dielectric, 1), factor, metallic)
@@ -124,7 +129,7 @@ class MaterialReader:
     def _over(self, layers: Layers, anisotropy: float, what: str) -> Over:
         coat, sheen = layers.clearcoat, layers.sheen
         if coat.clearcoatNormalTexture is not None:
-            self._warnings.append(f"the normal texture of the coat of {what} is not used")
+            self._warnings.append(simplified(f"the normal texture of the coat of {what} is not used"))
         weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"coat texture of {what}")
         coat_roughness = coat.clearcoatRoughnessFactor
         if coat.clearcoatRoughnessTexture is not None:
@@ -135,7 +140,9 @@ class MaterialReader:
         tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {what}")
         r, g, b = (round(float(value), 6) for value in tint)
         if r + g + b > 0:
-            self._warnings.append(f"the sheen of {what} is a curve over the half angle; its masking is averaged")
+            self._warnings.append(
+                simplified(f"the sheen of {what} is a curve over the half angle; its masking is averaged")
+            )
         return Over(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
 
     def _anisotropy(self, layers: Layers, what: str) -> tuple[float, float]:
@@ -148,13 +155,17 @@ class MaterialReader:
             strength *= float(pixels[..., 2].mean()) / 255
             turn += float(np.arctan2(y, x))
             if np.hypot(x, y) < 0.5:
-                self._warnings.append(f"the anisotropy of {what} runs in all directions; its highlight is round")
+                self._warnings.append(
+                    simplified(f"the anisotropy of {what} runs in all directions; its highlight is round")
+                )
                 return 0.0, 0.0
             if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-                self._warnings.append(f"the anisotropy texture of {what} is replaced by its mean")
+                self._warnings.append(simplified(f"the anisotropy texture of {what} is replaced by its mean"))
         if strength == 0:
             return 0.0, 0.0
-        self._warnings.append(f"{what} is anisotropic; its highlight is Ashikhmin-Shirley's, of about the same width")
+        self._warnings.append(
+            simplified(f"{what} is anisotropic; its highlight is Ashikhmin-Shirley's, of about the same width")
+        )
         return strength, float(np.remainder(turn, 2 * np.pi))
 
     def _normal_map(self, info: TextureInfo | None, turn: float, what: str) -> Texture | None:
@@ -178,7 +189,7 @@ class MaterialReader:
             return 1.0
         pixels, _ = self._images.texture(info.index, f"the {words}")
         if np.ptp(pixels[..., channel]) > 2:
-            self._warnings.append(f"the {words} is replaced by its mean")
+            self._warnings.append(simplified(f"the {words} is replaced by its mean"))
         return float(pixels[..., channel].mean()) / 255
 
     def _mean_color(self, info: TextureInfo | None, words: str) -> Any:
@@ -187,7 +198,7 @@ class MaterialReader:
         pixels, _ = self._images.texture(info.index, f"the {words}")
         self._spend(pixels.shape[0] * pixels.shape[1])
         if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-            self._warnings.append(f"the {words} is replaced by its mean")
+            self._warnings.append(simplified(f"the {words} is replaced by its mean"))
         return to_linear(pixels[..., :3]).mean((0, 1), dtype=np.float64)
 
     def _spend(self, num_texels: int) -> None:
@@ -197,9 +208,9 @@ class MaterialReader:
 
     def _warn_of_the_rest(self, material: GltfMaterial, what: str) -> None:
         if material.alphaMode != "OPAQUE":
-            self._warnings.append(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here")
+            self._warnings.append(wrong(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here"))
         if material.occlusionTexture is not None:
-            self._warnings.append(f"the occlusion texture of {what} is not used; relume traces occlusion")
+            self._warnings.append(unused(f"the occlusion texture of {what} is not used; relume traces occlusion"))
 
 
 def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from relume.scene.gltf.document import Index, Number, TextureInfo
 from relume.scene.model import F32, U32
+from relume.scene.remarks import Remark, wrong
 
 
 class Placement(BaseModel, frozen=True):
@@ -39,22 +40,22 @@ class UvUse:
         return np.asarray(np.clip(moved, -1e6, 1e6), np.float32)
 
 
-def uv_use(textures: Sequence[TextureInfo], what: str, warnings: list[str]) -> UvUse:
+def uv_use(textures: Sequence[TextureInfo], what: str, warnings: list[Remark]) -> UvUse:
     """What the first texture asks for; a warning where another asks for something else."""
     uses = [_use(texture, what, warnings) for texture in textures]
     if len(set(uses)) > 1:
-        warnings.append(f"the textures of {what} are placed differently; all are placed as the first")
+        warnings.append(wrong(f"the textures of {what} are placed differently; all are placed as the first"))
     return uses[0] if uses else UvUse()
 
 
-def _use(texture: TextureInfo, what: str, warnings: list[str]) -> UvUse:
+def _use(texture: TextureInfo, what: str, warnings: list[Remark]) -> UvUse:
     extension = texture.extensions.get("KHR_texture_transform")
     if extension is None:
         return UvUse(texture.texCoord)
     try:
         placement = Placement.model_validate(extension)
     except ValidationError:
-        warnings.append(f"a texture transform of {what} is not valid; it is not used")
+        warnings.append(wrong(f"a texture transform of {what} is not valid; it is not used"))
         return UvUse(texture.texCoord)
     uv_set = texture.texCoord if placement.texCoord is None else placement.texCoord
     return UvUse(uv_set, placement.model_copy(update={"texCoord": None}))

@@ -18,6 +18,7 @@ from relume.scene.gltf.document import Document, Index, Name, Primitive
 from relume.scene.gltf.materials import Understood
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import F32, Texture
+from relume.scene.remarks import Remark, simplified
 
 EXTENSION = "KHR_materials_variants"
 SAME_IMAGE = 0.01  # relative RMS; two codings of one image differ by less
@@ -81,7 +82,7 @@ def variant_looks(
     names: Sequence[str],
     worn: Sequence[tuple[Understood, Choices]],
     wardrobe: Mapping[int, Understood],
-    warnings: list[str],
+    warnings: list[Remark],
 ) -> dict[str, dict[str, Any]]:
     """A partial look for each variant, the terms in it complete.
 
@@ -99,11 +100,11 @@ def variant_looks(
     return looks
 
 
-def _dressed(own: Understood, other: Understood, variant: str, warnings: list[str]) -> list[dict[str, Any]]:
+def _dressed(own: Understood, other: Understood, variant: str, warnings: list[Remark]) -> list[dict[str, Any]]:
     """The other material's terms, their textures looked for among those that the own material has baked."""
     what = f"variant {variant!r} of material {own.material.name!r}"
     if not _same_normals(own, other):
-        warnings.append(f"{what} keeps the normal map it was baked with")
+        warnings.append(simplified(f"{what} keeps the normal map it was baked with"))
     terms = []
     for term in other.material.terms:
         channel = term.get("texture")
@@ -113,7 +114,7 @@ def _dressed(own: Understood, other: Understood, variant: str, warnings: list[st
         image = other.material.textures[channel]
         kept, tint = _kept_channel(own, other, image)
         if kept is None and np.ptp(image.pixels, axis=(0, 1)).max() > 0:
-            warnings.append(f"{what} has a texture of its own; its mean colour stands for it")
+            warnings.append(simplified(f"{what} has a texture of its own; its mean colour stands for it"))
         color = np.array(term["color"]) * tint
         terms.append(term | {"color": [round(float(value), 6) for value in color], "texture": kept})
     pointer = ("materials", own.material.name, "terms")

@@ -11,6 +11,7 @@ from relume.errors import SceneError
 from relume.scene.gltf.geometry import usable, without_degenerate
 from relume.scene.gltf.uvs import made_tangents
 from relume.scene.model import F32, Material, Mesh
+from relume.scene.remarks import Remark, wrong
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -34,7 +35,7 @@ class Corners:
 
 
 def make_mesh(
-    corners: Corners, name: str, number: int, material: Material, what: str, warnings: list[str]
+    corners: Corners, name: str, number: int, material: Material, what: str, warnings: list[Remark]
 ) -> Mesh | None:
     """A mesh with own vertices for each corner; None where no triangle is left (a warning says so).
 
@@ -52,7 +53,7 @@ def make_mesh(
     solid = without_degenerate(corners.positions, triangles[..., 0], what, warnings)
     triangles = triangles[solid]
     if len(triangles) == 0:
-        warnings.append(f"{what} has no triangles; it is left out")
+        warnings.append(wrong(f"{what} has no triangles; it is left out"))
         return None
     points = corners.positions[triangles[..., 0]].astype(np.float32)
     normals = _normals(corners, triangles, points, what, warnings)
@@ -65,18 +66,18 @@ def make_mesh(
     return Mesh(name, flat, normals, tangents, uvs, faces, number)
 
 
-def _picked(values: F64, indices: I64, width: int, what: str, warnings: list[str]) -> F32:
+def _picked(values: F64, indices: I64, width: int, what: str, warnings: list[Remark]) -> F32:
     """Values of the corners, zeros where a corner has none or none that is finite. (num_corners, width)"""
     flat = indices.reshape(-1)
     picked = np.zeros((len(flat), width))
     picked[flat >= 0] = values[flat[flat >= 0]]
     if not usable(picked):
-        warnings.append(f"{what} are not all finite; they are not used")
+        warnings.append(wrong(f"{what} are not all finite; they are not used"))
         return np.zeros(picked.shape, np.float32)
     return picked.astype(np.float32)
 
 
-def _normals(corners: Corners, triangles: I64, points: F32, what: str, warnings: list[str]) -> F32:
+def _normals(corners: Corners, triangles: I64, points: F32, what: str, warnings: list[Remark]) -> F32:
     """Unit normals of the corners: the file's, and creased ones where it has none. (num_corners, 3)"""
     given = _picked(corners.normals, triangles[..., 2], 3, f"normals of {what}", warnings).astype(np.float64)
     length = np.linalg.norm(given, axis=1, keepdims=True)

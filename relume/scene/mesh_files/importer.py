@@ -16,16 +16,17 @@ from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
 from relume.scene.mesh_files.obj import Obj, read_obj
 from relume.scene.mesh_files.ply import read_ply
 from relume.scene.model import Environment, Light, Material, Mesh, Scene
+from relume.scene.remarks import Remark, simplified, unused, wrong
 
 MAX_LIBRARIES = 100
 
 
 def import_obj(data: bytes, name: str, environment: Environment | None, companions: Companions) -> Scene:
     """Reads a Wavefront .obj file and the .mtl files and images that it names. Raises SceneError."""
-    warnings: list[str] = []
+    warnings: list[Remark] = []
     obj = read_obj(data)
     library = _library(obj, companions, warnings)
-    warnings.extend(f"lines of kind {kind!r} are not used; only faces are" for kind in sorted(obj.left_out))
+    warnings.extend(unused(f"lines of kind {kind!r} are not used; only faces are") for kind in sorted(obj.left_out))
     maker = MaterialMaker(companions, warnings)
     numbers: dict[str, int] = {}
     materials: list[Material] = []
@@ -36,7 +37,7 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
         if material not in numbers:
             numbers[material] = len(materials)
             if material and obj.libraries and material not in library:
-                warnings.append(f"material {material[:80]!r} is not described; it is grey")
+                warnings.append(wrong(f"material {material[:80]!r} is not described; it is grey"))
             materials.append(maker.make(material, library.get(material)))
             emissions.append(maker.emission(materials[-1], library.get(material)))
         own_name = unique_name(thing or material or "mesh", taken)
@@ -50,18 +51,18 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
 
 def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
     """Reads a Stanford .ply file, text or binary. Raises SceneError."""
-    warnings: list[str] = []
+    warnings: list[Remark] = []
     corners, color = read_ply(data)
     described = Described()
     if color is not None:
-        warnings.append("vertex colours are replaced by their mean")
+        warnings.append(simplified("vertex colours are replaced by their mean"))
         described.numbers = {"Kd": [round(float(value), 6) for value in color], "Pr": [0.5]}
     material = MaterialMaker(Alone(), warnings).make("material", described if color is not None else None)
     mesh = make_mesh(corners, "mesh", 0, material, "the mesh", warnings)
     return _scene(name, [] if mesh is None else [mesh], [material], environment, warnings)
 
 
-def _library(obj: Obj, companions: Companions, warnings: list[str]) -> dict[str, Described]:
+def _library(obj: Obj, companions: Companions, warnings: list[Remark]) -> dict[str, Described]:
     """All materials of all libraries; the first of a name wins."""
     if len(obj.libraries) > MAX_LIBRARIES:
         raise SceneError(f"the .obj file names more than {MAX_LIBRARIES} material files; join them")
@@ -70,7 +71,7 @@ def _library(obj: Obj, companions: Companions, warnings: list[str]) -> dict[str,
         data = companions.read(name, "the material file")
         if data is None:
             shown = name[:60].encode("ascii", "replace").decode()
-            warnings.append(f"the material file {shown!r} is not beside the scene; pack both into a .zip file")
+            warnings.append(wrong(f"the material file {shown!r} is not beside the scene; import both together"))
         else:
             library = read_library(data) | library
     return library
@@ -81,7 +82,7 @@ def _scene(
     meshes: list[Mesh],
     materials: list[Material],
     environment: Environment | None,
-    warnings: list[str],
+    warnings: list[Remark],
     lights: Sequence[Light] = (),
 ) -> Scene:
     if not meshes:

@@ -19,6 +19,7 @@ from relume.scene.gltf.images import Decoder, to_linear
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.model import Material, Texture
+from relume.scene.remarks import Remark, simplified, wrong
 
 F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
@@ -83,7 +84,7 @@ def _image_name(words: list[str]) -> str:
 class MaterialMaker:
     """Turns described materials into relume's, each image decoded once."""
 
-    def __init__(self, companions: Companions, warnings: list[str]) -> None:
+    def __init__(self, companions: Companions, warnings: list[Remark]) -> None:
         self._companions = companions
         self._warnings = warnings
         self._decoder = Decoder()
@@ -110,7 +111,7 @@ class MaterialMaker:
         if texture is None:
             return factor
         if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 0.01:
-            self._warnings.append(f"map_Ke of material {material.name!r} is replaced by its mean")
+            self._warnings.append(simplified(f"map_Ke of material {material.name!r} is replaced by its mean"))
         factor = factor if factor.any() else np.ones(3)  # exporters write zeros where they mean the image
         return np.asarray(factor * texture.pixels.mean((0, 1), dtype=np.float64))
 
@@ -130,16 +131,17 @@ class MaterialMaker:
             self._pixels[name] = None if data is None else self._decoder.decode(data, what)[..., :3]
         if self._pixels[name] is None:
             shown = name[:60].encode("ascii", "replace").decode()
-            self._warnings.append(f"{what} ({shown!r}) is not beside the scene; it is left out")
+            self._warnings.append(wrong(f"{what} ({shown!r}) is not beside the scene; it is left out"))
             return None
         return Texture(np.ascontiguousarray(convert(self._pixels[name]), np.float32))
 
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
         numbers = described.numbers
         if numbers.get("d", [1.0])[0] < 1 or numbers.get("Tr", [0.0])[0] > 0:
-            self._warnings.append(f"{what} is see-through; it is opaque here")
-        unused = sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "norm"})
-        self._warnings.extend(f"{keyword[:40]} of {what} is not used" for keyword in unused)
+            self._warnings.append(wrong(f"{what} is see-through; it is opaque here"))
+        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "norm"}):
+            say = wrong if keyword == "map_d" else simplified  # it cuts holes
+            self._warnings.append(say(f"{keyword[:40]} of {what} is not used"))
 
 
 def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str, Any], ...]:

@@ -1,0 +1,61 @@
+"""Warnings and what they do to the picture."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+
+from relume.scene.archive import load_scene, save_scene
+from relume.scene.finish import MAX_WARNINGS, finished_scene
+from relume.scene.importer import import_scene
+from relume.scene.model import Environment, Scene
+from relume.scene.remarks import remark_of, simplified, unused, wrong
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nmtllib none.mtl\nf 1 2 3\n"
+
+
+def imported() -> Scene:
+    return import_scene(TRIANGLE.encode(), "test", LIGHT)
+
+
+def test_an_import_tells_the_worst_first() -> None:
+    assert [(warning.effect, str(warning)) for warning in imported().warnings] == [
+        ("wrong", "the material file 'none.mtl' is not beside the scene; import both together"),
+        ("unused", "lines of kind 'l' are not used; only faces are"),
+    ]
+
+
+def test_effects_are_kept_with_the_scene(tmp_path: Path) -> None:
+    scene = imported()
+    save_scene(scene, tmp_path)
+    loaded = load_scene(tmp_path)
+    assert [(warning.effect, warning) for warning in loaded.warnings] == [
+        (warning.effect, warning) for warning in scene.warnings
+    ]
+
+
+def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
+    save_scene(imported(), tmp_path)
+    document = json.loads((tmp_path / "scene.json").read_text())
+    document["warnings"] = ["something is off"]
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    (warning,) = load_scene(tmp_path).warnings
+    assert (warning, warning.effect) == ("something is off", "wrong")
+
+
+def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
+    scene = imported()
+    found = [unused("a little thing")] * MAX_WARNINGS + [simplified("a mean")] * 3 + [wrong("a hole")]
+    listed = finished_scene("test", scene.meshes, scene.materials, scene.cameras, LIGHT, found).warnings
+    assert listed[:4] == ("a hole", "a mean", "a mean", "a mean")
+    assert (listed[-1], listed[-1].effect, len(listed)) == ("and 4 more of the kind", "unused", MAX_WARNINGS + 1)
+
+
+def test_a_remark_survives_documents_and_processes() -> None:
+    remark = simplified("a mean")
+    for copy in (remark_of(json.loads(json.dumps(remark.document()))), pickle.loads(pickle.dumps(remark))):
+        assert (copy, copy.effect) == (remark, remark.effect)

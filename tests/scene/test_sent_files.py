@@ -1,0 +1,47 @@
+"""A scene file and the files that were uploaded with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relume.errors import SceneError
+from relume.scene import companions
+from relume.scene.companions import Sent
+from relume.scene.importer import import_scene
+from relume.scene.model import Environment
+
+LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
+TRIANGLE = b"mtllib ../looks/red.mtl\nusemtl Red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def kept(folder: Path, **files: bytes) -> dict[str, Path]:
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return {name: folder / name for name in files}
+
+
+def test_names_are_looked_up_from_the_scenes_folder_not_from_the_disk(tmp_path: Path) -> None:
+    (path,) = kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n").values()
+    sent = Sent({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
+    scene = import_scene(TRIANGLE, "test", LIGHT, sent)
+    assert scene.materials[0].terms[0]["color"] == [1, 0, 0]
+    assert scene.warnings == ()
+
+
+def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path: Path) -> None:
+    kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
+    sent = Sent({}, "meshes/triangle.obj")
+    missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, sent)
+    assert any("is not beside the scene" in warning for warning in missing.warnings)
+    with pytest.raises(SceneError, match="outside the folder"):
+        import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, sent)
+
+
+def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(companions, "MAX_BYTES", 5)
+    files = kept(tmp_path, a=b"1234", b=b"12")
+    with pytest.raises(SceneError, match="scale them down"):
+        Sent(files, "scene.obj")
