@@ -5,6 +5,7 @@ export type {
   BakeBody,
   BakeMessage,
   BakeRequest,
+  BuiltInBody,
   ClientMessage,
   CurveBody,
   CurveMessage,

@@ -3,7 +3,6 @@ import { fromHex, strength, toHex } from "../src/inspector/color";
 import { defaultTerm, modelsFor, withModel } from "../src/inspector/terms";
 import { freeName } from "../src/looks/names";
 import type { ModelBody, Rgb } from "../src/protocol";
-import { sortFiles, stem } from "../src/start/files";
 import { gauge } from "../src/state/metrics";
 import { placeFromUrl, placeToUrl } from "../src/state/url";
 import { chord } from "../src/ui/chord";
@@ -158,20 +157,6 @@ test("a place survives the URL", () => {
     light: null,
   });
   expect(placeFromUrl("?term=zzz").term).toBe(0);
-});
-
-test("dropped files find their role", () => {
-  const file = (name: string) => new File([], name);
-  const nothing = { scene: null, environment: null, refused: [] };
-  const first = sortFiles([file("a.GLB"), file("notes.txt")], nothing);
-  expect(first.refused).toEqual(["notes.txt"]);
-  const second = sortFiles([file("sky.exr")], first);
-  expect([second.scene?.name, second.environment?.name, second.refused]).toEqual(["a.GLB", "sky.exr", []]);
-  for (const name of ["a.gltf", "b.obj", "c.ply", "D.ZIP"]) {
-    const sorted = sortFiles([file(name)], nothing);
-    expect([sorted.scene?.name, sorted.refused]).toEqual([name, []]);
-  }
-  expect(["tea.pot.obj", "plain"].map(stem)).toEqual(["tea.pot", "plain"]);
 });
 
 test("free names are free", () => {

@@ -2,6 +2,7 @@
 import type {
   BakeBody,
   BakeRequest,
+  BuiltInBody,
   DryRunBody,
   EnvironmentBody,
   MaterialBody,
@@ -68,6 +69,11 @@ async function get<T>(path: string): Promise<T> {
 
 export const listScenes = () => get<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
+export const listBuiltIns = () => get<BuiltInBody[]>("/api/built-ins");
+/** Make a built-in scene; a second time it is the same one. */
+export async function takeBuiltIn(name: string): Promise<SceneBody> {
+  return (await (await request(`/api/built-ins/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
+}
 export const listModels = () => get<ModelBody[]>("/api/models");
 export const listMaterials = () => get<MaterialBody[]>("/api/materials");
 export const listMeasured = () => get<MeasuredBody[]>("/api/materials/measured");

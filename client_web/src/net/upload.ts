@@ -1,9 +1,12 @@
 /** Imports: multipart uploads with progress, which fetch cannot report. */
 import type { EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
+import type { Dropped } from "../start/files";
 import { ApiError } from "./api";
 
 export interface Upload {
-  scene: File;
+  scene: Dropped;
+  /** The files that it names. */
+  companions: readonly Dropped[];
   environment: File | null;
   name: string;
   ground: boolean;
@@ -39,7 +42,8 @@ function post(path: string, form: FormData, progress: (fraction: number) => void
 
 export function uploadScene(upload: Upload, progress: (fraction: number) => void): Promise<SceneBody> {
   const form = new FormData();
-  form.append("scene", upload.scene);
+  form.append("scene", upload.scene.file, upload.scene.path);
+  for (const { file, path } of upload.companions) form.append("companions", file, path);
   if (upload.environment !== null) form.append("environment", upload.environment);
   form.append("name", upload.name);
   form.append("ground", String(upload.ground));

@@ -4,6 +4,7 @@ import type { SceneBody } from "../protocol";
 import { viewsToBake, type BakeChoice } from "../state/open";
 import { IconButton } from "../ui/Button";
 import { PresetList } from "./PresetList";
+import { Remarks } from "./Remarks";
 
 interface Props {
   scene: SceneBody;
@@ -32,13 +33,7 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
       <p>
         A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.
       </p>
-      {scene.warnings.length > 0 && (
-        <ul class="warnings">
-          {scene.warnings.map((warning) => (
-            <li key={warning}>{warning}</li>
-          ))}
-        </ul>
-      )}
+      {scene.remarks.length > 0 && <Remarks remarks={scene.remarks} />}
       <PresetList
         key={scene.id}
         scene={scene}

@@ -1,74 +1,141 @@
-/** Import: drop files anywhere on the page, or choose them; then the upload with its progress. */
-import { useState } from "preact/hooks";
+/** Import: drop files and folders anywhere on the page, or choose them; then the uploads with their progress. */
+import { useEffect, useState } from "preact/hooks";
 import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
-import { attempt, showError } from "../ui/toasts";
+import { showError } from "../ui/toasts";
 import { useFileDrop } from "../ui/useFileDrop";
-import { ENVIRONMENT_SUFFIXES, SCENE_SUFFIXES, sortFiles, stem, type Chosen } from "./files";
+import { ChosenScenes } from "./ChosenScenes";
+import {
+  chosenFiles,
+  COMPANION_SUFFIXES,
+  ENVIRONMENT_SUFFIXES,
+  isEnvironment,
+  isOfUse,
+  SCENE_SUFFIXES,
+  sortFiles,
+  stem,
+  together,
+  type Chosen,
+  type Dropped,
+} from "./files";
 
-const NOTHING: Chosen = { scene: null, environment: null, refused: [] };
+const NOTHING: Chosen = { scenes: [], environment: null };
+const MAX_NAMED = 5;
+const FORMATS = `A scene is one of ${SCENE_SUFFIXES.join(" ")}, an environment one of ${ENVIRONMENT_SUFFIXES.join(" ")}.`;
 
-export function DropZone({ onImported }: { onImported(scene: SceneBody): void }) {
-  const [chosen, setChosen] = useState<Chosen>(NOTHING);
+interface Sending {
+  name: string;
+  /** Of the bytes that are sent. */
+  share: number;
+}
+
+/** Why nothing of a drop, or not all of it, can be imported; null where all can. A folder may hold anything. */
+function refusal(files: readonly Dropped[]): string | null {
+  const refused = files.filter((each) => !isOfUse(each) && !each.path.includes("/")).map(({ path }) => path);
+  if (refused.length > 0) {
+    const more = refused.length > MAX_NAMED ? ` and ${refused.length - MAX_NAMED} more` : "";
+    return `${refused.slice(0, MAX_NAMED).join(", ")}${more}: ${FORMATS}`;
+  }
+  return files.some(isOfUse) ? null : `There is nothing to import in it. ${FORMATS}`;
+}
+
+function useSorted(files: readonly Dropped[]): Chosen {
+  const [chosen, setChosen] = useState(NOTHING);
+  useEffect(() => {
+    let stale = false;
+    void sortFiles(files).then((sorted) => !stale && setChosen(sorted));
+    return () => {
+      stale = true;
+    };
+  }, [files]);
+  return chosen;
+}
+
+function FileInput({ label, folder, take }: { label: string; folder?: boolean; take(files: Dropped[]): void }) {
+  const accept = [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES].join(",");
+  return (
+    <label class="file">
+      {label}
+      <input
+        type="file"
+        multiple
+        {...(folder ? { webkitdirectory: true } : { accept })}
+        onChange={(event) => {
+          take(chosenFiles(event.currentTarget.files ?? []));
+          event.currentTarget.value = ""; // so that the same file can be chosen again
+        }}
+      />
+    </label>
+  );
+}
+
+export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void }) {
+  const [files, setFiles] = useState<readonly Dropped[]>([]);
   const [ground, setGround] = useState(false);
-  const [sent, setSent] = useState<number | null>(null);
-  const take = (files: File[]) => {
-    const next = sortFiles(files, chosen);
-    if (next.refused.length > 0)
-      showError(
-        `${next.refused.join(", ")}: a scene is one of ${SCENE_SUFFIXES.join(" ")}, an environment one of ${ENVIRONMENT_SUFFIXES.join(" ")}. Put a scene of several files into a .zip.`,
-      );
-    setChosen(next);
+  const [sending, setSending] = useState<Sending | null>(null);
+  const { scenes, environment } = useSorted(files);
+  const take = (news: Dropped[]) => {
+    if (news.length === 0) return;
+    const words = refusal(news);
+    if (words !== null) showError(words);
+    setFiles((before) => together(before, news.filter(isOfUse)));
   };
   const over = useFileDrop(take);
-  const send = async (scene: File) => {
-    setSent(0);
-    const order = { scene, environment: chosen.environment, name: stem(scene.name), ground };
-    const imported = await attempt(() => uploadScene(order, setSent));
-    setSent(null);
-    if (imported === undefined) return;
-    setChosen(NOTHING);
-    onImported(imported);
+  /** One after another; what was refused stays chosen, so that what it lacks can be added. */
+  const send = async () => {
+    const imported: SceneBody[] = [];
+    const done = new Set<string>();
+    for (const scene of scenes) {
+      const name = stem(scene.path);
+      try {
+        const order = { scene, companions: scene.companions, environment, name, ground };
+        imported.push(await uploadScene(order, (share) => setSending({ name, share })));
+        done.add(scene.path);
+      } catch (error) {
+        showError(scenes.length > 1 ? `${name}: ${(error as Error).message}` : error);
+      }
+    }
+    setSending(null);
+    setFiles((before) => (done.size === scenes.length ? [] : before.filter(({ path }) => !done.has(path))));
+    if (imported.length > 0) onImported(imported);
   };
   return (
     <section class={`drop ${over ? "over" : ""}`} aria-label="Import a scene">
       <p>
-        <b>Drop a scene and an environment anywhere</b>, or{" "}
-        <label class="file">
-          choose files
-          <input
-            type="file"
-            multiple
-            accept={[...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES].join(",")}
-            onChange={(event) => take([...(event.currentTarget.files ?? [])])}
-          />
-        </label>
-        .
+        <b>Drop a scene, its folder, or an environment anywhere</b>, or <FileInput label="choose files" take={take} />, or{" "}
+        <FileInput label="choose a folder" folder take={take} />.
       </p>
       <p class="quiet">
-        Scene: .glb, .obj, .ply, or a .zip of .gltf or .obj with the files that belong to it. Environment: .hdr or .exr;
+        Scene: .glb, .gltf, .obj, .ply with the files that belong to it, or a .zip of them. Environment: .hdr or .exr;
         without one the scene is lit by a studio.
       </p>
+      <ChosenScenes
+        scenes={scenes}
+        numParts={files.filter(({ file }) => !isEnvironment(file)).length}
+        onLeaveOut={(path) => setFiles((before) => before.filter((each) => each.path !== path))}
+      />
       <div class="chosen">
-        <span class={chosen.scene ? "" : "quiet"}>Scene: {chosen.scene?.name ?? "none"}</span>
-        <span class={chosen.environment ? "" : "quiet"}>Environment: {chosen.environment?.name ?? "none"}</span>
+        <span class={environment ? "" : "quiet"}>Environment: {environment?.name ?? "none"}</span>
         <label class="on-ground">
           <input type="checkbox" checked={ground} onChange={(event) => setGround(event.currentTarget.checked)} />
           Put it on a ground
         </label>
-        {sent !== null ? (
+        {sending !== null ? (
           <>
-            <progress max={1} value={sent} aria-label="Upload" />
-            <span>{sent < 1 ? `Sending, ${Math.round(100 * sent)} %` : "The server reads the scene…"}</span>
+            <progress max={1} value={sending.share} aria-label="Upload" />
+            <span>
+              {sending.share < 1
+                ? `Sending “${sending.name}”, ${Math.round(100 * sending.share)} %`
+                : `The server reads “${sending.name}”…`}
+            </span>
           </>
         ) : (
-          <button
-            class="primary"
-            disabled={chosen.scene === null}
-            onClick={() => chosen.scene && void send(chosen.scene)}
-          >
-            Import
-          </button>
+          <>
+            <button class="primary" disabled={scenes.length === 0} onClick={() => void send()}>
+              {scenes.length > 1 ? `Import ${scenes.length} scenes` : "Import"}
+            </button>
+            {files.length > 0 && <button onClick={() => setFiles([])}>Clear</button>}
+          </>
         )}
       </div>
     </section>

@@ -1,10 +1,12 @@
 /** What can be baked: which light, which views, and the three presets with what each will cost, before anything starts. */
 import { useEffect, useId, useState } from "preact/hooks";
 import { planBake } from "../net/api";
-import { MAX_VIEWS_SHOWN, type DryRunBody, type SceneBody } from "../protocol";
+import { MAX_VIEWS_SHOWN, type SceneBody } from "../protocol";
 import type { BakeChoice, Preset } from "../state/open";
-import { formatBytes, formatCount, formatSeconds } from "../ui/scale";
 import { METHODS, type Method } from "./methods";
+import { OwnRecipe } from "./OwnRecipe";
+import { PlanWords, type Planned } from "./PlanWords";
+import type { Size } from "./recipe";
 
 const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "preview", label: "Preview", help: "to find the look" },
@@ -12,15 +14,18 @@ const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "final", label: "Final", help: "for sharp highlights and print" },
 ];
 
-type Plans = Partial<Record<Preset, DryRunBody | Error>>;
+type Plans = Partial<Record<Preset, Planned>>;
 
-function usePlans(scene: string, method: Method, views: readonly string[]): Plans {
+const OWN_SIZE: Size = [640, 480];
+const OWN_LIGHTS = 2000;
+
+function usePlans(scene: string, method: Method, views: readonly string[], relightable: boolean): Plans {
   const [plans, setPlans] = useState<Plans>({});
   useEffect(() => {
     let stale = false;
     setPlans({});
     for (const { name } of PRESETS) {
-      planBake({ scene, method, preset: name, views: [...views] }).then(
+      planBake({ scene, method, preset: name, views: [...views], relightable }).then(
         (plan) => !stale && setPlans((before) => ({ ...before, [name]: plan })),
         (error: Error) => !stale && setPlans((before) => ({ ...before, [name]: error })),
       );
@@ -28,22 +33,8 @@ function usePlans(scene: string, method: Method, views: readonly string[]): Plan
     return () => {
       stale = true;
     };
-  }, [scene, method, views]);
+  }, [scene, method, views, relightable]);
   return plans;
-}
-
-function Plan({ plan }: { plan: DryRunBody | Error | undefined }) {
-  if (plan === undefined) return <span class="plan quiet">Planning…</span>;
-  if (plan instanceof Error) return <span class="plan wrong">{plan.message}</span>;
-  const [width, height] = plan.recipe.size;
-  const time = plan.plan.seconds === null ? "time not known yet" : `about ${formatSeconds(plan.plan.seconds)}`;
-  return (
-    <span class="plan">
-      {width}×{height}, {formatCount(plan.recipe.lights)} light triangles
-      <br />
-      up to {formatCount(plan.plan.rays)} rays · {time} · {formatBytes(plan.plan.store_bytes)}
-    </span>
-  );
 }
 
 interface MethodsProps {
@@ -64,6 +55,21 @@ function Methods({ chosen, onChoose }: MethodsProps) {
         </label>
       ))}
     </fieldset>
+  );
+}
+
+interface RelightableProps {
+  chosen: boolean;
+  onChoose(relightable: boolean): void;
+}
+
+function Relightable({ chosen, onChoose }: RelightableProps) {
+  return (
+    <label class="bake-relightable">
+      <input type="checkbox" checked={chosen} onChange={() => onChoose(!chosen)} />
+      Ready for other light
+      <small>turning or exchanging the environment errs less; its own light is a little coarser</small>
+    </label>
   );
 }
 
@@ -100,35 +106,45 @@ interface Props {
   method: Method;
   views: readonly string[];
   action: string;
+  /** Where a size of one's own begins. */
+  size?: Size;
   onChoose(choice: BakeChoice): void;
 }
 
-export function PresetList({ scene, method: initial, views, action, onChoose }: Props) {
+export function PresetList({ scene, method: initial, views, action, size = OWN_SIZE, onChoose }: Props) {
   const [method, setMethod] = useState(initial);
   const [chosen, setChosen] = useState([...views]);
-  const plans = usePlans(scene.id, method, chosen);
+  const [relightable, setRelightable] = useState(false);
+  const plans = usePlans(scene.id, method, chosen, relightable);
   return (
     <>
       <Methods chosen={method} onChoose={setMethod} />
       {scene.views.length > 1 && (
         <Views all={scene.views.map((view) => view.name)} chosen={chosen} onChoose={setChosen} />
       )}
+      <Relightable chosen={relightable} onChoose={setRelightable} />
       <ul class="presets">
         {PRESETS.map(({ name, label, help }) => (
           <li key={name}>
             <span class="preset-name">
               <b>{label}</b> {help}
             </span>
-            <Plan plan={plans[name]} />
+            <PlanWords plan={plans[name]} />
             <button
               class={name === "good" ? "primary" : ""}
               disabled={plans[name] instanceof Error}
-              onClick={() => onChoose({ method, preset: name, views: chosen })}
+              onClick={() => onChoose({ method, preset: name, views: chosen, relightable })}
             >
               {action}
             </button>
           </li>
         ))}
+        <OwnRecipe
+          request={{ scene: scene.id, method, views: chosen, relightable }}
+          initial={{ size, lights: OWN_LIGHTS }}
+          action={action}
+          onChoose={(recipe) => onChoose({ method, views: chosen, relightable, ...recipe })}
+        />
       </ul>
     </>
   );

@@ -2,6 +2,7 @@ import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { CardProgress } from "./CardProgress";
+import { countsOf, Remarks } from "./Remarks";
 import { formatCount } from "../ui/scale";
 
 interface Props {
@@ -40,16 +41,10 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }
           {scene.materials.length === 1 ? "material" : "materials"} · {scene.views.length}&nbsp;
           {scene.views.length === 1 ? "view" : "views"}
         </small>
-        {scene.warnings.length > 0 && (
+        {scene.remarks.length > 0 && (
           <details>
-            <summary>
-              {scene.warnings.length} {scene.warnings.length === 1 ? "thing was" : "things were"} not understood
-            </summary>
-            <ul>
-              {scene.warnings.map((warning) => (
-                <li key={warning}>{warning}</li>
-              ))}
-            </ul>
+            <summary>Not as in the file: {countsOf(scene.remarks)}</summary>
+            <Remarks remarks={scene.remarks} />
           </details>
         )}
       </div>

@@ -5,6 +5,7 @@ import type { SceneBody } from "../protocol";
 import { openScene, type BakeChoice } from "../state/open";
 import { attempt, note } from "../ui/toasts";
 import { BakeDialog } from "./BakeDialog";
+import { BuiltIns } from "./BuiltIns";
 import { DropZone } from "./DropZone";
 import { SceneCard } from "./SceneCard";
 
@@ -18,8 +19,9 @@ export function StartPage() {
   const [planned, setPlanned] = useState<SceneBody | null>(null);
   const refresh = () => attempt(async () => setScenes(await listScenes()));
   useEffect(() => void refresh(), []);
-  const imported = (scene: SceneBody) => {
-    setPlanned(scene);
+  const imported = (news: SceneBody[]) => {
+    if (news.length === 1) setPlanned(news[0] as SceneBody);
+    else note(`${news.length} scenes are imported.`);
     void refresh();
   };
   const remove = (scene: SceneBody) =>
@@ -29,7 +31,7 @@ export function StartPage() {
     });
   const putOnGround = async (scene: SceneBody) => {
     const grounded = await attempt(() => addGround(scene.id));
-    if (grounded !== undefined) imported(grounded);
+    if (grounded !== undefined) imported([grounded]);
   };
   return (
     <main class="start">
@@ -41,9 +43,10 @@ export function StartPage() {
       {planned !== null && (
         <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(choice) => open(planned, choice)} />
       )}
+      <BuiltIns onOpen={open} />
       <h2>Scenes</h2>
       {scenes === null && <p class="quiet">Looking for scenes…</p>}
-      {scenes?.length === 0 && <p class="quiet">No scenes yet. Drop one above, or run the demo.</p>}
+      {scenes?.length === 0 && <p class="quiet">No scenes yet. Take a built-in one, or drop your own above.</p>}
       <ul class="cards">
         {scenes?.map((scene) => (
           <SceneCard

@@ -1,35 +1,68 @@
-/** Which of the dropped files are the scene and the environment. */
+/** Which of the dropped files are scenes, which belong to one, and which is the environment. */
+import { namedBy } from "./named";
 
-/** As the server reads them; a scene of several files comes as one .zip. */
+/** As the server reads them. */
 export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
+const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".gif"];
+/** What may belong to a scene. */
+export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
-export interface Chosen {
-  scene: File | null;
-  environment: File | null;
-  /** Names of files that are neither. */
-  refused: string[];
+/** A file and its name with the folders that it was dropped in. */
+export interface Dropped {
+  path: string;
+  file: File;
 }
 
-function endsWith(file: File, suffixes: readonly string[]): boolean {
-  return suffixes.some((suffix) => file.name.toLowerCase().endsWith(suffix));
+export interface ScenePart extends Dropped {
+  /** The files that it names. */
+  companions: Dropped[];
+  /** Names in it that no file here goes by. */
+  missing: string[];
+}
+
+export interface Chosen {
+  scenes: ScenePart[];
+  environment: File | null;
+}
+
+function endsWith(name: string, suffixes: readonly string[]): boolean {
+  return suffixes.some((suffix) => name.toLowerCase().endsWith(suffix));
 }
 
 export function isEnvironment(file: File): boolean {
-  return endsWith(file, ENVIRONMENT_SUFFIXES);
+  return endsWith(file.name, ENVIRONMENT_SUFFIXES);
 }
 
-/** A file's name without what it ends with. */
+const isScene = ({ path }: Dropped) => endsWith(path, SCENE_SUFFIXES);
+
+/** A file's name without its folders and what it ends with. */
 export function stem(name: string): string {
-  return name.replace(/\.[^.]+$/, "");
+  return name.replace(/^.*\//, "").replace(/\.[^.]+$/, "");
 }
 
-export function sortFiles(files: readonly File[], before: Chosen): Chosen {
-  const next: Chosen = { ...before, refused: [] };
-  for (const file of files) {
-    if (endsWith(file, SCENE_SUFFIXES)) next.scene = file;
-    else if (isEnvironment(file)) next.environment = file;
-    else next.refused.push(file.name);
-  }
-  return next;
+/** Files that were chosen with a button; those of a folder know where they lay in it. */
+export function chosenFiles(files: Iterable<File>): Dropped[] {
+  return [...files].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
+}
+
+/** Whether the import has a use for a file. */
+export function isOfUse({ path }: Dropped): boolean {
+  return endsWith(path, [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES]);
+}
+
+/** What was there and what came; of two files of one name the new one. */
+export function together(before: readonly Dropped[], news: readonly Dropped[]): Dropped[] {
+  return [...new Map([...before, ...news].map((each) => [each.path, each])).values()];
+}
+
+export async function sortFiles(files: readonly Dropped[]): Promise<Chosen> {
+  const environments = files.filter(({ file }) => isEnvironment(file));
+  const byPath = new Map(files.map((each) => [each.path.toLowerCase(), each]));
+  const find = (path: string) => byPath.get(path.toLowerCase());
+  const images = files.filter(({ path }) => endsWith(path, IMAGE_SUFFIXES));
+  const scenes = await Promise.all(
+    files.filter(isScene).map(async (scene) => ({ ...scene, ...(await namedBy(scene, find, images)) })),
+  );
+  return { scenes, environment: environments.at(-1)?.file ?? null };
 }

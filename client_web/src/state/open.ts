@@ -4,6 +4,7 @@ import { bakeEnd, followBake } from "../net/events";
 import { stage } from "../picture/stage";
 import { MAX_VIEWS_SHOWN, type BakeBody, type SceneBody } from "../protocol";
 import type { Method } from "../start/methods";
+import { previewSize, type Size } from "../start/recipe";
 import { attempt, showError } from "../ui/toasts";
 import { connect, disconnect, whenBakeIsReady } from "./live";
 import { recall, recallHistory, remember } from "./place";
@@ -14,8 +15,13 @@ import { availableOf } from "./views";
 export type Preset = "preview" | "good" | "final";
 export interface BakeChoice {
   method: Method;
-  preset: Preset;
   views: string[];
+  /** Gives the size and the number of lights that are not named beside it. */
+  preset?: Preset;
+  size?: Size;
+  lights?: number;
+  /** Divided for light that will be turned or exchanged. */
+  relightable?: boolean;
 }
 
 /** The views that are baked where nobody chooses: as many as can be seen at once. */
@@ -121,7 +127,9 @@ whenBakeIsReady((id) => {
 });
 
 async function bakePreview(scene: SceneBody, choice: BakeChoice): Promise<string> {
-  const preview = await api.startBake({ scene: scene.id, ...choice, preset: "preview" });
+  const { size, lights: _, ...rest } = choice;
+  const shape = size === undefined ? {} : { size: previewSize(size) };
+  const preview = await api.startBake({ scene: scene.id, ...rest, ...shape, preset: "preview" });
   store.coming.value = preview;
   const end = preview.state === "ready" ? preview : await bakeEnd(preview.id, (news) => (store.coming.value = news));
   if (end.state === "ready") return end.id;

@@ -28,6 +28,7 @@ export function BakeMenu() {
             scene={current}
             method={words.name}
             views={views.value.map((baked) => baked.name)}
+            {...(size === null ? {} : { size: [size.width, size.height] })}
             action="Bake"
             onChoose={(choice) => {
               setOpen(false);

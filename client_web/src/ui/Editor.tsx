@@ -22,7 +22,7 @@ export function Editor() {
   const widths = { outline, library, truth, inspector: inspectorShownWidth.value };
   const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
   const shown = (name: SidePanel) => shownPanels.value.includes(name);
-  const over = useFileDrop((files) => void take(files));
+  const over = useFileDrop((files) => void take(files.map(({ file }) => file)));
   return (
     <div class={`editor ${over ? "over" : ""}`} style={style}>
       <TopBar />

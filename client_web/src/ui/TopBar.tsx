@@ -13,6 +13,7 @@ import { BakeMenu } from "./BakeMenu";
 import { useDrag } from "./drag";
 import { ExportMenu } from "./ExportMenu";
 import { Overflow } from "./Overflow";
+import { RemarksMenu } from "./RemarksMenu";
 import { ShareButton } from "./ShareButton";
 import { Slider } from "./Slider";
 import { Switch } from "./Switch";
@@ -150,6 +151,7 @@ export function TopBar() {
     <header class="top-bar">
       <IconButton icon="back" label="All scenes" onClick={leave} />
       <h1 title={scene.value?.name}>{scene.value?.name ?? "…"}</h1>
+      <RemarksMenu />
       <BakeMenu />
       <Overflow controls={CONTROLS} />
       <Panels />

@@ -1,7 +1,10 @@
-/** Files dropped anywhere on the page; whether some are held over it. */
+/** Files and folders dropped anywhere on the page; whether some are held over it. */
 import { useEffect, useState } from "preact/hooks";
+import type { Dropped } from "../start/files";
+import { droppedFiles } from "../start/folders";
+import { attempt } from "./toasts";
 
-export function useFileDrop(take: (files: File[]) => void): boolean {
+export function useFileDrop(take: (files: Dropped[]) => void): boolean {
   const [over, setOver] = useState(false);
   useEffect(() => {
     const drag = (event: DragEvent) => {
@@ -10,10 +13,11 @@ export function useFileDrop(take: (files: File[]) => void): boolean {
       setOver(event.type === "dragover");
     };
     const drop = (event: DragEvent) => {
-      if (!event.dataTransfer?.types.includes("Files")) return;
+      const transfer = event.dataTransfer;
+      if (!transfer?.types.includes("Files")) return;
       event.preventDefault();
       setOver(false);
-      take([...event.dataTransfer.files]);
+      void attempt(async () => take(await droppedFiles(transfer)));
     };
     window.addEventListener("dragover", drag);
     window.addEventListener("dragleave", drag);

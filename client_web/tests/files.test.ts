@@ -1,0 +1,77 @@
+import { expect, test } from "vitest";
+import { isOfUse, sortFiles, stem, together, type Dropped } from "../src/start/files";
+import { resolve } from "../src/start/named";
+import { previewSize, recipeProblem } from "../src/start/recipe";
+
+const dropped = (path: string, content: BlobPart = ""): Dropped => ({
+  path,
+  file: new File([content], path.replace(/^.*\//, "")),
+});
+const gltf = (...uris: string[]) => JSON.stringify({ buffers: uris.map((uri) => ({ uri })), images: [{ bufferView: 0 }] });
+
+test("dropped files find their role", async () => {
+  const files = [dropped("a.GLB"), dropped("b.ply"), dropped("sky.exr"), dropped("red.PNG")];
+  const { scenes, environment } = await sortFiles(files);
+  expect(scenes.map(({ path }) => path)).toEqual(["a.GLB", "b.ply"]);
+  expect(environment?.name).toBe("sky.exr");
+  expect(files.every(isOfUse)).toBe(true);
+  expect(isOfUse(dropped("notes.txt"))).toBe(false);
+  expect(["tea.pot.obj", "plain", "a/b/c.d.glb"].map(stem)).toEqual(["tea.pot", "plain", "c.d"]);
+});
+
+test("a scene takes along what it names, wherever that lies in the folder, and no more", async () => {
+  const files = [
+    dropped("room/scenes/sofa.gltf", gltf("sofa%20a.bin", "../textures/Red.png", "data:x", "gone.bin")),
+    dropped("room/scenes/sofa a.bin"),
+    dropped("room/textures/red.png"),
+    dropped("room/textures/other.png"),
+  ];
+  const [sofa] = (await sortFiles(files)).scenes;
+  expect(sofa?.companions.map(({ path }) => path)).toEqual(["room/scenes/sofa a.bin", "room/textures/red.png"]);
+  expect(sofa?.missing).toEqual(["gone.bin"]);
+});
+
+test("an .obj takes its materials and the images that they name", async () => {
+  const files = [
+    dropped("a/tea.obj", "# by hand\r\nmtllib my looks.mtl\r\nv 0 0 0\n"),
+    dropped("a/my looks.mtl", "newmtl Pot\nmap_Kd -s 1 1 1 images\\Pot.png\n"),
+    dropped("a/images/Pot.png"),
+    dropped("a/images/cup.png"),
+  ];
+  const [pot] = (await sortFiles(files)).scenes;
+  expect(pot?.companions.map(({ path }) => path)).toEqual(["a/my looks.mtl", "a/images/Pot.png"]);
+  expect(pot?.missing).toEqual([]);
+});
+
+test("what a binary glTF names stands in its first chunk; damaged files name nothing", async () => {
+  const json = new TextEncoder().encode(gltf("far.bin"));
+  const header = new DataView(new ArrayBuffer(20));
+  header.setUint32(12, json.length, true);
+  const files = [dropped("a.glb", new Blob([header, json])), dropped("b.glb", "gl"), dropped("c.gltf", "{")];
+  expect((await sortFiles(files)).scenes.map(({ missing }) => missing)).toEqual([["far.bin"], [], []]);
+});
+
+test("of two files of one name the new one counts", () => {
+  const [old, other, news] = [dropped("a.glb"), dropped("b.hdr"), dropped("a.glb")];
+  expect(together([old, other], [news])).toEqual([news, other]);
+});
+
+test("names lead from the scene's folder, as far as there are folders", () => {
+  expect(resolve("a/b/c.gltf", "./d/../e.bin")).toBe("a/b/e.bin");
+  expect(resolve("c.gltf", "../../e.bin")).toBe("e.bin");
+});
+
+test("a preview has the shape of what was asked for and is never larger", () => {
+  expect(previewSize([640, 480])).toEqual([320, 240]);
+  const [width, height] = previewSize([4000, 500]);
+  expect(width / height).toBeCloseTo(8, 1);
+  expect(width * height).toBeLessThan(320 * 240 * 1.02);
+  expect(previewSize([30, 900])).toEqual([30, 900]);
+});
+
+test("recipes are whole numbers within bounds", () => {
+  expect(recipeProblem({ size: [16, 16384], lights: 1 })).toBeNull();
+  for (const size of [[0, 9], [640, Number.NaN], [20.5, 20], [99999, 100]] as [number, number][])
+    expect(recipeProblem({ size, lights: 9 })).toMatch("whole pixels");
+  expect(recipeProblem({ size: [640, 480], lights: 0 })).toMatch("light triangles");
+});
