@@ -50,16 +50,8 @@ def test_import_refuses_json_that_is_no_gltf(text: bytes) -> None:
     refused(text)
 
 
-@pytest.mark.parametrize(
-    ("extension", "command"),
-    [
-        ("KHR_draco_mesh_compression", "@gltf-transform/cli copy"),
-        ("EXT_meshopt_compression", "@gltf-transform/cli copy"),
-        ("KHR_texture_basisu", "@gltf-transform/cli ktxdecompress"),
-    ],
-)
-def test_import_says_how_to_unpack(extension: str, command: str) -> None:
-    assert command in refused(changed(extensionsRequired=[extension]))
+def test_import_says_how_to_unpack() -> None:
+    assert "@gltf-transform/cli ktxdecompress" in refused(changed(extensionsRequired=["KHR_texture_basisu"]))
 
 
 def test_import_shows_names_without_control_characters() -> None:

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.gltf.container import PACKED_EXTENSIONS, Container
-from relume.scene.gltf.document import Accessor, Sparse
+from relume.scene.gltf.document import Accessor, BufferView, Primitive, Sparse
+from relume.scene.gltf.packed import (
+    MAX_UNPACKED_BYTES,
+    MeshoptView,
+    draco_part,
+    meshopt_view,
+    unpacked_draco,
+    unpacked_view,
+)
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -28,7 +36,30 @@ class AccessorReader:
         self._container = container
         self._integers: dict[int, Array] = {}
         self._floats: dict[int, NDArray[np.float32]] = {}
+        self._draco: dict[int, Array] = {}
         self._budget = MAX_NUMBERS
+
+    def unpack(self, primitive: Primitive, what: str) -> None:
+        """Unpack a primitive's accessors where they have no data of their own.
+
+        Raises:
+            SceneError: the packed data is damaged, or is not what the accessors say.
+        """
+        part = draco_part(primitive.extensions, what)
+        position = primitive.attributes.get("POSITION")
+        if part is None or position is None or self._accessor(position, what).bufferView is not None:
+            return
+        if primitive.indices is None or primitive.mode != 4:
+            raise SceneError(f"{what} is packed by Draco and no list of triangles; export the scene again")
+        indices, positions = self._accessor(primitive.indices, what), self._accessor(position, what)
+        data = bytes(view_bytes(self._container, part.bufferView, what))
+        corners, values = unpacked_draco(data, indices.count, positions.count, what)
+        self._draco[primitive.indices] = _as_told(corners[:, None], indices, f"indices of {what}")
+        for name, number in part.attributes.items():
+            index = primitive.attributes.get(name)
+            if index is not None and number in values:
+                accessor = self._accessor(index, what)
+                self._draco[index] = _as_told(values[number], accessor, f"{name[:40]} of {what}")
 
     def integers(self, index: int, what: str) -> Array:
         """Unsigned scalars, such as vertex indices. (count,)"""
@@ -36,7 +67,7 @@ class AccessorReader:
         if accessor.type != "SCALAR" or accessor.componentType not in (5121, 5123, 5125):
             raise SceneError(f"{what} are not unsigned scalars; export the scene again")
         if index not in self._integers:
-            self._integers[index] = self._values(accessor, what)[:, 0]
+            self._integers[index] = self._values(index, accessor, what)[:, 0]
         return self._integers[index]
 
     def floats(self, index: int, widths: tuple[int, ...], what: str) -> NDArray[np.float32]:
@@ -49,7 +80,7 @@ class AccessorReader:
         if WIDTHS.get(accessor.type) not in widths:
             raise SceneError(f"{what} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
         if index not in self._floats:
-            values = self._values(accessor, what)
+            values = self._values(index, accessor, what)
             if accessor.normalized and values.dtype.kind != "f":
                 scaled = values / np.float64(np.iinfo(values.dtype).max)
                 self._floats[index] = np.maximum(scaled, -1).astype(np.float32)
@@ -61,11 +92,21 @@ class AccessorReader:
         accessor: Accessor = _at(self._container.document.accessors, index, what)
         return accessor
 
-    def _values(self, accessor: Accessor, what: str) -> Array:
+    def _values(self, index: int, accessor: Accessor, what: str) -> Array:
         self._budget -= accessor.count * WIDTHS[accessor.type]
         if self._budget < 0:
             raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
-        return _read(self._container, accessor, what)
+        return self._draco[index] if index in self._draco else _read(self._container, accessor, what)
+
+
+def _as_told(values: Array, accessor: Accessor, what: str) -> Array:
+    """Unpacked values in the type that their accessor says. (count, width) Raises SceneError where they cannot be."""
+    dtype = np.dtype(DTYPES[accessor.componentType])
+    is_float = dtype.kind == "f"
+    fits = values.shape == (accessor.count, WIDTHS.get(accessor.type)) and (values.dtype.kind == "f") == is_float
+    if not fits or not (is_float or np.array_equal(values.astype(dtype), values)):
+        raise SceneError(f"{what} are not what their Draco data holds; export the scene again")
+    return values.astype(dtype)
 
 
 def view_bytes(container: Container, index: int, what: str) -> memoryview:
@@ -74,6 +115,19 @@ def view_bytes(container: Container, index: int, what: str) -> memoryview:
     for extension in PACKED_EXTENSIONS:
         if extension in view.extensions:
             raise SceneError(f"{what} is packed with {extension}; unpack it: {PACKED_EXTENSIONS[extension]}")
+    packed = meshopt_view(view, what)
+    if packed is None:
+        return _bytes(container, view, what)
+    if index not in container.unpacked:
+        num_bytes = view.byteLength + sum(len(each) for each in container.unpacked.values())
+        if num_bytes > MAX_UNPACKED_BYTES:
+            raise SceneError(f"the scene's arrays unpack to more than {MAX_UNPACKED_BYTES >> 20} MB; simplify it")
+        container.unpacked[index] = unpacked_view(packed, bytes(_bytes(container, packed, what)), what)
+    return container.unpacked[index]
+
+
+def _bytes(container: Container, view: BufferView | MeshoptView, what: str) -> memoryview:
+    """A stretch of a buffer."""
     content: memoryview = _at(container.buffers, view.buffer, f"the buffer of {what}")
     if view.byteOffset + view.byteLength > len(content):
         raise SceneError(f"the buffer view of {what} reaches beyond its buffer; export the scene again")

@@ -9,7 +9,7 @@ import base64
 import binascii
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote_to_bytes
 
@@ -20,18 +20,18 @@ from relume.scene.companions import Companions
 from relume.scene.gltf.document import Buffer, Document
 from relume.scene.gltf.layers import UNDERSTOOD
 from relume.scene.gltf.names import UNREADABLE
+from relume.scene.gltf.packed import DRACO, MESHOPT, is_fallback
 
 MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
-# Required extensions that change what an accessor or image holds, with what undoes them.
+# Required extensions that change what an accessor or image holds and are not read, with what undoes them.
 PACKED_EXTENSIONS = {
-    "KHR_draco_mesh_compression": "npx @gltf-transform/cli copy in.glb out.glb",
-    "EXT_meshopt_compression": "npx @gltf-transform/cli copy in.glb out.glb",
-    "KHR_meshopt_compression": "npx @gltf-transform/cli copy in.glb out.glb",
     "KHR_texture_basisu": "npx @gltf-transform/cli ktxdecompress in.glb out.glb",
 }
 READ_EXTENSIONS = {
+    DRACO,
+    *MESHOPT,
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "EXT_texture_webp",
@@ -43,11 +43,16 @@ READ_EXTENSIONS = {
 
 @dataclass(frozen=True)
 class Container:
-    """A document and the bytes of its buffers, each at least as long as declared."""
+    """A document and the bytes of its buffers, each at least as long as declared.
+
+    Attributes:
+        unpacked: buffer views that were packed, by number, once they were needed.
+    """
 
     document: Document
     buffers: tuple[memoryview, ...]
     companions: Companions
+    unpacked: dict[int, memoryview] = field(default_factory=dict)
 
     def resolve(self, uri: str, what: str) -> bytes:
         """The content of a data URI, or of a file beside this one. Raises SceneError."""
@@ -137,6 +142,8 @@ def _split_glb(data: bytes) -> tuple[bytes, memoryview | None]:
 
 
 def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Companions) -> memoryview:
+    if is_fallback(buffer.extensions):
+        return memoryview(b"")
     if buffer.uri is not None:
         content = memoryview(_resolve(buffer.uri, companions, f"buffer {i}"))
     elif i == 0 and binary is not None:

@@ -115,6 +115,7 @@ class _Reading:
             self._corners_left -= num_corners(self._document, primitive)
             if self._corners_left < 0:
                 raise SceneError(f"the file describes more than {MAX_TRIANGLES:,} triangles; simplify it")
+            self._accessors.unpack(primitive, f"mesh {name!r}")
             self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
         geometry = self._geometry[key]
         if geometry is None:

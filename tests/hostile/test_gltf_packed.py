@@ -1,0 +1,131 @@
+"""Packed geometry that is damaged or lies about what it holds: refused in words, before anything large is made."""
+
+from __future__ import annotations
+
+import base64
+import struct
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from hostile_scenes import refused
+from packed_glb import SIDE, VECTORS, Glb, draco_bytes, draco_glb, meshopt_glb
+
+from relume.errors import SceneError
+from relume.scene.gltf import import_gltf
+from relume.scene.meshopt import MeshoptError, decode_sequence, decode_triangles, decode_vertices
+
+HUGE = 2**31
+
+
+@pytest.mark.parametrize("level", [0, 7])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.6, 0.9])
+def test_truncated_draco_is_refused(level: int, share: float) -> None:
+    packed, _ = draco_bytes(level)
+    assert "Draco" in refused(draco_glb(packed[: int(share * len(packed))] or b"D").bytes())
+
+
+@pytest.mark.parametrize("level", [0, 7])
+def test_damaged_draco_ends_in_words_or_in_a_scene(level: int) -> None:
+    (packed, _), rng = draco_bytes(level), np.random.default_rng(36)
+    for _ in range(60):
+        damaged = bytearray(packed)
+        for place in rng.integers(11, len(packed), 3):
+            damaged[place] = rng.integers(256)
+        try:
+            import_gltf(draco_glb(bytes(damaged)).bytes(), "test")
+        except SceneError:
+            continue
+
+
+def test_draco_that_claims_other_numbers_is_refused_before_it_is_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    draco_bytes()  # decodes it once
+    monkeypatch.setattr("DracoPy.decode", lambda _: pytest.fail("it was decoded"))
+    head = struct.pack("<5sBBBBH", b"DRACO", 2, 2, 1, 0, 0)
+    many = b"\xff\xff\xff\xff\x07"
+    for claims in (many + many, b"\x48" + many, b"\x48\x32", b"\xff" * 9):
+        assert "other numbers" in refused(draco_glb(head + claims + bytes(50)).bytes())
+    for wrong in (b"BRACO" + head[5:], head[:7] + b"\0" + head[8:], head[:8] + b"\7" + head[9:]):
+        assert "damaged" in refused(draco_glb(wrong + bytes(50)).bytes())
+    for unread in (head[:6] + b"\1" + head[7:], head[:9] + b"\0\x80"):
+        assert "npx @gltf-transform/cli copy" in refused(draco_glb(unread + bytes(50)).bytes())
+
+
+@pytest.mark.parametrize("accessor", [0, 1, 2])
+@pytest.mark.parametrize("count", [3, SIDE * SIDE - 1, 300_000_000])
+def test_accessors_that_draco_does_not_fill_are_refused(accessor: int, count: int) -> None:
+    glb = draco_glb()
+    glb.document["accessors"][accessor]["count"] = count
+    refused(glb.bytes())
+
+
+def test_a_draco_extension_that_is_none_is_refused() -> None:
+    for part in (None, 3, {}, {"bufferView": -1, "attributes": {}}, {"bufferView": 99, "attributes": {}}):
+        glb = draco_glb()
+        glb.document["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": part}
+        refused(glb.bytes())
+
+
+def packed_view(glb: Glb, view: int = 0) -> dict[str, Any]:
+    found: dict[str, Any] = glb.document["bufferViews"][view]["extensions"]["EXT_meshopt_compression"]
+    return found
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"count": HUGE},
+        {"count": HUGE, "byteStride": 4},
+        {"count": 0},
+        {"byteStride": 6},
+        {"byteStride": 1024},
+        {"mode": "POINTS"},
+        {"mode": "TRIANGLES"},
+        {"filter": "QUATERNION"},
+        {"byteOffset": 2**39},
+        {"byteLength": 2**39},
+        {"byteLength": 5},
+        {"buffer": 9},
+    ],
+)
+def test_meshopt_views_that_lie_are_refused_before_anything_is_made(changes: dict[str, Any]) -> None:
+    glb = meshopt_glb()
+    packed_view(glb).update(changes)
+    if "count" in changes:
+        glb.document["bufferViews"][0]["byteLength"] = max(1, changes["count"] * packed_view(glb)["byteStride"])
+        glb.document["accessors"][0]["count"] = max(1, changes["count"])
+    data = glb.bytes()
+    tracemalloc.start()
+    refused(data)
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("name", VECTORS)
+def test_truncated_and_damaged_meshopt_data_is_refused_or_decoded_within_its_bounds(name: str) -> None:
+    vector, rng = VECTORS[name], np.random.default_rng(36)
+    packed, count, stride = base64.b64decode(vector["packed"]), vector["count"], vector["stride"]
+
+    def decode(data: bytes) -> Any:
+        if vector["mode"] == "ATTRIBUTES":
+            return decode_vertices(data, count, stride)
+        return (decode_triangles if vector["mode"] == "TRIANGLES" else decode_sequence)(data, count)
+
+    for length in {0, 1, 2, 20, len(packed) // 2, len(packed) - 1}:
+        with pytest.raises(MeshoptError):
+            decode(packed[:length])
+    for _ in range(40):
+        damaged = bytearray(packed)
+        for place in rng.integers(0, len(packed), 3):
+            damaged[place] = rng.integers(256)
+        try:
+            assert len(decode(bytes(damaged))) == count
+        except MeshoptError:
+            continue
+
+
+def test_indices_beyond_the_vertices_are_refused_after_unpacking() -> None:
+    glb = meshopt_glb()
+    glb.document["accessors"][0]["count"] = 20
+    assert "beyond its 20 vertices" in refused(glb.bytes())

@@ -1,0 +1,102 @@
+"""glTF files whose geometry is packed, by Draco and by meshoptimizer."""
+
+from __future__ import annotations
+
+import base64
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import DracoPy
+import numpy as np
+from glb_builder import Glb
+
+# Packed by the encoder of meshoptimizer 1.3, unpacked by its reference decoder.
+VECTORS: dict[str, dict[str, Any]] = {
+    each["name"]: each for each in json.loads((Path(__file__).parent / "scene" / "meshopt_vectors.json").read_text())
+}
+SIDE = 7  # points along the grid's sides
+GRID_FACES = 2 * (SIDE - 1) ** 2
+
+
+def grid() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, texture coordinates and triangles of a grid in the plane z = 0, one unit by half a one each cell."""
+    y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    cells = np.array([[i, i + 1, i + SIDE + 1, i, i + SIDE + 1, i + SIDE] for i in range(SIDE * SIDE - SIDE - 1)])
+    cells = cells[np.arange(len(cells)) % SIDE != SIDE - 1]
+    positions = np.stack([x, 0.5 * y, 0 * x], -1).astype(np.float32)
+    uvs = (np.stack([x, y], -1) / (SIDE - 1)).astype(np.float32)
+    return positions, uvs, cells.reshape(-1, 3).astype(np.uint32)
+
+
+def shown(glb: Glb, attributes: dict[str, int], indices: int, **more: Any) -> Glb:
+    """The document with a node that shows a primitive."""
+    primitive = {"attributes": attributes, "indices": indices, **more}
+    glb.document["meshes"] = [{"name": "grid", "primitives": [primitive]}]
+    glb.document["nodes"] = [{"mesh": 0}]
+    glb.document["scenes"] = [{"nodes": [0]}]
+    return glb
+
+
+def empty_accessor(glb: Glb, count: int, kind: str, component: int = 5126) -> int:
+    glb.document["accessors"].append({"componentType": component, "count": count, "type": kind})
+    return len(glb.document["accessors"]) - 1
+
+
+@cache
+def draco_bytes(level: int = 7) -> tuple[bytes, int]:
+    """The grid packed by Draco, its texture coordinates number 7; and the number of its positions."""
+    positions, uvs, faces = grid()
+    options = {"quantization_bits": 14, "compression_level": level, "preserve_order": level == 0}
+    packed = DracoPy.encode(positions, faces, generic_attributes={7: uvs}, **options)
+    (place,) = (each["unique_id"] for each in DracoPy.decode(packed).attributes if each["attribute_type"] == 0)
+    return packed, place
+
+
+def draco_glb(data: bytes | None = None, level: int = 7) -> Glb:
+    """The grid packed by Draco, or other data in its place."""
+    positions, _, faces = grid()
+    packed, place = draco_bytes(level)
+    glb = Glb()
+    view = glb.view(packed if data is None else data)
+    attributes = {
+        "POSITION": empty_accessor(glb, len(positions), "VEC3"),
+        "TEXCOORD_0": empty_accessor(glb, len(positions), "VEC2"),
+    }
+    indices = empty_accessor(glb, faces.size, "SCALAR", 5125)
+    part = {"bufferView": view, "attributes": {"POSITION": place, "TEXCOORD_0": 7}}
+    glb.document["extensionsRequired"] = glb.document["extensionsUsed"] = ["KHR_draco_mesh_compression"]
+    return shown(glb, attributes, indices, extensions={"KHR_draco_mesh_compression": part})
+
+
+def meshopt_glb(name: str = "EXT_meshopt_compression") -> Glb:
+    """The grid packed by meshoptimizer: exponents, octahedral normals, triangles; its second buffer is a fallback."""
+    glb = Glb()
+
+    def accessor(vector: str, kind: str, component: int, **more: Any) -> int:
+        packed = VECTORS[vector]
+        data = base64.b64decode(packed["packed"])
+        place = glb.view(data)
+        view = glb.document["bufferViews"][place]
+        told = {key: packed[key] for key in ("mode", "count", "filter")}
+        told |= {"buffer": 0, "byteOffset": view["byteOffset"], "byteLength": len(data), "byteStride": packed["stride"]}
+        view |= {"buffer": 1, "byteOffset": 0, "byteLength": packed["count"] * packed["stride"]}
+        view["extensions"] = {name: told}
+        if packed["mode"] == "ATTRIBUTES":
+            view["byteStride"] = packed["stride"]
+        index = empty_accessor(glb, packed["count"], kind, component)
+        glb.document["accessors"][index] |= {"bufferView": place, **more}
+        return index
+
+    attributes = {
+        "POSITION": accessor("places of the grid", "VEC3", 5126),
+        "NORMAL": accessor("normals of the grid", "VEC3", 5120, normalized=True),
+    }
+    shown(glb, attributes, accessor("grid, 2 bytes", "SCALAR", 5123))
+    glb.document["extensionsRequired"] = glb.document["extensionsUsed"] = [name, "KHR_mesh_quantization"]
+    glb.document["buffers"] = [
+        {"byteLength": len(glb.binary)},
+        {"byteLength": 10_000, "extensions": {name: {"fallback": True}}},
+    ]
+    return glb
