@@ -21,7 +21,7 @@ export function countsOf(remarks: readonly Remark[]): string {
 
 export function Remarks({ remarks }: { remarks: readonly Remark[] }) {
   return (
-    <div class="remarks">
+    <div class="remarks" role="group" aria-label="What the import says" tabIndex={0}>
       {GROUPS.map(({ effect, title }) => {
         const own = remarks.filter((remark) => remark.effect === effect);
         return (

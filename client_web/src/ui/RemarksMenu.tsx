@@ -20,7 +20,7 @@ export function RemarksMenu() {
         ! {remarks.length}
       </button>
       {open && (
-        <div class="menu-body remarks-menu" role="region" aria-label="What the import says" tabIndex={0}>
+        <div class="menu-body remarks-menu">
           <Remarks remarks={remarks} />
         </div>
       )}

@@ -23,8 +23,8 @@ MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 UNPACK = "unpack it: npx @gltf-transform/cli copy in.glb out.glb"
 MAX_UNPACKED_BYTES = 1 << 30  # of all buffer views of a file
 
-# The packing is a known one; a byte of it never means more than this many.
-MESHOPT_RATIO = 300
+# A block of 256 elements has at least a byte for every four of an element's.
+MESHOPT_RATIO = 1024
 DRACO_HEADER = struct.Struct("<5sBBBBH")
 DRACO_MESH, DRACO_SEQUENTIAL, DRACO_EDGEBREAKER = 1, 0, 1
 DRACO_METADATA = 0x8000

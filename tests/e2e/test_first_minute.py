@@ -1,0 +1,134 @@
+"""The first minute in a browser: a built-in scene, folders and several files, what an import says, a bake of any shape."""
+
+from __future__ import annotations
+
+import json
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from editor_page import Editor
+from editor_server import Server
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+ROOM = f"mtllib looks/room.mtl\n{TRIANGLE}v 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl Wall\nf 1/1 2/2 3/3\nl 1 2\nf 2/1 4/2 3/3\n"
+LOOKS = "newmtl Wall\nKd 1 1 1\nmap_Kd ../images/wall.png\nd 0.5\n"
+GLTF = {
+    "asset": {"version": "2.0"},
+    "buffers": [{"uri": "far%20away.bin", "byteLength": 36}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "nodes": [{"mesh": 0}],
+    "scenes": [{"nodes": [0]}],
+}
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an .obj, and what belongs to it in folders of their own."""
+    folder = tmp_path_factory.mktemp("files") / "room"
+    for name, content in {"room.obj": ROOM, "looks/room.mtl": LOOKS, "README.md": "a room"}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(content)
+    (folder / "images").mkdir()
+    Image.new("RGB", (2, 2), (200, 40, 40)).save(folder / "images" / "wall.png")
+    return folder
+
+
+@pytest.fixture
+def start(server: Server, browser: Browser) -> Iterator[Page]:
+    """The start page in a fresh profile; scenes that a test imports are gone afterwards."""
+    known = {scene["id"] for scene in server.call("/api/scenes")}
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(server.url)
+    yield page
+    context.close()
+    for scene in server.call("/api/scenes"):
+        if scene["id"] not in known:
+            request = urllib.request.Request(f"{server.url}/api/scenes/{scene['id']}", method="DELETE")
+            urllib.request.urlopen(request, timeout=30).close()
+    assert errors == []
+
+
+def drop(page: Page, *paths: Path) -> None:
+    """Drop files and folders of the disk onto the page, as a file manager does."""
+    session = page.context.new_cdp_session(page)
+    data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 400, "y": 300, "data": data})
+
+
+def test_one_click_takes_a_built_in_scene_and_opens_it(start: Page, server: Server) -> None:
+    start.get_by_role("button", name="Still life Teapot").click()
+    Editor(start).wait_until_exact()
+    expect(start.get_by_role("heading", level=1)).to_have_text("Still life")
+    expect(start.get_by_role("option", name="Teapot")).to_be_visible()
+
+
+def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_at_hand(
+    start: Page, server: Server, room: Path
+) -> None:
+    drop(start, room)
+    expect(start.get_by_text("Scene: room.obj with 2 files")).to_be_visible()
+    start.get_by_role("button", name="Import", exact=True).click()
+    dialog = start.get_by_role("region", name="Bake room")
+    seen = dialog.get_by_role("region", name="Looks other than in the file")
+    expect(seen).to_contain_text("material 'Wall' is see-through; it is opaque here")
+    expect(dialog.get_by_role("region", name="Not used")).to_contain_text("lines of kind 'l'")
+    own = dialog.get_by_role("group", name="Size and lights of your own bake")
+    own.get_by_label("Height").fill("16385")
+    expect(dialog.get_by_text("Give width and height in whole pixels")).to_be_visible()
+    own.get_by_label("Width").fill("60")
+    own.get_by_label("Height").fill("200")
+    own.get_by_label("Light triangles").fill("40")
+    expect(dialog.get_by_text("60×200, 40 light triangles")).to_be_visible()
+    dialog.get_by_label("Ready for other light").check()
+    dialog.locator(".own-recipe").get_by_role("button", name="Open and bake").click()
+    editor = Editor(start)
+    expect(start.get_by_role("button", name="60×200, direct")).to_be_visible()
+    wall = editor.pixels()
+    assert (wall.max(axis=(0, 1)) > 20).all()
+    assert wall[..., 0].astype(int).max() > 1.3 * wall[..., 2].max()  # the image came along
+    (scene,) = (each for each in server.call("/api/scenes") if each["name"] == "room")
+    recipes = [bake["recipe"] for bake in server.call(f"/api/bakes?scene={scene['id']}")]
+    assert recipes[0] | {"views": None} == {
+        "method": "direct", "views": None, "size": [60, 200], "lights": 40, "relightable": True,
+    }
+    mark = start.get_by_role("button", name="What the import says: 1 wrong, 1 unused")
+    mark.click()
+    expect(start.get_by_text("material 'Wall' is see-through; it is opaque here")).to_be_visible()
+    start.keyboard.press("Escape")
+    expect(start.get_by_text("material 'Wall' is see-through; it is opaque here")).to_have_count(0)
+
+
+def test_several_files_are_several_scenes_and_what_is_lacking_is_said(
+    start: Page, server: Server, tmp_path: Path
+) -> None:
+    before = len(server.call("/api/scenes"))
+    for name, content in {"one.obj": TRIANGLE + "f 1 2 3\n", "notes.txt": "", "two.gltf": json.dumps(GLTF)}.items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "far away.bin").write_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes())
+    drop(start, tmp_path / "notes.txt")
+    expect(start.get_by_text("notes.txt: A scene is one of .glb")).to_be_visible()
+    expect(start.get_by_role("button", name="Import", exact=True)).to_be_disabled()
+    files = start.get_by_label("choose files")
+    files.set_input_files([tmp_path / "one.obj", tmp_path / "two.gltf"])
+    expect(start.get_by_text("lacks far away.bin: drop them too")).to_be_visible()
+    start.get_by_role("button", name="Import 2 scenes").click()
+    expect(start.get_by_text("two: buffer 0 lies outside the file")).to_be_visible()
+    expect(start.get_by_role("button", name="Open one")).to_be_visible()
+    expect(start.get_by_role("list", name="Chosen scenes")).to_have_text("Scene: two.gltf with 0 fileslacks far away.bin: drop them too, or the folder they lie in")
+    assert len(server.call("/api/scenes")) == before + 1
+    drop(start, tmp_path / "far away.bin")
+    expect(start.get_by_text("Scene: two.gltf with 1 file")).to_be_visible()
+    start.get_by_role("button", name="Import", exact=True).click()
+    expect(start.get_by_role("button", name="Open two")).to_be_visible()
+    assert len(server.call("/api/scenes")) == before + 2
