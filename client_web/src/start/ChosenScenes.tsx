@@ -6,6 +6,8 @@ interface Props {
   scenes: readonly ScenePart[];
   /** Of chosen files that are parts of scenes. */
   numParts: number;
+  /** Why the server refused some, by path. */
+  problems: ReadonlyMap<string, string>;
   onLeaveOut(path: string): void;
 }
 
@@ -21,7 +23,7 @@ function lack({ missing }: ScenePart): string {
   return `lacks ${missing.slice(0, MAX_NAMED).join(", ")}${more}: drop them too, or the folder they lie in`;
 }
 
-export function ChosenScenes({ scenes, numParts, onLeaveOut }: Props) {
+export function ChosenScenes({ scenes, numParts, problems, onLeaveOut }: Props) {
   if (scenes.length === 0)
     return (
       <p class="chosen-scenes">
@@ -36,6 +38,7 @@ export function ChosenScenes({ scenes, numParts, onLeaveOut }: Props) {
             Scene: {scene.file.name} <span class="quiet">{words(scene)}</span>
           </span>
           {scene.missing.length > 0 && <span class="wrong">{lack(scene)}</span>}
+          {problems.has(scene.path) && <span class="wrong">{problems.get(scene.path)}</span>}
           <IconButton icon="close" label={`Leave out ${stem(scene.path)}`} onClick={() => onLeaveOut(scene.path)} />
         </li>
       ))}

@@ -72,12 +72,14 @@ function FileInput({ label, folder, take }: { label: string; folder?: boolean; t
 export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void }) {
   const [files, setFiles] = useState<readonly Dropped[]>([]);
   const [ground, setGround] = useState(false);
+  const [problems, setProblems] = useState<ReadonlyMap<string, string>>(new Map());
   const [sending, setSending] = useState<Sending | null>(null);
   const { scenes, environment } = useSorted(files);
   const take = (news: Dropped[]) => {
     if (news.length === 0) return;
     const words = refusal(news);
     if (words !== null) showError(words);
+    setProblems(new Map());
     setFiles((before) => together(before, news.filter(isOfUse)));
   };
   const over = useFileDrop(take);
@@ -85,6 +87,7 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
   const send = async () => {
     const imported: SceneBody[] = [];
     const done = new Set<string>();
+    const refused = new Map<string, string>();
     for (const scene of scenes) {
       const name = stem(scene.path);
       try {
@@ -92,10 +95,17 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
         imported.push(await uploadScene(order, (share) => setSending({ name, share })));
         done.add(scene.path);
       } catch (error) {
-        showError(scenes.length > 1 ? `${name}: ${(error as Error).message}` : error);
+        refused.set(scene.path, (error as Error).message);
       }
     }
     setSending(null);
+    setProblems(refused);
+    if (refused.size > 0)
+      showError(
+        scenes.length === 1
+          ? [...refused.values()].join()
+          : `${refused.size} of ${scenes.length} scenes could not be imported; the list says why.`,
+      );
     setFiles((before) => (done.size === scenes.length ? [] : before.filter(({ path }) => !done.has(path))));
     if (imported.length > 0) onImported(imported);
   };
@@ -112,6 +122,7 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
       <ChosenScenes
         scenes={scenes}
         numParts={files.filter(({ file }) => !isEnvironment(file)).length}
+        problems={problems}
         onLeaveOut={(path) => setFiles((before) => before.filter((each) => each.path !== path))}
       />
       <div class="chosen">
