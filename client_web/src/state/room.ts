@@ -31,7 +31,7 @@ const between = (least: number, most: number, share: number) =>
 
 /** CSS pixels. */
 export const panelWidths = computed<Record<SidePanel, number>>(() => ({
-  outline: 240,
+  outline: 250,
   library: between(280, 400, 0.24),
   truth: between(280, 480, 0.26),
   inspector: inspectorShownWidth.value + SPLITTER,

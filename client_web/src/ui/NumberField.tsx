@@ -1,5 +1,5 @@
 /** A number that is typed: Enter or leaving takes it, Escape leaves it as it was, arrows step it. */
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { history } from "../state/store";
 import { formatNumber, parseNumber } from "./scale";
 
@@ -21,7 +21,7 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, b
   const [draft, setDraft] = useState<string | null>(begun ?? null);
   const refused = useRef(false);
   const wrong = draft !== null && parseNumber(draft) === null;
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (!autoFocus) return;
     input.current?.focus();
     if (begun === undefined) input.current?.select();

@@ -62,13 +62,15 @@ export function Slider(props: SliderProps) {
       if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
     },
   });
+  /** Several keys may come before the field is there. */
+  const begin = (typed: string) => setTyping((now) => ({ begun: `${now?.begun ?? ""}${typed}` }));
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
     if (step !== undefined) set(at + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
     else if (event.key === "Enter") setTyping({});
-    else if (isNumberKey(event, props.minimum)) setTyping({ begun: event.key });
+    else if (isNumberKey(event, props.minimum)) begin(event.key);
     else if ((event.key === "Delete" || event.key === "Backspace") && initial !== undefined) onChange(initial);
     else return;
     event.preventDefault();
