@@ -88,7 +88,7 @@ def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> ND
     most = int(_MOST_TURNING * edge.size)
     if np.count_nonzero(turning) > most:
         turning &= cosine < np.partition(cosine[turning], most)[most]
-    return turning
+    return np.asarray(turning)
 
 
 def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
@@ -119,10 +119,10 @@ def _merge(
     group = np.full((num_pixels, positions_a_pixel), -1)
     for candidate in range(positions_a_pixel):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
-        first = slice(candidate, candidate + 1)
+        one = slice(candidate, candidate + 1)
         cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
-        off = _is_off_plane(normal[:, first], distance[:, first], rays[:, first], distance, rays)
-        same = (group < 0) & (mesh == mesh[:, first]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
+        off = _is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
+        same = (group < 0) & (mesh == mesh[:, one]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
         same &= (group[:, candidate] < 0)[:, None]
         group[same] = candidate
     pixel, first = np.nonzero(group == np.arange(positions_a_pixel))

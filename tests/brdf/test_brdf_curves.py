@@ -122,7 +122,7 @@ def test_points_are_averaged_exactly_and_continue_constantly():
 def test_two_points_make_a_straight_line():
     term, curve = drawn({"points": [[0, 0], [90, 9]]})
     edges = np.linspace(0, 9, 257)
-    middles = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # of a band's directions: nearly its own
+    middles = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # nearly those of the bands
     np.testing.assert_allclose(curve_bands(term, curve)[2], middles, rtol=1e-9)
     term, curve = drawn({"points": [[0, 0], [90, 9]]}, name="theta_d")
     np.testing.assert_allclose(curve_bands(term, curve)[2], 9 * (np.arange(64) + 0.5) / 64, rtol=1e-9)

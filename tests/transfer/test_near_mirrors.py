@@ -1,4 +1,4 @@
-"""Lobes narrower than a light triangle, and than a band: chrome in even light is even, as bright as the light."""
+"""Lobes narrower than a light triangle, and than a band: chrome in even light is even, and as bright as the light."""
 
 from __future__ import annotations
 
