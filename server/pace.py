@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 _ENOUGH = 0.02  # of a step: before, its pace says little
+_EARLY = 0.25  # of a sample: until then much is made that is made once, such as kernels
 
 
 class Pace:
@@ -42,8 +43,14 @@ def sampled(work: Callable[[Callable[[float], object]], object], scale: float) -
         work: does a small sample; called with whom to tell its progress.
     """
     began = time.monotonic()
-    first: list[float] = []
-    work(lambda share: None if first else first.append(time.monotonic()))
+    early: list[tuple[float, float]] = []
+
+    def tell(share: float) -> None:
+        if not early and share >= _EARLY:
+            early.append((time.monotonic(), share))
+
+    work(tell)
     ended = time.monotonic()
-    prepared = first[0] if first else began
-    return (prepared - began) + scale * (ended - prepared)
+    at, share = early[0] if early else (began, 0.0)
+    whole = (ended - at) / (1 - share) if share < 1 else ended - began
+    return max(0.0, at - began - share * whole) + scale * whole

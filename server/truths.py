@@ -31,7 +31,7 @@ from worker.paths import scene_path
 
 F32 = NDArray[np.float32]
 SPP = 64
-_SAMPLE = 8  # times as wide as its sample is a picture whose pace is not known
+_SAMPLE = 4  # times as wide as its sample is a picture whose pace is not known
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class TruthQueue:
         try:
             if frame is None or estimate is None:
                 self._backlog.note(work.id, 0)
-                frame = self._library.render(transfer, request.view, look, lambda share: None, is_stopped)
+                frame = self._library.render(transfer, request.view, look, cancelled=is_stopped)
                 estimate = Estimate.nothing(*frame.shape[:2])
             size = frame.shape[1], frame.shape[0]
             pace = self._paces[work.id] = Pace(self._pass_s.get((request.bake, request.view)))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO
-from editor_page import Editor
+from editor_page import WAIT_MS, Editor
 from editor_server import SIZE
 from playwright.sync_api import expect
 
@@ -18,7 +18,7 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
     page.get_by_role("button", name="In the middle").click()
     editor.wait_until_exact()
     exr, bar = page.get_by_role("button", name="EXR", exact=True), page.get_by_role("progressbar", name="EXR")
-    with page.expect_download() as download:
+    with page.expect_download(timeout=WAIT_MS) as download:
         exr.click()
     assert download.value.suggested_filename == "still-life-front.exr"
     path = tmp_path / "picture.exr"
@@ -34,7 +34,7 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
     expect(bar).to_have_count(0)
 
     page.get_by_role("button", name="More ways to export").press("Enter")
-    with page.expect_download() as download:
+    with page.expect_download(timeout=WAIT_MS) as download:
         page.get_by_role("button", name="EXR, the picture alone").press("Enter")
     download.value.save_as(path)
     assert OpenImageIO.ImageBuf(str(path)).spec().channelnames == ("R", "G", "B")

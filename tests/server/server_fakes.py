@@ -249,6 +249,7 @@ class Control:
         transfer: FakeTransfer,
         view: str,
         look: Any,
+        *,
         progress: Callable[[float], object] = lambda share: None,
         cancelled: Callable[[], bool] = lambda: False,
         for_display: bool = False,

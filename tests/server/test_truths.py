@@ -64,6 +64,7 @@ def test_comparison_goes_on_after_a_restart(
     queue = client.app.state.services.truths
     identity = url.rsplit("/", 1)[1]
     request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
+    queue.close()  # or it might be the first to look
     # as a kill after three passes leaves it
     queue._backlog._update(identity, ("ready",), state="running", request=request)
     later = Control()

@@ -16,7 +16,7 @@ from relume.exr.attributes import Origin, attributes_of, world_to_ndc
 from relume.exr.layers import layers_of
 from relume.exr.picture import export_exr
 from relume.exr.writer import channels_of, write_exr
-from relume.look import default_look, validate
+from relume.look import Look, default_look, validate
 from relume.trace.primary import camera_directions
 
 POINT = {"kind": "point", "position": [0, 1, 0]}
@@ -68,6 +68,20 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
     assert names_of(layers_of(look_with(transport={"bounces": 1}), reflects=True)) == paths[:2]
     assert names_of(layers_of(look_with(transport={"show": "first_bounce"}), reflects=True)) == []
     assert names_of(layers_of(look_with(lights=lights, environment={"scale": 0.0}), reflects=False)) == []
+
+
+def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_none():
+    look = look_with(lights={"Key": POINT}, background={"kind": "color", "color": [0.2, 0.3, 0.4]})
+    *lit, behind = layers_of(look, reflects=False)
+    assert behind.of == "background"
+    assert behind.look.background.color == (0.2, 0.3, 0.4)
+    assert not any(any(light.gain) for light in behind.look.lights.values())
+    assert not any(behind.look.environment.gain)
+    assert all(layer.look.background.color == (0, 0, 0) for layer in lit)
+    assert layers_of(look_with(background={"kind": "color"}), reflects=False) == []
+    catching = look.model_dump()
+    catching["materials"]["Floor"]["catcher"] = True
+    assert layers_of(Look.model_validate(catching), reflects=True) == []
 
 
 def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():
