@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -96,6 +97,6 @@ def test_a_bake_says_what_it_is_at(editor: Editor, server: Server) -> None:
     expect(words).to_contain_text("baking, ")
     editor.page.get_by_role("button", name="Cancel").click()
     said = editor.page.evaluate("window.said.join('\\n')")
-    assert "starting worker processes, 1 s" in said
+    assert re.search(r"starting worker processes, \d+ s", said)
     assert any(phase in said for phase in ("loading the kernels", "reading the scene", "sorting its triangles"))
     assert server.call(f"/api/bakes/{bake['id']}")["state"] in ("cancelled", "running")
