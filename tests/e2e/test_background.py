@@ -27,7 +27,7 @@ def ids(server: Server, bake: str) -> np.ndarray:
 
 def downloaded(editor: Editor, button: str, path: Path) -> Path:
     with editor.page.expect_download() as download:
-        editor.page.get_by_role("button", name=button).click()
+        editor.page.get_by_role("button", name=button, exact=True).click()
     download.value.save_as(path)
     return path
 
