@@ -67,7 +67,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 def _scenes(count: int) -> Iterator[Scene]:
     """Scenes of several sizes made by code, each another."""
-    yield from [make() for make in BUILT_IN.values()][:count]
+    yield from [each.make() for each in BUILT_IN.values()][:count]
     for number in range(count - len(BUILT_IN)):
         yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.05 * number)), (LAMBERT,))
 
