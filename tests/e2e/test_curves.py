@@ -161,10 +161,10 @@ def test_points_that_are_touched_change_nothing_and_a_nudge_no_more_than_its_sha
 
         angles = [float(place.split()[0]) for place in places if place is not None]
         values = [float(point.get_attribute("aria-valuenow") or "nan") for point in curve.points.all()]
-        for index, value in enumerate(values):
-            if value == 0:
+        for index in sorted({0, 1, len(values) // 2, len(values) - 2, len(values) - 1}):
+            if values[index] == 0:
                 continue
-            curve.type_value(index, value * (1 + NUDGE))
+            curve.type_value(index, values[index] * (1 + NUDGE))
             *_, drawn = curve.said()
             nudged = term_of(model, params, drawn)
             after = bands_of(nudged)
