@@ -11,6 +11,7 @@ import json
 import os
 import threading
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from relume.imageio import write_image
 from relume.reference.truth import Comparison, Estimate, compare, error_map
 from server.backlog import Backlog, Work
 from server.bodies import TruthRequest
+from server.errors import BusyError
 from server.live.ports import Library, Transfer
 from server.pace import Pace, sampled
 from server.tables import TruthRow
@@ -65,17 +67,28 @@ class TruthQueue:
         return self._backlog.submit(request.model_dump_json())
 
     def seconds(self, request: TruthRequest, transfer: Transfer) -> float:
-        """What a comparison will take: as passes of this view took before, or as a small picture takes now."""
+        """What a comparison will take: as passes of this view took before, or as a small picture takes now.
+
+        Raises:
+            BusyError: another view is being tried out, and who asks would wait behind it.
+            CancelledError: the server closes.
+        """
         key = request.bake, request.view
-        with self._sampling:
+        if key in self._pass_s:
+            return request.passes * self._pass_s[key]
+        if not self._sampling.acquire(blocking=False):
+            raise BusyError("another comparison is being estimated; ask again in a moment")
+        try:
             if key not in self._pass_s:
                 look = looks.validate(request.look, transfer.default_look).on_the_map()
                 view = transfer.views[request.view]
                 size = max(1, view.width // _SAMPLE), max(1, view.height // _SAMPLE)
                 scale = view.width * view.height / (size[0] * size[1])
-                self._pass_s[key] = sampled(
-                    lambda tell: self._pass(transfer, request.view, look, size, 0, tell, lambda: False), scale
-                )
+                closes = partial(getattr, self._backlog, "is_closing")
+                of_pass = partial(self._pass, transfer, request.view, look, size, 0, is_stopped=closes)
+                self._pass_s[key] = sampled(lambda tell: of_pass(tell=tell), scale)
+        finally:
+            self._sampling.release()
         return request.passes * self._pass_s[key]
 
     def get(self, identity: str) -> TruthStatus:

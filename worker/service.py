@@ -240,10 +240,13 @@ class BakeService:
             stopped=self._closing.is_set,
             expected=expected,
         )
-        if not tiny:
-            self._is_crowding.set()
-        runner.run()
-        if not tiny:
+        if tiny:
+            runner.run()
+            return
+        self._is_crowding.set()
+        try:
+            runner.run()
+        finally:
             self._is_crowding.clear()
 
     def _remove_strays(self) -> None:

@@ -65,8 +65,8 @@ class TransferPool:
 
     @property
     def opened(self) -> list[Transfer]:
-        """Those that are open now."""
-        futures = [entry.future for entry in self._entries.values() if entry.future.done()]
+        """Those that are open now; may be asked from any thread."""
+        futures = [entry.future for entry in list(self._entries.values()) if entry.future.done()]
         return [future.result() for future in futures if not future.cancelled() and future.exception() is None]
 
     def let_go(self) -> tuple[int, Collection[Path]]:

@@ -151,3 +151,15 @@ def test_brute_force_has_the_light_paths_of_the_bake(
 
 def _baked_by(method: str, init: Callable[..., None]) -> Callable[..., None]:
     return lambda self, *args, **more: init(self, *args, **{**more, "method": method})
+
+
+def test_an_estimate_does_not_wait_behind_another(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
+    truths = client.app.state.services.truths  # type: ignore[attr-defined]
+    with truths._sampling:
+        refused = client.post("/api/truths", json=question)
+        assert (refused.status_code, refused.json()["title"]) == (503, "Too busy")
+    told = client.post("/api/truths", json=question).json()
+    with truths._sampling:  # what is known is told at once
+        assert client.post("/api/truths", json=question).json() == told

@@ -46,7 +46,7 @@ export function TruthPanel() {
       {body === undefined && (
         <>
           <p>Compares the picture with one made the slow way, by a ray for every light that is drawn.</p>
-          <p role="status">{truthPlan.value === null ? "Finding out how long it takes…" : planWords(truthPlan.value)}</p>
+          <p role="status">{planWords(truthPlan.value)}</p>
         </>
       )}
       {body !== undefined && (

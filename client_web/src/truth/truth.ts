@@ -10,8 +10,8 @@ import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;
 
-/** What a comparison would take; null while that is not known. */
-export const truthPlan = signal<TruthPlanBody | null>(null);
+/** What a comparison would take; null while that is being found out. */
+export const truthPlan = signal<TruthPlanBody | "unknown" | null>(null);
 /** The comparison, and the look that it judges. */
 export const truth = signal<{ body: TruthBody; look: string } | null>(null);
 
@@ -44,7 +44,8 @@ function asked(): TruthRequest | null {
 async function plan(): Promise<void> {
   const request = asked();
   truthPlan.value = null;
-  if (request !== null) await attempt(async () => (truthPlan.value = await planTruth(request)));
+  // the time is told where it can be: a server that is busy with another estimate may be asked all the same
+  if (request !== null) truthPlan.value = await planTruth(request).catch(() => "unknown" as const);
 }
 
 export async function askTruth(): Promise<void> {

@@ -8,7 +8,9 @@ function percent(share: number): string {
 }
 
 /** How long it takes, before it begins. */
-export function planWords(plan: { passes: number; seconds: number }): string {
+export function planWords(plan: { passes: number; seconds: number } | "unknown" | null): string {
+  if (plan === null) return "Finding out how long it takes…";
+  if (plan === "unknown") return "How long it takes is not known now; it is said while it runs.";
   return `${plan.passes} passes of brute force: about ${formatSeconds(plan.seconds)}.`;
 }
 
