@@ -84,7 +84,7 @@ export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdit
         <svg
           width={frame.width}
           height={frame.height}
-          tabIndex={tool.value === "stretch" ? 0 : -1}
+          tabindex={tool.value === "stretch" ? 0 : -1}
           role="group"
           aria-label={`${info.label} curve`}
           {...handlers}

@@ -81,7 +81,7 @@ export function Handles({ frame, hand, points }: Props) {
           key={index}
           data-index={index}
           role="slider"
-          tabIndex={0}
+          tabindex={0}
           class={picked.value?.index === index ? `handle picked ${picked.value.carried ? "carried" : ""}` : "handle"}
           aria-label={`Point ${index + 1} of ${points.length}`}
           aria-orientation="vertical"

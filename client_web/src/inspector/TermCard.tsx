@@ -70,7 +70,7 @@ function Texture({ channels, value, onChange }: TextureProps) {
   return (
     <label class="param texture">
       <span class="param-label">Texture</span>
-      <select value={value ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
+      <select value={channels.find((name) => name === value) ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
         <option value="">None</option>
         {channels.map((name) => (
           <option key={name} value={name}>

@@ -89,7 +89,7 @@ export function NavigationMap() {
     <div class="material-map">
       <svg
         viewBox={`-6 -6 ${WIDTH + 12} ${HEIGHT + 12}`}
-        tabIndex={0}
+        tabindex={0}
         role="application"
         aria-label={`Map of materials; arrow keys move the point. Now ${words}`}
         onKeyDown={key}
