@@ -152,8 +152,8 @@ def test_right_frame_under_a_small_sun_is_not_blamed_and_wrong_ones_are(roughnes
     assert found.significant <= 0.01
     assert found.error is None or found.error < 0.01
 
-    brighter = look.model_dump()
-    brighter["materials"]["Floor"]["terms"][0]["color"] = [0.525, 0.4725, 0.42]
+    floor = {"terms": [{"model": "lambert", "color": [0.525, 0.4725, 0.42]}]}
+    brighter = {"materials": {"Floor": floor}}
     of_brighter = validate(brighter, default_look(scene.materials))
     lit = reference_image(scene, "front", of_brighter, size, 1024, pass_index=1_000)
     of_floor = np.abs(lit - frame).max(axis=2) > 0.02 * frame.max(axis=2)

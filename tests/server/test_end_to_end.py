@@ -114,7 +114,7 @@ def test_frame_is_true(real: TestClient) -> None:
     truth = wait_until_done(real, real.post("/api/truths", json=request).headers["location"])
     assert truth["state"] == "ready", truth["problem"]
     assert truth["found"]["noise"] > 0
-    assert truth["found"]["error"] < 0.03
+    assert truth["found"]["limit"] < 0.03  # of the error, which may lie below the noise
 
 
 def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def samples_of(scene, size, view=None):
 
 
 def both(scene, size, num_lights):
-    """Bits of the full trace and predicted ones, the cosines, the lights and the counts."""
+    """Bits of the full trace and predicted ones, the light that each lets through, and the counts."""
     geometry, position, normal = samples_of(scene, size)
     lights = subdivide(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
@@ -45,9 +45,16 @@ def both(scene, size, num_lights):
     return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.power[:, 1], found.rays
 
 
-def change(full, predicted, weight):
-    """Relative RMSE of the irradiance."""
-    right, wrong = (full * weight).sum(axis=1), (predicted * weight).sum(axis=1)
+def in_pixels(scene, size, values):
+    """A value of each surface sample as the picture shows it: by its share of its pixel. (pixels,)"""
+    samples = sample_view(scene, merge(scene), scene.cameras[0].name, size)
+    solid = samples.material != BACKGROUND
+    return np.bincount(samples.pixel[solid], samples.weight[solid] * values, minlength=size[0] * size[1])
+
+
+def change(scene, size, full, predicted, weight):
+    """Relative RMSE of a picture of the irradiance."""
+    right, wrong = (in_pixels(scene, size, (bits * weight).sum(axis=1)) for bits in (full, predicted))
     return np.sqrt(np.mean((wrong - right) ** 2) / np.mean(right**2))
 
 
@@ -87,10 +94,11 @@ def first_of(lights, count):
     ],
 )
 def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bound):
-    full, predicted, weight, rays = both(scene(), (96, 72), num_lights)
+    made, size = scene(), (96, 72)
+    full, predicted, weight, rays = both(made, size, num_lights)
     wrong = (full != predicted).sum() / rays.full
     assert wrong <= WRONG_SHARE
-    assert change(full, predicted, weight) <= bound
+    assert change(made, size, full, predicted, weight) <= bound
     assert rays.full > saving * rays.traced
     assert rays.checked > 0
     # the estimate is that of what the check saw before it mended it: right to three deviations of the count
@@ -152,7 +160,7 @@ def flood(seen, facing, known, rows, samples, before, doubt, beside):
 
 
 def test_kernel_does_what_its_twin_does():
-    geometry, position, normal = samples_of(still_life(), (24, 18))
+    geometry, position, normal = samples_of(still_life(), (26, 20))
     lights = subdivide(studio(), 300)
     seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
     found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
