@@ -14,12 +14,13 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import NotFoundError, ParameterError
+from relume.look import Look
 from server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
 from server.tables import LookRow
 
 MAX_LOOK_BYTES = 256 * 1024
 MAX_LOOKS = 10_000
-PARTS = ("materials", "environment", "lights", "transport", "display")
+PARTS = tuple(Look.model_fields)
 
 
 @dataclass(frozen=True)

@@ -53,14 +53,14 @@ def test_exchanged_light_comes_to_background_and_objects_at_once(editor: Editor,
     white = dusk() / [1.0, 0.4, 0.2]
     for name, tint in (("red", [1, 0, 0]), ("blue", [0, 0, 1])):
         page.get_by_label("Environment file").set_input_files(write_map(tmp_path / f"{name}.exr", white * tint))
-        expect(page.get_by_role("radio", name=name)).to_be_checked()
+        expect(page.get_by_role("radio", name=name, exact=True)).to_be_checked()
         editor.wait_until_exact()
     mark, words = page.locator(".limits p", has_text="Baked for other light"), page.locator(".exactness")
     expect(mark).to_be_visible()
     expect(words).to_have_text("exact for this bake ✓")
     page.evaluate(RECORD)
     for name in ("red", "blue"):
-        page.get_by_role("radio", name=name).click()
+        page.get_by_role("radio", name=name, exact=True).click()
         page.wait_for_function("(of) => window.draws.at(-1)?.[of] > 0.3", arg=name)
         editor.wait_until_exact()
     drawn = draws(page)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from relume.errors import SceneError
 from relume.scene import companions
@@ -38,6 +40,18 @@ def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path
     assert any("is not beside the scene" in warning for warning in missing.warnings)
     with pytest.raises(SceneError, match="outside the folder"):
         import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, sent)
+
+
+@pytest.mark.parametrize("image", ["../images/red.png", "looks/red.png"])
+def test_images_lie_where_the_material_file_says_or_else_where_the_scene_would(tmp_path: Path, image: str) -> None:
+    """In a folder of the material file's own both readings are found in the wild."""
+    picture = io.BytesIO()
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(picture, "PNG")
+    files = kept(tmp_path, scene=b"", looks=f"newmtl Red\nKd 1 1 1\nmap_Kd {image}\n".encode(), png=picture.getvalue())
+    lies = {"../images/red.png": "room/images/red.png", "looks/red.png": "room/looks/red.png"}[image]
+    sent = Sent({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
+    scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, sent)
+    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0], atol=1e-3)
 
 
 def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

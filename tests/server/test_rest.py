@@ -16,6 +16,7 @@ from PIL import Image
 from server_fakes import SIZE, Control
 from session_client import Baked
 
+from relume.look import Look
 from server.app import create_app
 from server.settings import Settings
 
@@ -206,6 +207,13 @@ def test_render_continues_after_a_restart(settings: Settings, client: TestClient
         assert wait_until_done(restarted, url)["state"] == "ready"
         assert restarted.get(f"{url}/frames/1").status_code == 200
     assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched
+
+
+def test_look_with_everything_that_looks_have_is_saved(client: TestClient) -> None:
+    whole = {section: {} for section in Look.model_fields}
+    assert client.put("/api/looks/Whole", json=whole, headers={"If-None-Match": "*"}).status_code == 201
+    assert client.get("/api/looks/Whole").json() == whole
+    assert client.put("/api/looks/Other", json={"mood": {}}, headers={"If-None-Match": "*"}).status_code == 422
 
 
 def test_look_is_saved_and_changed_only_by_who_knows_its_version(client: TestClient) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Sequence
 
 from relume.environments.studio import studio
@@ -73,7 +74,7 @@ def _library(obj: Obj, companions: Companions, warnings: list[Remark]) -> dict[s
             shown = name[:60].encode("ascii", "replace").decode()
             warnings.append(wrong(f"the material file {shown!r} is not beside the scene; import both together"))
         else:
-            library = read_library(data) | library
+            library = read_library(data, posixpath.dirname(name.replace("\\", "/"))) | library
     return library
 
 

@@ -5,6 +5,7 @@ Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), a
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,15 +33,18 @@ OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
 
 @dataclass
 class Described:
-    """One `newmtl`: its numbers, and the names of its images by keyword."""
+    """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them."""
 
+    folder: str = ""
     numbers: dict[str, list[float]] = field(default_factory=dict)
     maps: dict[str, str] = field(default_factory=dict)
 
 
-def read_library(data: bytes) -> dict[str, Described]:
+def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
     """The materials of a library by name.
 
+    Args:
+        folder: that the library lies in, seen from the scene.
     Raises:
         SceneError: too large, too many, or a line is not what its first word says.
     """
@@ -51,7 +55,7 @@ def read_library(data: bytes) -> dict[str, Described]:
     for line in data.decode("utf-8", "replace").splitlines():
         word, _, rest = line.strip().partition(" ")
         if word == "newmtl":
-            material = materials[rest.strip()[:1_000]] = Described()
+            material = materials[rest.strip()[:1_000]] = Described(folder)
             if len(materials) > MAX_MATERIALS:
                 raise SceneError(f"the material file has more than {MAX_MATERIALS:,} materials; remove some")
         elif word in NUMBERS:
@@ -99,7 +103,7 @@ class MaterialMaker:
             return Material(own_name, make_terms(Surface(np.array(GREY), np.full(3, 0.04), 1.0, 0.5), Over()))
         textures = self._textures(described, what)
         self._warn_of_the_rest(described, what)
-        normal_map = self._image(described.maps.get("norm"), f"the normal map of {what}", _normals)
+        normal_map = self._image(described, "norm", f"the normal map of {what}", _normals)
         return Material(own_name, _terms(described, textures), textures, normal_map)
 
     def emission(self, material: Material, described: Described | None) -> F64:
@@ -107,7 +111,7 @@ class MaterialMaker:
         if described is None:
             return np.zeros(3)
         factor = np.array(described.numbers.get("Ke", [0.0, 0.0, 0.0]))
-        texture = self._image(described.maps.get("map_Ke"), f"map_Ke of material {material.name!r}", to_linear)
+        texture = self._image(described, "map_Ke", f"map_Ke of material {material.name!r}", to_linear)
         if texture is None:
             return factor
         if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 0.01:
@@ -118,22 +122,26 @@ class MaterialMaker:
     def _textures(self, described: Described, what: str) -> dict[str, Texture]:
         textures = {}
         for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular")):
-            texture = self._image(described.maps.get(keyword), f"{keyword} of {what}", to_linear)
+            texture = self._image(described, keyword, f"{keyword} of {what}", to_linear)
             if texture is not None:
                 textures[channel] = texture
         return textures
 
-    def _image(self, name: str | None, what: str, convert: Callable[[Any], Any]) -> Texture | None:
+    def _image(self, described: Described, keyword: str, what: str, convert: Callable[[Any], Any]) -> Texture | None:
+        name = described.maps.get(keyword)
         if not name:
             return None
-        if name not in self._pixels:
-            data = self._companions.read(name, what)
-            self._pixels[name] = None if data is None else self._decoder.decode(data, what)[..., :3]
-        if self._pixels[name] is None:
+        path = posixpath.join(described.folder, name.replace("\\", "/"))
+        if path not in self._pixels:
+            data = self._companions.read(path, what)
+            if data is None and described.folder and not name.startswith(".."):
+                data = self._companions.read(name, what)  # some exporters name it as the scene sees it
+            self._pixels[path] = None if data is None else self._decoder.decode(data, what)[..., :3]
+        if self._pixels[path] is None:
             shown = name[:60].encode("ascii", "replace").decode()
             self._warnings.append(wrong(f"{what} ({shown!r}) is not beside the scene; it is left out"))
             return None
-        return Texture(np.ascontiguousarray(convert(self._pixels[name]), np.float32))
+        return Texture(np.ascontiguousarray(convert(self._pixels[path]), np.float32))
 
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
         numbers = described.numbers
