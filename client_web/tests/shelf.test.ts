@@ -1,5 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import { exchange, shelf } from "../src/looks/shelf";
+import { exchange, shelf, unusedName } from "../src/looks/shelf";
 import { LOOK } from "./look";
 
 let asked: string[];
@@ -37,4 +37,16 @@ test("a look that is renamed is written before the old one goes", async () => {
   await exchange(old, { name: "New", look: LOOK });
   expect(asked).toEqual(["PUT /api/looks/New none *", 'DELETE /api/looks/Old "1"']);
   expect(names()).toEqual(["New"]);
+});
+
+test("a look is called otherwise than those of other scenes, which are not shown", async () => {
+  const entries = ["Old", "Look 2", "Look 3"].map((name) => ({ name }));
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify(entries))));
+  expect(await unusedName()).toBe("Look 4");
+});
+
+test("a name that is taken is said to be, not that somebody changed it", async () => {
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response("{}", { status: 412 })));
+  await expect(exchange(old, { name: "Taken", look: LOOK })).rejects.toThrow("There is a look called “Taken” already");
+  await expect(exchange(old, { ...old, look: { ...LOOK, lights: {} } })).rejects.toThrow("was changed elsewhere");
 });

@@ -10,8 +10,7 @@ import { filmstripOpen } from "../state/panels";
 import { connection, defaultLook, exact, held, history, look, scene, showBefore, wipe } from "../state/store";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
-import { freeName } from "./names";
-import { addLook, keepThumbnail, shelf } from "./shelf";
+import { addLook, keepThumbnail, unusedName } from "./shelf";
 
 /** The look whose picture is kept as A, and what it is called. */
 export const sideA = signal<{ look: Look; label: string } | null>(null);
@@ -70,8 +69,10 @@ export function toggleWipe(): void {
 export async function saveLook(): Promise<void> {
   const current = look.value;
   if (current === null) return;
-  const name = freeName(shelf.value.map((entry) => entry.name));
-  keepThumbnail(name, thumbnail(stage.active.pixels, current.display));
+  const image = thumbnail(stage.active.pixels, current.display);
+  const name = await attempt(unusedName);
+  if (name === undefined) return;
+  keepThumbnail(name, image);
   filmstripOpen.value = true;
   justSaved.value = name;
   await addLook(name, current);

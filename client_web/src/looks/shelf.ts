@@ -5,6 +5,7 @@ import type { Look, LookEntry } from "../protocol";
 import type { NamedLook } from "../state/history";
 import { history, scene } from "../state/store";
 import { attempt } from "../ui/toasts";
+import { freeName } from "./names";
 
 export interface SavedLook extends NamedLook {
   etag: string;
@@ -56,7 +57,18 @@ export async function refreshShelf(): Promise<void> {
   });
 }
 
-function conflict(error: unknown, name: string): never {
+/** A name that no look has: looks of other scenes, which are not shown, have names too. */
+export async function unusedName(): Promise<string> {
+  const entries = (await (await request("/api/looks")).json()) as LookEntry[];
+  return freeName(
+    entries.map(({ name }) => name),
+    shelf.value.length,
+  );
+}
+
+function conflict(error: unknown, name: string, isNew = false): never {
+  if (isNew && error instanceof ApiError && error.status === 412)
+    throw new Error(`There is a look called “${name}” already, perhaps of another scene. Choose another name.`);
   if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
     void refreshShelf();
     throw new Error(
@@ -73,7 +85,7 @@ function etagOf(name: string): string | null {
 async function write({ name, look }: NamedLook, etag: string | null): Promise<void> {
   const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
   const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) =>
-    conflict(error, name),
+    conflict(error, name, etag === null),
   );
   const saved = { name, etag: response.headers.get("etag") ?? "", look };
   const known = shelf.value.some((entry) => entry.name === name);
