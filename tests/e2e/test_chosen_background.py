@@ -80,6 +80,15 @@ def test_the_background_is_chosen_by_click_and_key_and_leaves_the_objects(
     page.reload()
     expect(group.get_by_role("radio", name="None")).to_be_checked()
     assert changed(none, editor.pixels()) == 0
+    page.keyboard.press("a")  # beside another background, what was kept has none still
+    group.get_by_role("radio", name="Colour").click()
+    editor.wait_until_exact()
+    page.keyboard.down("c")
+    assert changed(none, editor.pixels()) == 0
+    page.keyboard.up("c")
+    assert not set(np.unique(editor.pixels()[outside])) & SQUARES
+    page.get_by_role("button", name="Undo", exact=False).first.click()
+    editor.wait_until_exact()
     with Image.open(downloaded(editor, "PNG", tmp_path / "a.png")) as image:
         assert image.mode == "RGBA"
         alpha = np.asarray(image)[..., 3]

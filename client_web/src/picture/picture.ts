@@ -24,6 +24,8 @@ export class Picture {
   pixels = emptyPixels(1, 1);
   /** The A side of a comparison. */
   reference: Pixels | null = null;
+  /** The same as `alpha`, of the A side. */
+  referenceAlpha: Uint8Array | null = null;
   ids: Ids | null = null;
   /** The bake that the ids are of, or will be when they have come. */
   idsOf: string | null = null;
@@ -117,18 +119,24 @@ export class Picture {
 
   /** Keep it as it is now as the A side of comparisons. */
   keepAsReference(): void {
-    this.setReference(this.capture());
-  }
-
-  setReference(pixels: Pixels | null): void {
-    this.reference = pixels;
-    if (pixels !== null) this.screen?.renderer.setReference(pixels);
+    this.reference = copyPixels(this.pixels);
+    this.referenceAlpha = this.alpha?.slice() ?? null;
+    this.showReference();
     this.screen?.redraw();
   }
 
-  /** A copy of the picture as it is. */
-  capture(): Pixels {
-    return copyPixels(this.pixels);
+  forgetReference(): void {
+    this.reference = this.referenceAlpha = null;
+    this.screen?.redraw();
+  }
+
+  /** Give the A side to the screen. */
+  showReference(): void {
+    const { reference, referenceAlpha, screen } = this;
+    if (reference === null) return;
+    screen?.renderer.setReference(reference);
+    if (referenceAlpha !== null)
+      screen?.renderer.setReferenceAlpha(reference.width, reference.height, referenceAlpha);
   }
 
   /** Linear radiance of a pixel; null outside. */

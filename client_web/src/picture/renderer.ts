@@ -4,7 +4,7 @@ import type { Pixels } from "./pixels";
 import { fragment, VERTEX, type Features } from "./shaders";
 import { allocate, makeTexture, Program } from "./gl";
 
-const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uIds"] as const;
+const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
 type Unit = (typeof UNITS)[number];
 /** Screen pixels per picture pixel from which the pixels themselves are shown. */
 const NEAREST_FROM = 6;
@@ -22,6 +22,7 @@ export interface DrawState {
   brush: boolean;
   displayReferred: boolean;
   transparent: boolean;
+  transparentReference: boolean;
   surround: [number, number, number];
 }
 
@@ -52,6 +53,7 @@ export class Renderer {
     for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
     this.setBrush(1, 1, new Uint8Array(1));
     this.setAlpha(1, 1, new Uint8Array(1));
+    this.setReferenceAlpha(1, 1, new Uint8Array(1));
     this.setIds(1, 1, new Uint16Array([65535]));
     this.setDisplay(new ImageData(1, 1));
   }
@@ -110,6 +112,10 @@ export class Renderer {
     this.setBytes("uAlpha", width, height, values);
   }
 
+  setReferenceAlpha(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uReferenceAlpha", width, height, values);
+  }
+
   private setBytes(unit: Unit, width: number, height: number, values: Uint8Array): void {
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
@@ -133,6 +139,7 @@ export class Renderer {
       displayReferred: state.displayReferred,
       transparent: state.transparent,
       compare: state.wipe > 0,
+      transparentReference: state.wipe > 0 && state.transparentReference,
       brush: state.brush,
       outline: state.hover >= 0,
       solo: state.solo >= 0,
@@ -154,7 +161,7 @@ export class Renderer {
     UNITS.forEach((unit, index) => {
       gl.activeTexture(gl.TEXTURE0 + index);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
-      if (unit === "uPicture" || unit === "uReference" || unit === "uAlpha") {
+      if (unit === "uPicture" || unit === "uReference" || unit === "uAlpha" || unit === "uReferenceAlpha") {
         gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
       }
     });

@@ -65,7 +65,7 @@ export class Screen implements Shows {
     const { renderer, shown } = this;
     const { width, height } = shown.pixels;
     renderer.setPicture(shown.pixels);
-    if (shown.reference !== null) renderer.setReference(shown.reference);
+    shown.showReference();
     if (shown.ids !== null) renderer.setIds(shown.ids.width, shown.ids.height, shown.ids.values);
     if (shown.brush !== null) renderer.setBrush(width, height, shown.brush);
     if (shown.alpha !== null) renderer.setAlpha(width, height, shown.alpha);
@@ -116,13 +116,14 @@ export class Screen implements Shows {
     const hovered = store.hoveredMaterial.value;
     const alone = store.solo.value;
     const { on, at } = store.wipe.value;
+    const before = store.showBefore.value; // read also while there is no A yet: a redraw follows what was read
     return {
       held: store.held.value,
       transform: transformOf(view),
       exposure: store.exposure.value,
       toneMap: store.toneMap.value,
       falseColour: store.falseColour.value,
-      wipe: reference === null ? -1 : store.showBefore.value ? 2 : on ? at : -1,
+      wipe: reference === null ? -1 : before ? 2 : on ? at : -1,
       hover: hovered === null || ids === null ? -1 : store.materialNames.value.indexOf(hovered),
       solo: alone === null || ids === null ? -1 : store.materialNames.value.indexOf(alone),
       brush: store.brushed.value !== null && brush !== null,
@@ -143,6 +144,7 @@ export class Screen implements Shows {
       place: [Math.round(left * ratio), Math.round(top * ratio), width * ratio, (width * ratio) / shown.aspect],
       displayReferred: shown.display !== null,
       transparent: shown.alpha !== null,
+      transparentReference: shown.referenceAlpha !== null,
       surround: SURROUND,
     });
     this.blank = false;

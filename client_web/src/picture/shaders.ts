@@ -14,6 +14,8 @@ export interface Features {
   /** There is nothing behind some of it: squares show. */
   transparent: boolean;
   compare: boolean;
+  /** The same of the A side. */
+  transparentReference: boolean;
   brush: boolean;
   outline: boolean;
   solo: boolean;
@@ -39,6 +41,7 @@ export function fragment(features: Features): string {
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
     features.compare && "COMPARE",
+    features.transparentReference && "TRANSPARENT_REFERENCE",
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
     features.solo && "SOLO",
@@ -55,6 +58,7 @@ uniform sampler2D uReference;  // the A side of a comparison, linear radiance
 uniform sampler2D uDisplay;    // an image that the server has tone-mapped already
 uniform sampler2D uBrush;      // 0..1: share of each pixel that a stretch of the curve lights
 uniform sampler2D uAlpha;      // how much of what is behind each pixel it hides; its light is multiplied by that
+uniform sampler2D uReferenceAlpha;  // the same of the A side
 uniform usampler2D uIds;       // material of each pixel, 65535 = background
 uniform vec2 uCanvas;          // device pixels
 uniform vec4 uPlace;           // left, top, width, height of the picture, device pixels from the top left
@@ -126,6 +130,9 @@ float alpha(vec2 uv, bool reference) {
 #ifdef TRANSPARENT
   if (!reference) return texture(uAlpha, uv).r;
 #endif
+#ifdef TRANSPARENT_REFERENCE
+  if (reference) return texture(uReferenceAlpha, uv).r;
+#endif
   return 1.0;
 }
 
@@ -152,7 +159,7 @@ vec3 squares() {
 
 vec3 shown(vec2 uv, bool reference) {
   vec4 light = filtered(uv, reference);
-#ifdef TRANSPARENT
+#if defined(TRANSPARENT) || defined(TRANSPARENT_REFERENCE)
   return mix(squares(), display(light.rgb / max(light.a, 1.0 / 512.0)), light.a);
 #else
   return display(light.rgb);

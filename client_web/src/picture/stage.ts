@@ -22,7 +22,7 @@ class Stage {
 
   /** Keep what is shown as A; what A was in other views is another picture. */
   keepReference(): void {
-    for (const picture of this.pictures.values()) picture.setReference(null);
+    for (const picture of this.pictures.values()) picture.forgetReference();
     for (const picture of this.shown) picture.keepAsReference();
   }
 
