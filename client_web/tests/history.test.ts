@@ -40,6 +40,20 @@ describe("History", () => {
     expect([history.canUndo, history.canRedo]).toEqual([true, true]);
   });
 
+  test("presses while a step is being undone count too, and so do those the other way", async () => {
+    [1, 2, 3].forEach((v) => change(v));
+    const slow: Perform = async (step, back) => {
+      await Promise.resolve();
+      void perform(step, back);
+    };
+    const press = (by: number) => history.goTo(history.heading + by, slow);
+    const first = press(-1);
+    await Promise.all([first, press(-1), press(-1)]);
+    expect([value, history.cursor.value, history.heading]).toEqual([0, 0, 0]);
+    await Promise.all([press(1), press(1), press(-1)]);
+    expect([value, history.cursor.value]).toEqual([1, 1]);
+  });
+
   test("undone steps can be kept: nothing that comes takes them away", async () => {
     [1, 2, 3].forEach((v) => change(v));
     const saved = { name: "Look 1", look: LOOK };

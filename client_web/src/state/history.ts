@@ -50,7 +50,8 @@ export class History {
   readonly cursor = signal(0);
   private sealed = true;
   private lastTime = 0;
-  private busy = false;
+  /** While steps are being undone or redone: how many shall be done in the end. */
+  private target: number | null = null;
 
   constructor(private readonly now: () => number = () => performance.now()) {}
 
@@ -86,24 +87,28 @@ export class History {
     this.lastTime = this.now();
   }
 
-  /** Undo or redo until `count` steps are done; the cursor moves only after each has succeeded. */
+  /** Where undoing and redoing will end: the next press counts from there. */
+  get heading(): number {
+    return this.target ?? this.cursor.value;
+  }
+
+  /** Undo or redo until `count` steps are done; the cursor moves only after each has succeeded. Where that is going on
+   * already, it goes on to `count`. */
   async goTo(count: number, perform: Perform): Promise<void> {
-    if (this.busy) return;
-    this.busy = true;
+    const goes = this.target !== null;
+    this.target = Math.min(Math.max(count, 0), this.steps.value.length);
+    if (goes) return;
     this.sealed = true;
     try {
-      const target = Math.min(Math.max(count, 0), this.steps.value.length);
-      while (this.cursor.value > target) {
-        await perform(this.steps.value[this.cursor.value - 1] as Step, true);
-        this.cursor.value -= 1;
-      }
-      while (this.cursor.value < target) {
-        await perform(this.steps.value[this.cursor.value] as Step, false);
-        this.cursor.value += 1;
-      }
+      while (this.cursor.value !== this.target) await this.move(this.cursor.value > this.target, perform);
     } finally {
-      this.busy = false;
+      this.target = null;
     }
+  }
+
+  private async move(back: boolean, perform: Perform): Promise<void> {
+    await perform(this.steps.value[this.cursor.value - (back ? 1 : 0)] as Step, back);
+    this.cursor.value += back ? -1 : 1;
   }
 
   /** Make what was undone part of what was done, with the way back as its last step, so that the next step discards

@@ -11,5 +11,5 @@ function perform(step: Step, back: boolean): void | Promise<void> {
 }
 
 export const goTo = (count: number) => void attempt(() => history.goTo(count, perform));
-export const undo = () => goTo(history.cursor.peek() - 1);
-export const redo = () => goTo(history.cursor.peek() + 1);
+export const undo = () => goTo(history.heading - 1);
+export const redo = () => goTo(history.heading + 1);
