@@ -48,7 +48,7 @@ def attributes_of(
         "worldToNDC": world_to_ndc(camera, size),
         "screenWindowWidth": 2 * float(np.tan(camera.yfov / 2)) * size[0] / size[1],
         "relume:camera": _json(seen_from),
-        "relume:look": _json(look.model_dump(mode="json", exclude_defaults=True)),
+        "relume:look": _json(look.model_dump(mode="json", exclude_unset=True)),  # only grounds may name `catcher`
         "relume:environment": "of the scene" if environment is None else environment,
         "relume:units": UNITS,
         "relume:scene": origin.scene,

@@ -17,6 +17,7 @@ from relume.exr.layers import layers_of
 from relume.exr.picture import export_exr
 from relume.exr.writer import channels_of, write_exr
 from relume.look import Look, default_look, validate
+from relume.scene.ground import with_ground
 from relume.trace.primary import camera_directions
 
 POINT = {"kind": "point", "position": [0, 1, 0]}
@@ -130,6 +131,15 @@ def test_attributes_say_where_the_picture_comes_from(tmp_path):
     np.testing.assert_allclose(found["worldToNDC"], world_to_ndc(camera, SIZE).ravel(), rtol=1e-5, atol=1e-6)
     eye = np.append(camera.to_world[:3, 3], 1) @ np.reshape(found["worldToCamera"], (4, 4))
     np.testing.assert_allclose(eye, [0, 0, 0, 1], atol=1e-5)
+
+
+@pytest.mark.parametrize("catcher", [True, False])
+def test_a_ground_is_told_as_what_it_was_shown(catcher):
+    camera, scene = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), with_ground(still_life())
+    default, ground = default_look(scene.materials), scene.materials[-1].name
+    look = validate({"materials": {ground: {"catcher": catcher}}}, default)
+    attributes = attributes_of(Origin("5" * 16, "grounded", "b" * 16), camera, SIZE, look, [])
+    assert validate(json.loads(attributes["relume:look"]), default) == look
 
 
 def test_points_in_the_world_are_found_in_the_picture():
