@@ -121,14 +121,17 @@ class FrameLoop:
         try:
             if self._accepted is not None:
                 await self._work.quick(painter.accept, [picture], self._accepted)
-            if self._answers.touched is not None:
-                await self._work.quick(painter.touch, [picture], self._answers.touched)
         except RelumeError as error:
             if not self._viewports:
                 raise
             await self._wire.refuse(error)
             self._shown.hide(name)
             return
+        if self._answers.touched is not None:
+            try:
+                await self._work.quick(painter.touch, [picture], self._answers.touched)
+            except RelumeError as error:  # the view is shown all the same
+                await self._wire.refuse(error)
         self._viewports[name] = Viewport(self._transfer.views[name], picture)
 
     def _pictures(self) -> list[Picture]:

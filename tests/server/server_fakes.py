@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.errors import CancelledError, EditNotSupportedError
+from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
 from relume.look import default_look
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
@@ -149,6 +149,8 @@ class FakePicture:
         self.control.num_looks += 1
 
     def touch(self, pointer: str) -> None:
+        if self.view.name in self.control.short_of_memory:
+            raise MemoryBudgetError("the curve", 2, 1, "close it")
         self.wanted = pointer
 
     def waiting(self) -> FakeNeed | None:
@@ -226,6 +228,7 @@ class Control:
     freezing: threading.Event = field(default_factory=threading.Event)
     may_freeze: threading.Event = field(default_factory=threading.Event)
     may_trace: threading.Event = field(default_factory=threading.Event)
+    short_of_memory: set[str] = field(default_factory=set)
     stores_kept: list[set[Path]] = field(default_factory=list)
     render_gate: threading.Event = field(default_factory=_open_gate)
     passes_asked: list[int] = field(default_factory=list)

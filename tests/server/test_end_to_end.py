@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from session_client import Frame, open_session
 from tiny_scenes import still_life
 
+from relume.scene.ground import with_ground
 from relume.transfer.base import Recipe
 from server.app import create_app
 from server.settings import Settings
@@ -147,6 +148,26 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
     for view, picture in pictures.items():
         request = {"bake": bake, "view": view, "looks": [{"materials": {"Ball": {"terms": terms}}}]}
         assert_same(picture, rendered_by(real, request, tmp_path))
+
+
+def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient) -> None:
+    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+    scene = with_ground(still_life())
+    bake = bakes.submit(
+        register_scene(bakes.data_dir, bakes.ledger, scene), Recipe("direct", ("front", "left"), (32, 24), 50)
+    )
+    with bakes.subscribe(bake) as changes:
+        assert list(changes)[-1].state == "ready"
+    ground = f"/materials/{scene.materials[-1].name}"
+    terms = [{"model": "lambert"}, {"model": "cook_torrance"}]
+    with open_session(real, bake) as session:
+        session.edit(1, ground, {"catcher": False, "terms": terms})
+        session.send(type="touch", curve=f"{ground}/terms/1/curves/theta_h")
+        session.exact(1)
+        session.edit(2, f"{ground}/catcher", True)
+        session.exact(2)
+        session.send(type="view", name="left")
+        assert session.exact(2).header["view"] == "left"
 
 
 def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: TestClient, tmp_path: Path) -> None:

@@ -160,6 +160,17 @@ def test_what_a_hand_may_hold_is_of_this_look() -> None:
             check_held(pointer, document)
 
 
+def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> None:
+    for is_catcher in (False, True):
+        document = {"materials": {"a/b": {**DOCUMENT["materials"]["a/b"], "catcher": is_catcher}}}
+        for find, pointer in ((find_curve, f"{TERM}/1/curves/theta_h"), (check_held, f"{TERM}/1/params/sigma")):
+            if is_catcher:
+                with pytest.raises(ParameterError):
+                    find(pointer, document)
+            else:
+                find(pointer, document)
+
+
 def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failure() -> None:
     opened: list[str] = []
 

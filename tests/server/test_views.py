@@ -83,6 +83,20 @@ def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient,
         assert session.text("probe")["view"] == "front"
 
 
+def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    control.short_of_memory = {"left"}
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="touch", curve=THETA_H)
+        session.text("curve")
+        session.send(type="view", name="left")
+        assert session.text("problem")["revision"] is None
+        session.edit(1, SIGMA, 0.3)
+        assert session.exact(1).header["view"] == "left"
+
+
 def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)

@@ -57,6 +57,7 @@ export const curvePath = computed(() => {
   const [material, curve] = [selectedMaterial.value, selectedCurve.value];
   const term = terms.value[selectedTerm.value];
   if (material === null || curve === null || term === undefined) return null;
+  if (look.value?.materials[material]?.catcher) return null; // of a catcher's terms nothing is seen
   if (!modelOf(term)?.curves.some((info) => info.name === curve)) return null;
   return pointer("materials", material, "terms", selectedTerm.value, "curves", curve);
 });
