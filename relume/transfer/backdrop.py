@@ -1,8 +1,8 @@
 """What the eye sees behind the surfaces of a view, and on a ground that only catches shadows.
 
 A catcher shows, sample by sample, what lies behind it times what arrives there over what would arrive if nothing but
-the ground were there. What arrives is the image of a white diffuse term, so that all that keeps images near their look
-holds for it too; the rest is a factor on it.
+the ground were there; where nothing would, nothing is hidden. What arrives is the image of a white diffuse term, so
+that all that keeps images near their look holds for it too; the rest is a factor on it.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Backdrop:
             if material.num_samples and look.materials[name].catcher:
                 self._catch(material, shown, light)
             else:
-                material.set_factor(None, None)
+                material.set_factor(None, None, None)
         if shown == self._shown:
             return False
         self._shown, self.is_transparent = shown, background.kind == "transparent"
@@ -87,13 +87,14 @@ class Backdrop:
             for_display: the picture will be laid over display values (sRGB), where a shadow that leaves half of the
                 light leaves three quarters of the value; else over linear ones.
         """
+        is_direct = self._shown is None or self._shown.is_direct
         alpha = np.ones((3, self._view.num_view_samples), np.float32)
         alpha[:, self._view.num_surface_samples :] = 0
         for material in self._images.by_name.values():
             if material.is_caught:
                 arriving = material.terms[0].displayed.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
                 unhidden = self._open[material.index][1].T
-                share = np.divide(arriving, unhidden, out=np.ones_like(unhidden), where=unhidden > 0)
+                share = np.divide(arriving, unhidden, out=np.full_like(unhidden, is_direct), where=unhidden > 0)
                 left = luminance(np.clip(share, 0, 1).T)
                 alpha[:, self._view.rows(material.index)] = 1 - (srgb_encode(left) if for_display else left)
         return alpha
@@ -105,8 +106,11 @@ class Backdrop:
         of_light, unhidden = self._unhidden(material, light)
         if material.factor_key != (shown, of_light):
             behind = self._behind(shown, index)
-            factor = np.divide(behind, unhidden, out=np.zeros_like(unhidden), where=unhidden > 0)
-            material.set_factor((shown, of_light), np.ascontiguousarray(factor.T))
+            is_lit = unhidden > 0
+            factor = np.divide(behind, unhidden, out=np.zeros_like(unhidden), where=is_lit)
+            shows_unlit = shown.is_direct and not is_lit.all()
+            unlit = np.where(is_lit, np.float32(0), behind).T if shows_unlit else None
+            material.set_factor((shown, of_light), np.ascontiguousarray(factor.T), unlit)
 
     def _unhidden(self, material: MaterialImage, light: Light) -> tuple[Hashable, F32]:
         """What tells a light from others here, and the image in it if nothing stood on the catcher, (n, 3): as rough as

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
@@ -11,7 +13,7 @@ from relume.color import srgb_encode
 from relume.light.blur import blurred, reduced
 from relume.light.environment import lookup, texel_directions, texel_solid_angles, turned
 from relume.scene.ground import with_ground
-from relume.scene.model import Material
+from relume.scene.model import Light, Material
 from relume.transfer.cache import FrozenCache
 from relume.transfer.picture import Picture
 from relume.transfer.render import render_image
@@ -19,18 +21,21 @@ from relume.transfer.render import render_image
 SIZE = (40, 30)
 CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
 RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
+SHINING = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
 CAMERA = looking("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
 POINT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
 
 
 def ball_scene(environment):
+    """A red ball, which may shine, above a ground."""
     ball = sphere("ball", CENTRE, RADIUS, 0, rings=24)
-    return with_ground(scene_of(ball, camera=CAMERA, environment=environment, materials=[RED]))
+    scene = scene_of(ball, camera=CAMERA, environment=environment, materials=[RED])
+    return with_ground(replace(scene, lights=(SHINING,)))
 
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory):
-    """A red ball above a ground, opened."""
+    """Of direct light alone, opened."""
     return bake_corner(ball_scene(studio()), "direct", tmp_path_factory.mktemp("standing"))
 
 
@@ -137,17 +142,65 @@ def test_shadows_are_those_of_brute_force(standing, degrees):
     assert np.quantile(np.abs(ours - expected), 0.99) < 0.05
 
 
-def test_ground_is_as_dark_as_its_lamp_says(standing):
-    image = rendered(standing, lamp_alone, background(kind="color", color=[2.0, 1.0, 0.5]))
-    points = ground_points(standing)
+def miss_of(points):
+    """How far from the middle of the ball the way from points to the lamp passes. (n,)"""
     lamp = np.array(POINT["position"])
     towards = (lamp - points) / np.linalg.norm(lamp - points, axis=1, keepdims=True)
     along = np.einsum("nc,nc->n", towards, CENTRE - points)
-    miss = np.sqrt(np.sum((CENTRE - points) ** 2, axis=1) - along**2)
+    return np.sqrt(np.sum((CENTRE - points) ** 2, axis=1) - along**2)
+
+
+def test_ground_is_as_dark_as_its_lamp_says(standing):
+    image = rendered(standing, lamp_alone, background(kind="color", color=[2.0, 1.0, 0.5]))
+    miss = miss_of(ground_points(standing))
     shares = image[inner(standing, "Ground")] / [2.0, 1.0, 0.5]
     assert (shares[miss < 0.97 * RADIUS] == 0).all()
     assert (miss < 0.97 * RADIUS).sum() > 10
     np.testing.assert_allclose(shares[miss > 1.03 * RADIUS], 1, rtol=1e-4)
+
+
+def spot_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Lamp"] = {**POINT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
+
+
+def shining_ball_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Ball"]["on"] = True
+
+
+def blue_lamp_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Lamp"] = {**POINT, "emission": [0.0, 0.0, 5.0]}
+
+
+def test_ground_where_no_light_would_fall_shows_what_is_behind(standing):
+    """Nothing shadows it there: outside the cone of a spot, around a lamp that is itself an object."""
+    colour, ground, points = np.array([2.0, 1.0, 0.5]), inner(standing, "Ground"), ground_points(standing)
+    behind = background(kind="color", color=colour.tolist())
+    below = points - POINT["position"]
+    is_outside = np.degrees(np.arctan2(np.hypot(below[:, 0], below[:, 2]), -below[:, 1])) > 20.5
+    lit_by_spot = rendered(standing, spot_alone, behind)
+    shares = lit_by_spot[ground] / colour
+    assert 50 < is_outside.sum() < len(points) - 50
+    np.testing.assert_allclose(shares[is_outside], 1, rtol=1e-5)
+    miss = np.where(is_outside, np.inf, miss_of(points))
+    np.testing.assert_array_equal(shares[miss < 0.97 * RADIUS], 0)
+    assert (miss < 0.97 * RADIUS).sum() > 5
+    lit_by_ball = rendered(standing, shining_ball_alone, behind)
+    np.testing.assert_allclose(lit_by_ball[ground] / colour, 1, rtol=1e-5)
+    for alone, expected in ((spot_alone, lit_by_spot), (shining_ball_alone, lit_by_ball)):
+        *image, alpha = np.moveaxis(rendered(standing, alone, background(kind="transparent")), 2, 0)
+        composed = np.dstack(image) + (1 - alpha[..., None]) * colour
+        np.testing.assert_allclose(composed, expected, rtol=3e-4, atol=1e-5)  # alpha says nothing of shares over one
+        assert not rendered(standing, alone, behind, show("further_bounces"))[ground].any()
+
+
+def test_ground_under_a_lamp_of_one_channel_hides_that_channel_alone(standing):
+    shares = rendered(standing, blue_lamp_alone, background(kind="color", color=[1.0, 1.0, 1.0]))
+    shares = shares[inner(standing, "Ground")]
+    np.testing.assert_allclose(shares[:, :2], 1, rtol=1e-5)
+    assert (shares[:, 2].min(), shares[:, 2].max()) == (0, pytest.approx(1, rel=1e-4))
 
 
 def test_there_is_no_seam_where_the_ground_ends():
