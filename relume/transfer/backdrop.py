@@ -31,14 +31,13 @@ class _Shown(NamedTuple):
     """All that what is behind depends on.
 
     Attributes:
-        brightness: of the environment. gain: of the finished picture.
+        factor: multiplies the map, or the colour, for the gain of the finished picture is yet to.
     """
 
     background: BackgroundLook
     environment: EnvironmentKey
-    brightness: tuple[float, ...]
+    factor: tuple[float, ...]
     is_direct: bool
-    gain: tuple[float, ...]
 
 
 class Backdrop:
@@ -66,8 +65,9 @@ class Backdrop:
         Returns:
             Whether samples of the background are new.
         """
-        background, brightness = look.background, gain * np.array(light.environment_gain)
-        shown = _Shown(background, light.environment, tuple(brightness), light.paths.direct, tuple(gain))
+        background = look.background
+        factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
+        shown = _Shown(background, light.environment, factor, light.paths.direct)
         for name, material in self._images.by_name.items():
             if material.num_samples and look.materials[name].catcher:
                 self._catch(material, shown, light)
@@ -125,19 +125,19 @@ class Backdrop:
 
     def _behind(self, shown: _Shown, material: int | None) -> F32:
         """Radiance behind samples of a material, of the background where None, over the gain. (n, 3) float32"""
-        background, gain = shown.background, np.array(shown.gain)
+        background, factor = shown.background, np.array(shown.factor)
         first, stop = self._view.num_surface_samples, self._view.num_view_samples
         rows = slice(first, stop) if material is None else self._view.rows(material)
         if background.kind in ("color", "transparent"):
             color = background.color if background.kind == "color" else (0.0, 0.0, 0.0)
-            return np.tile((np.array(color) / gain).astype(np.float32), (rows.stop - rows.start, 1))
+            return np.tile((np.array(color) * factor).astype(np.float32), (rows.stop - rows.start, 1))
         blur = background.blur if background.kind == "blurred" else 0.0
         key = shown.environment, blur
         known = self._seen.get(material)
         if known is None or known[0] != key:
             known = key, self._map(shown.environment, material, blur)
             self._seen[material] = known
-        return np.asarray(known[1] * (np.array(shown.brightness) / gain), np.float32)
+        return np.asarray(known[1] * factor, np.float32)
 
     def _map(self, environment: EnvironmentKey, material: int | None, blur: float) -> F32:
         transfer, view = self._images.transfer, self._view

@@ -14,6 +14,7 @@ from relume.light.blur import blurred, reduced
 from relume.light.environment import lookup, texel_directions, texel_solid_angles, turned
 from relume.scene.ground import with_ground
 from relume.scene.model import Light, Material
+from relume.transfer.backdrop import Backdrop
 from relume.transfer.cache import FrozenCache
 from relume.transfer.picture import Picture
 from relume.transfer.render import render_image
@@ -295,3 +296,19 @@ def test_lamps_that_move_keep_the_ground_near_its_look(standing):
     errors = [relative_rmse(image[ground], exact[ground]) for image in (picture.image(), before)]
     assert errors[0] < 0.5 * errors[1]
     np.testing.assert_allclose(settle(picture).image(), exact, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["map", "blurred", "color"])
+def test_brightness_of_the_environment_multiplies_what_is_there(standing, kind, monkeypatch):
+    """Only a colour, which is not the light's own, is written anew."""
+    brighter = changes(background(kind=kind), environment(scale=2.0, color=[1.0, 0.5, 0.2]))
+    expected = rendered(standing, brighter)
+    picture = Picture(standing, "front", FrozenCache(BUDGET))
+    picture.set_look(look_of(standing, background(kind=kind)))
+    settle(picture)
+    write, written = Backdrop._behind, []
+    monkeypatch.setattr(Backdrop, "_behind", lambda *given: written.append(given) or write(*given))
+    picture.set_look(look_of(standing, brighter))
+    assert picture.advance(None).changed
+    assert bool(written) == (kind == "color")
+    np.testing.assert_allclose(picture.image(), expected, rtol=1e-6)
