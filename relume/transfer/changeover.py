@@ -29,7 +29,7 @@ class Changeover:
         Args:
             glimpse: what was just made, perhaps for an earlier light than the look's.
         """
-        images = self._images
+        images, before = self._images, self.light
         lit = [image.lit for _, image in images.terms() if not image.is_blank]
         if all(light == images.light for light in lit):
             self.light, self.gain = images.light, images.gain
@@ -39,4 +39,5 @@ class Changeover:
             return
         for _, image in images.terms():
             image.release()
-        images.shine_in(self.light)
+        if self.light != before:
+            images.shine_in(self.light)

@@ -12,6 +12,7 @@ from relume.transfer.cache import FrozenCache
 from relume.transfer.glimpse import Glimpse
 from relume.transfer.picture import Picture
 from relume.transfer.render import render_image
+from relume.transfer.view_images import ViewImages
 
 COLOURS = np.eye(3)
 
@@ -187,3 +188,13 @@ def test_picture_whose_images_were_kept_is_opened_without_a_preview(transfer, ma
     look = look_of(transfer, lit_by(maps, 2))
     settle(start(transfer, look))
     assert not isinstance(start(transfer, look, is_watched=True).waiting(), Glimpse)
+
+
+def test_surfaces_are_told_what_they_send_out_when_light_changes_and_not_else(transfer, maps, monkeypatch):
+    picture, told = settle(start(transfer, look_of(transfer, lit_by(maps, 0)))), []
+    shine = ViewImages.shine_in
+    monkeypatch.setattr(ViewImages, "shine_in", lambda *given: told.append(given) or shine(*given))
+    for sigma, lamp in ((0.2, None), (0.3, None), (0.3, 0.4)):
+        picture.set_look(look_of(transfer, lit_by(maps, 0, sigma=sigma, lamp=lamp)))
+        settle(picture)
+        assert len(told) == (lamp is not None)
