@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from relume.color import luminance, srgb_encode
 from relume.look import EnvironmentKey, Look
 from relume.look.model import BackgroundLook, Rgb
+from relume.transfer.coverage import Coverage
 from relume.transfer.light import Light
 from relume.transfer.material_image import MaterialImage
 from relume.transfer.unshadowed import Unshadowed
@@ -49,6 +50,7 @@ class Backdrop:
         self._seen: dict[int | None, tuple[Hashable, F32]] = {}
         self._unshadowed: dict[int, Unshadowed] = {}
         self._open: dict[int, tuple[Hashable, F32]] = {}
+        self._coverage: dict[bool, Coverage] = {}
         self.is_transparent = False
 
     @staticmethod
@@ -81,23 +83,27 @@ class Backdrop:
         return True
 
     def alpha(self, *, for_display: bool) -> F32:
-        """How much every view sample hides of what is put behind the picture, three times. (3, samples) float32
+        """How much every pixel hides of what is put behind the picture. (height, width) float32
 
         Args:
             for_display: the picture will be laid over display values (sRGB), where a shadow that leaves half of the
                 light leaves three quarters of the value; else over linear ones.
         """
+        if for_display not in self._coverage:
+            hidden = self._hidden_from_display if for_display else self._hidden
+            self._coverage[for_display] = Coverage(self._view, hidden)
+        return self._coverage[for_display].pixels(self._images.by_name.values())
+
+    def _hidden_from_display(self, material: MaterialImage) -> F32:
+        return np.asarray(1 - srgb_encode(1 - self._hidden(material)), np.float32)
+
+    def _hidden(self, material: MaterialImage) -> F32:
+        """The share of light that does not arrive at samples of a catcher. (n,) float32"""
         is_direct = self._shown is None or self._shown.is_direct
-        alpha = np.ones((3, self._view.num_view_samples), np.float32)
-        alpha[:, self._view.num_surface_samples :] = 0
-        for material in self._images.by_name.values():
-            if material.is_caught:
-                arriving = material.terms[0].displayed.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
-                unhidden = self._open[material.index][1].T
-                share = np.divide(arriving, unhidden, out=np.full_like(unhidden, is_direct), where=unhidden > 0)
-                left = luminance(np.clip(share, 0, 1).T)
-                alpha[:, self._view.rows(material.index)] = 1 - (srgb_encode(left) if for_display else left)
-        return alpha
+        arriving = material.terms[0].displayed.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
+        unhidden = self._open[material.index][1].T
+        share = np.divide(arriving, unhidden, out=np.full_like(unhidden, is_direct), where=unhidden > 0)
+        return np.asarray(1 - luminance(np.clip(share, 0, 1).T), np.float32)
 
     def _catch(self, material: MaterialImage, shown: _Shown, light: Light) -> None:
         index = material.index

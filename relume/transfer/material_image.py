@@ -16,7 +16,11 @@ F32 = NDArray[np.float32]
 
 
 class MaterialImage:
-    """State of one material in one view."""
+    """State of one material in one view.
+
+    Attributes:
+        num_composed: how often its radiance has been written: whoever has seen as many has seen it as it is.
+    """
 
     def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]], light: Hashable) -> None:
         self._view, self.index = view, index
@@ -34,6 +38,7 @@ class MaterialImage:
         self._unlit: F32 | None = None
         self.factor_key: Hashable = None
         self._is_current = False
+        self.num_composed = 0
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
         """New targets; terms that stay as they are keep their images."""
@@ -99,6 +104,7 @@ class MaterialImage:
         if self._shines is not None and any(self._emission):
             own += np.outer(np.array(self._emission, np.float32), self._shines)
         self._is_current = True
+        self.num_composed += 1
         return True
 
     def term_radiance(self, term: TermImage, image: F32, radiance: F32) -> None:

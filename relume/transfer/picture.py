@@ -187,15 +187,12 @@ class Picture:
         """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
         if not self._backdrop.is_transparent:
             return None
-        return to_bytes(resolve(self._view, self._backdrop.alpha(for_display=True), tiles, 1.0)[:, 0]).tobytes()
+        alpha = self._backdrop.alpha(for_display=True)
+        return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
-        if not self._backdrop.is_transparent:
-            return None
-        whole = [(0, 0, self._view.width, self._view.height)]
-        alpha = resolve(self._view, self._backdrop.alpha(for_display=for_display), whole, 1.0)[:, 0]
-        return np.clip(alpha, 0, 1).reshape(self._view.height, self._view.width)
+        return self._backdrop.alpha(for_display=for_display) if self._backdrop.is_transparent else None
 
     def image(self) -> F32:
         """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""

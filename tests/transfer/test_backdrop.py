@@ -10,6 +10,7 @@ from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
 from tiny_scenes import looking, quad, scene_of, sphere, studio
 
 from relume.color import srgb_encode
+from relume.imageio import to_bytes
 from relume.light.blur import blurred, reduced
 from relume.light.environment import lookup, texel_directions, texel_solid_angles, turned
 from relume.scene.ground import with_ground
@@ -312,3 +313,27 @@ def test_brightness_of_the_environment_multiplies_what_is_there(standing, kind, 
     assert picture.advance(None).changed
     assert bool(written) == (kind == "color")
     np.testing.assert_allclose(picture.image(), expected, rtol=1e-6)
+
+
+def test_coverage_follows_the_ground_alone(standing, monkeypatch):
+    """Whatever a hand does a live picture hides what a new one of the same look does, and asks no more than it must."""
+    picture, asked = Picture(standing, "front", FrozenCache(BUDGET)), []
+    ask = Backdrop._hidden
+    transparent = background(kind="transparent")
+    ball = [lambda d, c=c: d["materials"]["Ball"]["terms"][0].update(color=[c, 0.1, 0.1]) for c in (0.3, 0.6)]
+    lamp = changes(ball[1], lamp_alone)
+    steps = [(transparent, 1), (ball[0], 0), (ball[1], 0), (lamp, 1), (changes(lamp, plain_ground), 0), (lamp, 1)]
+    for change, most in steps:
+        look = look_of(standing, changes(transparent, change))
+        expected = render_image(standing, "front", look, for_display=True)[..., 3]
+        picture.set_look(look)
+        settle(picture)
+        with monkeypatch.context() as patched:
+            patched.setattr(Backdrop, "_hidden", lambda *given: asked.append(given) or ask(*given))
+            asked.clear()
+            tiles = picture.encode_alpha([(0, 0, 40, 10), (0, 10, 15, 20), (15, 10, 25, 20)])
+        assert len(asked) == most
+        alpha = picture.alpha(for_display=True)
+        np.testing.assert_allclose(alpha, expected, atol=1e-6)  # lamps are mixed in, which rounds otherwise
+        shown = to_bytes(alpha)
+        assert tiles == b"".join(part.tobytes() for part in (shown[:10], shown[10:, :15], shown[10:, 15:]))
