@@ -54,9 +54,9 @@ class Backdrop:
         self.is_transparent = False
 
     @staticmethod
-    def gain_of(gain: Rgb) -> F64:
-        """What multiplies the finished picture, never nothing: what is behind may be seen where no light is."""
-        return np.asarray(np.maximum(np.array(gain), _LEAST_GAIN))
+    def gain_of(gain: Rgb, background: BackgroundLook) -> F64:
+        """What multiplies the finished picture: never nothing before a colour, which is seen where no light is."""
+        return np.asarray(np.maximum(np.array(gain), _LEAST_GAIN if background.kind == "color" else 0.0))
 
     def follow(self, look: Look, light: Light, gain: F64, radiance: F32) -> bool:
         """Bring the samples of the background and the factors of catchers to a look.

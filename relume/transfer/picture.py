@@ -157,7 +157,7 @@ class Picture:
                 if frozen is not None:
                     term.step(frozen, max_coefficients)
         tiles: set[Tile] = set()
-        light, gain = self._changeover.light, self._backdrop.gain_of(self._changeover.gain)
+        light, gain = self._changeover.light, self._backdrop.gain_of(self._changeover.gain, self._look.background)
         is_new_behind = self._backdrop.follow(self._look, light, gain, self._radiance)
         for index, material in enumerate(images.by_name.values()):
             if material.num_samples and material.compose(self._radiance):
