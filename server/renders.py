@@ -66,9 +66,12 @@ class RenderQueue:
 
     def download_name(self, status: RenderStatus, index: int) -> str:
         """What the file of one picture is called where it is saved."""
-        request = status.request
-        number = f"-{index:04d}" if len(request.looks) > 1 else ""
-        return f"{safe_stem(request.name or request.view)}{number}.{request.format}"
+        number = f"-{index:04d}" if len(status.request.looks) > 1 else ""
+        return f"{_stem(status)}{number}.{status.request.format}"
+
+    def archive_name(self, status: RenderStatus) -> str:
+        """What the file of all pictures is called where it is saved."""
+        return f"{_stem(status)}.zip"
 
     def archive_path(self, status: RenderStatus) -> Path:
         """The finished batch in one file."""
@@ -133,6 +136,9 @@ class RenderQueue:
         unfinished = target.with_name("unfinished.zip")
         with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_STORED) as archive:
             for index in range(len(status.request.looks)):
-                path = self.frame_path(status, index)
-                archive.write(path, path.name)
+                archive.write(self.frame_path(status, index), self.download_name(status, index))
         os.replace(unfinished, target)
+
+
+def _stem(status: RenderStatus) -> str:
+    return safe_stem(status.request.name or status.request.view)

@@ -95,7 +95,7 @@ def get_archive(render: Id, services: Shared) -> FileResponse:
     if status.state != "ready":
         raise NotReadyError(f"the batch is not finished; {_state(status)}")
     path = services.renders.archive_path(status)
-    return FileResponse(path, media_type="application/zip", filename=f"{render}.zip")
+    return FileResponse(path, media_type="application/zip", filename=services.renders.archive_name(status))
 
 
 def _state(status: RenderStatus) -> str:

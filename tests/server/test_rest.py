@@ -184,9 +184,11 @@ def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked)
     assert frame.headers["content-type"] == "image/png"
     assert Image.open(io.BytesIO(frame.content)).size == (32, 16)
     assert client.get(f"{url}/frames/2").status_code == 404
-    archive = zipfile.ZipFile(io.BytesIO(client.get(f"{url}/archive.zip").content))
-    assert archive.namelist() == ["0000.png", "0001.png"]
-    assert archive.read("0001.png") == frame.content
+    packed = client.get(f"{url}/archive.zip")
+    assert packed.headers["content-disposition"] == 'attachment; filename="triangle-front.zip"'
+    archive = zipfile.ZipFile(io.BytesIO(packed.content))
+    assert archive.namelist() == ["triangle-front-0000.png", "triangle-front-0001.png"]
+    assert archive.read("triangle-front-0001.png") == frame.content
     assert client.delete(url).status_code == 204
     assert client.get(url).status_code == 404
 
