@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from editor_page import Editor, changed
+from editor_page import WAIT_MS, Editor, changed
 from editor_server import SIZE, Server
 from playwright.sync_api import Browser, expect
 
@@ -84,6 +85,14 @@ def test_a_link_in_a_fresh_profile_and_one_that_opens_nothing(editor: Editor, vi
     expect(visitor.page.locator(".scene-card")).to_have_count(1)
 
 
+def wait_until_cancelled(server: Server, bake: str) -> None:
+    deadline = time.monotonic() + WAIT_MS / 1e3
+    while (state := server.call(f"/api/bakes/{bake}")["state"]) != "cancelled":
+        assert state == "running", f"the bake is {state}"
+        assert time.monotonic() < deadline, "nothing was cancelled"
+        time.sleep(0.1)
+
+
 def test_a_bake_says_what_it_is_at(editor: Editor, server: Server) -> None:
     editor.page.evaluate("""() => {
       window.said = [];
@@ -97,6 +106,6 @@ def test_a_bake_says_what_it_is_at(editor: Editor, server: Server) -> None:
     expect(words).to_contain_text("baking, ")
     editor.page.get_by_role("button", name="Cancel").click()
     said = editor.page.evaluate("window.said.join('\\n')")
+    wait_until_cancelled(server, bake["id"])
     assert re.search(r"starting worker processes, \d+ s", said)
     assert any(phase in said for phase in ("loading the kernels", "reading the scene", "sorting its triangles"))
-    assert server.call(f"/api/bakes/{bake['id']}")["state"] in ("cancelled", "running")
