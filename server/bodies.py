@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from relume.look.document import MAX_BOUNCES
+from relume.look.model import Show
 from relume.scene.remarks import Effect
 from server.protocol import MAX_VIEWS_SHOWN
 from worker.status import Phase
@@ -304,10 +306,18 @@ class LookEntry(Body):
     bytes: int
 
 
+class SharedPaths(Body):
+    """Light paths that are looked at; as a look's `transport`."""
+
+    show: Show
+    bounces: Annotated[int, Field(ge=0, le=MAX_BOUNCES)]
+
+
 class ShareRequest(Body):
     """What a link shows: a look of a bake, the views beside each other and the one in hand.
 
-    `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone.
+    `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
+    paths that are looked at; null: those of the look.
     """
 
     bake: Id
@@ -316,6 +326,7 @@ class ShareRequest(Body):
     look: dict[str, Any]
     solo: Name | None = None
     solo_light: Annotated[str, Field(max_length=256)] | None = None
+    paths: SharedPaths | None = None
 
 
 class ShareEntry(Body):

@@ -75,6 +75,7 @@ def generate() -> str:
     for mode, models in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in models], by_alias=True)  # type: ignore[misc]
         parts.extend(_interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
+    parts = list(dict.fromkeys(parts))  # a part of inputs and outputs alike is written once
     parts.append(_union("ClientMessage", CLIENT_MESSAGES))
     parts.append(_union("ServerMessage", SERVER_MESSAGES))
     return "\n\n".join(parts) + "\n"

@@ -75,7 +75,7 @@ export interface RenderRequest {
   precision?: "half" | "float";
 }
 
-/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. */
+/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. */
 export interface ShareRequest {
   bake: string;
   view: string;
@@ -83,6 +83,13 @@ export interface ShareRequest {
   look: Record<string, unknown>;
   solo?: string | null;
   solo_light?: string | null;
+  paths?: SharedPaths | null;
+}
+
+/** Light paths that are looked at; as a look's `transport`. */
+export interface SharedPaths {
+  show: "all" | "direct" | "first_bounce" | "further_bounces";
+  bounces: number;
 }
 
 /** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
@@ -422,6 +429,7 @@ export interface ShareBody {
   look: Record<string, unknown>;
   solo: string | null;
   solo_light: string | null;
+  paths: SharedPaths | null;
   id: string;
   created: string;
   scene: string;

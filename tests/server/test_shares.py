@@ -14,6 +14,7 @@ from server import shares
 from worker.scenes import delete_scene
 
 LOOK = {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.1, 0.2, 0.3]}]}}}
+PATHS = {"show": "first_bounce", "bounces": 3}
 
 
 def body(baked: Baked, **more: Any) -> dict[str, Any]:
@@ -21,7 +22,7 @@ def body(baked: Baked, **more: Any) -> dict[str, Any]:
 
 
 def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
-    made = client.post("/api/shares", json=body(baked, solo="Paper", solo_light=""))
+    made = client.post("/api/shares", json=body(baked, solo="Paper", solo_light="", paths=PATHS))
     assert made.status_code == 201
     entry = made.json()
     assert re.fullmatch("[a-z2-7]{10}", entry["id"])
@@ -33,7 +34,10 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
     assert (found["scene"], found["bake"], found["view"], found["views"]) == (
         baked.scene, baked.bake, "left", ["front", "left"],
     )  # fmt: skip
-    assert (found["solo"], found["solo_light"], found["lacking"]) == ("Paper", "", [])
+    assert (found["solo"], found["solo_light"], found["paths"], found["lacking"]) == ("Paper", "", PATHS, [])
+    assert found["look"]["transport"]["show"] == "all"
+    plain = client.get(client.post("/api/shares", json=body(baked)).headers["location"]).json()
+    assert (plain["solo"], plain["solo_light"], plain["paths"]) == (None, None, None)
 
 
 def test_the_same_again_is_the_same_link_and_another_look_another(client: TestClient, baked: Baked) -> None:
@@ -68,6 +72,9 @@ def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch
         ({"views": ["front", "nowhere"]}, 422),
         ({"views": []}, 422),
         ({"views": ["front"] * 5}, 422),
+        ({"paths": {"show": "some", "bounces": 3}}, 422),
+        ({"paths": {"show": "all", "bounces": 25}}, 422),
+        ({"paths": {"show": "all"}}, 422),
         ({"bake": "0" * 16}, 404),
         ({"bake": "../../etc"}, 422),
         ({"more": 1}, 422),

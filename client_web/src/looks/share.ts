@@ -23,6 +23,7 @@ export async function share(): Promise<void> {
       look: { ...look },
       solo: store.solo.value,
       solo_light: store.soloLight.value,
+      paths: store.seenPaths.value,
     });
     const link = new URL(made.url, location.href).href;
     try {
@@ -40,11 +41,12 @@ function placeOf(shared: ShareBody): Place {
 }
 
 /** Take over what was seen: the look is a step, which undo takes back to the visitor's own. */
-function takeOver({ look, solo, solo_light }: ShareBody): void {
+function takeOver({ look, solo, solo_light, paths }: ShareBody): void {
   if (JSON.stringify(store.look.peek()) !== JSON.stringify(look)) commit("Shared look", look);
   store.history.seal();
   store.solo.value = solo;
   store.soloLight.value = solo_light;
+  store.seenPaths.value = paths;
 }
 
 /** Open what a link carries. */

@@ -1,0 +1,47 @@
+import { beforeEach, expect, test, vi } from "vitest";
+import { openShare, share } from "../src/looks/share";
+import type { ShareBody, ShareRequest } from "../src/protocol";
+import * as store from "../src/state/store";
+import { LOOK } from "./look";
+
+vi.mock("../src/state/open", () => ({
+  openScene: (_scene: string, _place: unknown, _choice: unknown, arrived: () => void) => {
+    arrived();
+    return Promise.resolve();
+  },
+}));
+
+const OF_THE_SERVER = { id: "a", created: "", scene: "s", lacking: [] };
+const PATHS = { show: "first_bounce", bounces: 24 } as const;
+let saved: ShareRequest;
+
+beforeEach(() => {
+  store.bake.value = "b".repeat(16);
+  store.look.value = LOOK;
+  store.shownViews.value = ["front"];
+  store.viewName.value = "front";
+  vi.stubGlobal("window", { setTimeout: () => 0 });
+  vi.stubGlobal("location", { href: "http://relume.example/" });
+  vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
+  vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {
+    if (init?.method !== "POST") {
+      const body: ShareBody = { solo: null, solo_light: null, paths: null, ...saved, ...OF_THE_SERVER, look: LOOK };
+      return Promise.resolve(Response.json(body));
+    }
+    saved = JSON.parse(init.body as string) as ShareRequest;
+    return Promise.resolve(Response.json({ id: "a", url: "/?share=a" }, { status: 201 }));
+  });
+});
+
+test("a link carries what is looked at, and a visitor's own gives way to it", async () => {
+  for (const [sent, visitors] of [
+    [PATHS, null],
+    [null, PATHS],
+  ]) {
+    store.seenPaths.value = sent ?? null;
+    await share();
+    store.seenPaths.value = visitors ?? null;
+    await openShare("a");
+    expect(store.seenPaths.value).toEqual(sent);
+  }
+});
