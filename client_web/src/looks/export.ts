@@ -16,10 +16,14 @@ const POLL_MS = 300;
 /** The EXR that the server renders now: how far it is, and a way to stop it. */
 export const exporting = signal<{ progress: number; stop(): void } | null>(null);
 
-function fileStem(): string {
+/** As many characters as the server leaves of a name. */
+const LONGEST_STEM = 120;
+
+/** What a picture's file is called, without what it ends with: the scene, the view, and which light is missing. */
+export function fileStem(): string {
   const limits = lightLimits.value.map((limit) => limit.words);
   const words = [scene.value?.name ?? "picture", viewName.value, ...limits].join(" ").trim();
-  return words.replace(/[^\p{L}\p{N}._-]+/gu, "-");
+  return [...words.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
 }
 
 function download(href: string, name: string): void {
