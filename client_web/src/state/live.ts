@@ -1,5 +1,5 @@
 /** The live session: connects the look to the server and the frames to the pictures; swaps to a finer bake. */
-import { batch, effect } from "@preact/signals";
+import { batch, effect, untracked } from "@preact/signals";
 import { problemText, request } from "../net/api";
 import type { Frame } from "../net/frame";
 import { Session, type SessionHandlers } from "../net/session";
@@ -192,8 +192,14 @@ async function arrive(from: Session, frame: Frame): Promise<void> {
   if (isNew && stage.of(view).idsOf !== from.bake) void loadIds(from.bake, view, arrival);
   if (!arrival.isWhole) return;
   if (from === session) return showArrived(from, view);
-  // views that are beside this one follow as they come
-  if (view === activeOf(pending)) await swap(from);
+  await swapWhereWhole();
+}
+
+/** The new bake takes over once the view that the hand is in is whole; those beside it follow as they come. */
+async function swapWhereWhole(): Promise<void> {
+  const active = activeOf(pending);
+  if (incoming === null || active === null) return;
+  if (arrivalsOf(incoming).get(active)?.isWhole) await swap(incoming);
 }
 
 async function showArrived(of: Session, view: string): Promise<void> {
@@ -347,6 +353,13 @@ effect(() => {
   const [shown, focus] = [store.shownViews.value, store.focusedView.value];
   if (session !== null && shown.length > 0) tellViews(session, shown, focus);
   if (incoming !== null && pending !== null) tellViews(incoming, shownOf(pending.views, pending.view), focus);
+});
+
+// the hand may come to a view that was whole before
+effect(() => {
+  store.viewName.value;
+  store.shownViews.value;
+  untracked(() => void swapWhereWhole());
 });
 
 // revisions that the view has already drawn while another one was counted tell nothing about the time they took

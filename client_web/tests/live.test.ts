@@ -1,0 +1,113 @@
+import { beforeEach, expect, test, vi } from "vitest";
+import type { Frame } from "../src/net/frame";
+import type { SessionHandlers } from "../src/net/session";
+import { stage } from "../src/picture/stage";
+import type { HelloMessage } from "../src/protocol";
+import { connect, disconnect } from "../src/state/live";
+import * as store from "../src/state/store";
+import { LOOK } from "./look";
+
+/** The sessions that were opened, the newest last. */
+const opened = vi.hoisted((): FakeSession[] => {
+  vi.stubGlobal("window", { setTimeout: () => 0 });
+  return [];
+});
+
+interface FakeSession {
+  bake: string;
+  handlers: SessionHandlers;
+}
+
+vi.mock("../src/net/session", () => ({
+  Session: class {
+    revision = 0;
+    pending = false;
+    constructor(
+      readonly bake: string,
+      readonly handlers: SessionHandlers,
+    ) {
+      opened.push(this);
+    }
+    connect = () => undefined;
+    close = () => undefined;
+    want = () => undefined;
+    send = () => true;
+    ask = () => true;
+  },
+}));
+
+const VIEWS = ["front", "left"].map((name) => ({ name, width: 1, height: 1, aspect: 1 }));
+
+function greet(bake: string): FakeSession {
+  connect(bake);
+  const session = opened.at(-1) as FakeSession;
+  const hello = { type: "hello", views: VIEWS, view: "front", method: "direct", look: LOOK, revision: 0, resume: "" };
+  session.handlers.hello(hello as unknown as HelloMessage);
+  return session;
+}
+
+function frame(view: string, complete = true): Frame {
+  return {
+    header: {
+      frame: 1,
+      revision: 0,
+      view,
+      width: 1,
+      height: 1,
+      tiles: [[0, 0, 1, 1]],
+      format: "rgb9e5",
+      exact: false,
+      fidelity: "preview",
+      complete,
+      kind: "picture",
+      alpha: false,
+      ms: { wait: 0, update: 0, encode: 0 },
+    },
+    payload: new Uint8Array(4),
+    alpha: null,
+  };
+}
+
+/** Both views of an old bake are shown, the hand is in the first; a new bake has said hello. */
+async function newBake(): Promise<FakeSession> {
+  const old = greet("old");
+  for (const view of store.shownViews.value) await old.handlers.frame(frame(view));
+  for (const view of store.shownViews.value) stage.of(view).idsOf = "new"; // none are fetched
+  return greet("new");
+}
+
+beforeEach(() => {
+  disconnect();
+  stage.clear();
+  for (const { name } of VIEWS) stage.of(name).idsOf = "old";
+  store.look.value = LOOK;
+  store.shownViews.value = ["front", "left"];
+  store.viewName.value = "front";
+});
+
+test("a new bake takes over when the view in hand is whole", async () => {
+  const session = await newBake();
+  await session.handlers.frame(frame("left"));
+  await session.handlers.frame(frame("front", false));
+  expect(store.bake.value).toBe("old");
+  await session.handlers.frame(frame("front"));
+  expect(store.bake.value).toBe("new");
+});
+
+test("a new bake takes over when the hand comes to a view that is whole", async () => {
+  const session = await newBake();
+  await session.handlers.frame(frame("left"));
+  store.viewName.value = "left";
+  expect(store.bake.value).toBe("new");
+});
+
+test("a new bake takes over when a view that is whole is shown alone", async () => {
+  const session = await newBake();
+  store.viewName.value = "left";
+  await session.handlers.frame(frame("left", false));
+  await session.handlers.frame(frame("front"));
+  expect(store.bake.value).toBe("old");
+  store.shownViews.value = ["front"];
+  store.viewName.value = "front";
+  expect(store.bake.value).toBe("new");
+});
