@@ -18,6 +18,7 @@ import "./picture/picture.css";
 import "./inspector/inspector.css";
 import "./looks/looks.css";
 import "./start/start.css";
+import "./start/bake.css";
 import "./curve/curve.css";
 import "./library/library.css";
 import "./lights/lights.css";
