@@ -1,6 +1,5 @@
 /** Import: drop files and folders anywhere on the page, or choose them; then the uploads with their progress. */
 import { useEffect, useState } from "preact/hooks";
-import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
 import { showError } from "../ui/toasts";
 import { useFileDrop } from "../ui/useFileDrop";
@@ -13,21 +12,15 @@ import {
   isOfUse,
   SCENE_SUFFIXES,
   sortFiles,
-  stem,
   together,
   type Chosen,
   type Dropped,
 } from "./files";
+import { useImport, type Sending } from "./useImport";
 
 const NOTHING: Chosen = { scenes: [], environment: null };
 const MAX_NAMED = 5;
 const FORMATS = `A scene is one of ${SCENE_SUFFIXES.join(" ")}, an environment one of ${ENVIRONMENT_SUFFIXES.join(" ")}.`;
-
-interface Sending {
-  name: string;
-  /** Of the bytes that are sent. */
-  share: number;
-}
 
 /** Why nothing of a drop, or not all of it, can be imported; null where all can. A folder may hold anything. */
 function refusal(files: readonly Dropped[]): string | null {
@@ -69,43 +62,32 @@ function FileInput({ label, folder, take }: { label: string; folder?: boolean; t
   );
 }
 
+function SendingWords({ name, share }: Sending) {
+  return (
+    <>
+      <progress max={1} value={share} aria-label="Upload" />
+      <span>{share < 1 ? `Sending “${name}”, ${Math.round(100 * share)} %` : `The server reads “${name}”…`}</span>
+    </>
+  );
+}
+
 export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void }) {
   const [files, setFiles] = useState<readonly Dropped[]>([]);
   const [ground, setGround] = useState(false);
-  const [problems, setProblems] = useState<ReadonlyMap<string, string>>(new Map());
-  const [sending, setSending] = useState<Sending | null>(null);
-  const { scenes, environment } = useSorted(files);
+  const { sending, problems, forgetProblems, send } = useImport();
+  const chosen = useSorted(files);
+  const { scenes, environment } = chosen;
   const take = (news: Dropped[]) => {
     if (news.length === 0) return;
     const words = refusal(news);
     if (words !== null) showError(words);
-    setProblems(new Map());
+    forgetProblems();
     setFiles((before) => together(before, news.filter(isOfUse)));
   };
   const over = useFileDrop(take);
-  /** One after another; what was refused stays chosen, so that what it lacks can be added. */
-  const send = async () => {
-    const imported: SceneBody[] = [];
-    const done = new Set<string>();
-    const refused = new Map<string, string>();
-    for (const scene of scenes) {
-      const name = stem(scene.path);
-      try {
-        const order = { scene, companions: scene.companions, environment, name, ground };
-        imported.push(await uploadScene(order, (share) => setSending({ name, share })));
-        done.add(scene.path);
-      } catch (error) {
-        refused.set(scene.path, (error as Error).message);
-      }
-    }
-    setSending(null);
-    setProblems(refused);
-    if (refused.size > 0)
-      showError(
-        scenes.length === 1
-          ? [...refused.values()].join()
-          : `${refused.size} of ${scenes.length} scenes could not be imported; the list says why.`,
-      );
+  /** What was refused stays chosen, so that what it lacks can be added. */
+  const sendAll = async () => {
+    const { imported, done } = await send(chosen, ground);
     setFiles((before) => (done.size === scenes.length ? [] : before.filter(({ path }) => !done.has(path))));
     if (imported.length > 0) onImported(imported);
   };
@@ -132,17 +114,10 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
           Put it on a ground
         </label>
         {sending !== null ? (
-          <>
-            <progress max={1} value={sending.share} aria-label="Upload" />
-            <span>
-              {sending.share < 1
-                ? `Sending “${sending.name}”, ${Math.round(100 * sending.share)} %`
-                : `The server reads “${sending.name}”…`}
-            </span>
-          </>
+          <SendingWords {...sending} />
         ) : (
           <>
-            <button class="primary" disabled={scenes.length === 0} onClick={() => void send()}>
+            <button class="primary" disabled={scenes.length === 0} onClick={() => void sendAll()}>
               {scenes.length > 1 ? `Import ${scenes.length} scenes` : "Import"}
             </button>
             {files.length > 0 && <button onClick={() => setFiles([])}>Clear</button>}

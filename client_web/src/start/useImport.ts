@@ -1,0 +1,61 @@
+/** Chosen scenes on their way to the server. */
+import { useState } from "preact/hooks";
+import { uploadScene } from "../net/upload";
+import type { SceneBody } from "../protocol";
+import { showError } from "../ui/toasts";
+import { stem, type Chosen } from "./files";
+
+export interface Sending {
+  name: string;
+  /** Of the bytes that are sent. */
+  share: number;
+}
+
+interface Outcome {
+  imported: SceneBody[];
+  /** Paths of the scenes that were imported. */
+  done: ReadonlySet<string>;
+}
+
+interface Import {
+  sending: Sending | null;
+  /** What was wrong with the scenes that were refused, by their paths. */
+  problems: ReadonlyMap<string, string>;
+  forgetProblems(): void;
+  /** One after another; what was refused is said. */
+  send(chosen: Chosen, ground: boolean): Promise<Outcome>;
+}
+
+function sayRefused(problems: ReadonlyMap<string, string>, numSent: number): void {
+  if (problems.size === 0) return;
+  showError(
+    numSent === 1
+      ? [...problems.values()].join()
+      : `${problems.size} of ${numSent} scenes could not be imported; the list says why.`,
+  );
+}
+
+export function useImport(): Import {
+  const [sending, setSending] = useState<Sending | null>(null);
+  const [problems, setProblems] = useState<ReadonlyMap<string, string>>(new Map());
+  const send = async ({ scenes, environment }: Chosen, ground: boolean) => {
+    const imported: SceneBody[] = [];
+    const done = new Set<string>();
+    const refused = new Map<string, string>();
+    for (const scene of scenes) {
+      const name = stem(scene.path);
+      try {
+        const order = { scene, companions: scene.companions, environment, name, ground };
+        imported.push(await uploadScene(order, (share) => setSending({ name, share })));
+        done.add(scene.path);
+      } catch (error) {
+        refused.set(scene.path, (error as Error).message);
+      }
+    }
+    setSending(null);
+    setProblems(refused);
+    sayRefused(refused, scenes.length);
+    return { imported, done };
+  };
+  return { sending, problems, forgetProblems: () => setProblems(new Map()), send };
+}
