@@ -4,7 +4,7 @@ import { NumberField } from "../ui/NumberField";
 import { IconButton } from "../ui/Button";
 import { fromHex, toHex } from "./color";
 
-interface Props {
+export interface ColorProps {
   label: string;
   value: Rgb;
   initial: Rgb | null;
@@ -16,7 +16,7 @@ interface Props {
 const MAXIMUM = 1e4;
 const CHANNELS = ["red", "green", "blue"] as const;
 
-export function ColorField({ label, value, initial, quantity = false, onChange }: Props) {
+export function ColorField({ label, value, initial, quantity = false, onChange }: ColorProps) {
   const least = quantity ? 0 : 1;
   const changed = initial !== null && value.some((v, i) => v !== initial[i]);
   return (

@@ -1,6 +1,6 @@
 /** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
 import { useRef } from "preact/hooks";
-import { ColorField } from "../inspector/ColorField";
+import { LabelledColor } from "../inspector/LabelledColor";
 import { edit } from "../state/edit";
 import { hold } from "../state/live";
 import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
@@ -75,15 +75,13 @@ export function EnvironmentPanel() {
         onChange={(value) => edit("Environment rotation", "/environment/rotation", value)}
         onHold={() => hold("/environment/rotation")}
       />
-      <div class="param alone">
-        <span class="param-label">Tint</span>
-        <ColorField
-          label="Environment tint"
-          value={shown.color}
-          initial={initial.color}
-          onChange={(value) => edit("Environment tint", "/environment/color", value)}
-        />
-      </div>
+      <LabelledColor
+        shown="Tint"
+        label="Environment tint"
+        value={shown.color}
+        initial={initial.color}
+        onChange={(value) => edit("Environment tint", "/environment/color", value)}
+      />
     </Section>
   );
 }

@@ -2,36 +2,21 @@
 import { seePaths, shownPaths } from "../state/paths";
 import { defaultLook, method } from "../state/store";
 import { LabelledSlider } from "../ui/LabelledSlider";
-import { onRadioKey } from "../ui/radio";
+import { RadioRow } from "../ui/RadioRow";
 import { Section } from "../ui/Section";
-import { MAX_BOUNCES, PATHS, type Show } from "./paths";
+import { MAX_BOUNCES, PATHS } from "./paths";
 
 export function TransportPanel() {
   const transport = shownPaths.value;
   if (transport === null || method.value !== "gather") return null;
-  const choose = (show: Show) => seePaths({ ...transport, show });
-  const chosen = PATHS.findIndex(({ show }) => show === transport.show);
   return (
     <Section title="Light paths">
-      <div
-        class="group segmented"
-        role="radiogroup"
-        aria-label="Light paths"
-        onKeyDown={(event) => onRadioKey(event, PATHS.length, chosen, (index) => choose(PATHS[index]?.show ?? "all"))}
-      >
-        {PATHS.map(({ show, label, title }, index) => (
-          <button
-            key={show}
-            role="radio"
-            aria-checked={index === chosen}
-            tabIndex={index === chosen ? 0 : -1}
-            title={title}
-            onClick={() => choose(show)}
-          >
-            {label}
-          </button>
-        ))}
-      </div>
+      <RadioRow
+        label="Light paths"
+        choices={PATHS}
+        chosen={transport.show}
+        onChoose={(show) => seePaths({ ...transport, show })}
+      />
       <LabelledSlider
         title="How many surfaces light may meet before the one that is seen"
         label="Bounces"

@@ -1,12 +1,8 @@
 /** Which light paths the picture shows, in words. */
 import type { Transport } from "../protocol";
+import type { Choice } from "../ui/RadioRow";
 
-export type Show = Transport["show"];
-
-interface PathWords {
-  show: Show;
-  label: string;
-  title: string;
+interface PathWords extends Choice<Transport["show"]> {
   /** Of a picture that shows nothing else; null where it shows all. */
   only: string | null;
 }
@@ -14,16 +10,16 @@ interface PathWords {
 export const MAX_BOUNCES = 24;
 
 export const PATHS: readonly PathWords[] = [
-  { show: "all", label: "All", title: "All light", only: null },
-  { show: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
+  { value: "all", label: "All", title: "All light", only: null },
+  { value: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
   {
-    show: "first_bounce",
+    value: "first_bounce",
     label: "First bounce",
     title: "Light that one surface has passed on",
     only: "the first bounce",
   },
   {
-    show: "further_bounces",
+    value: "further_bounces",
     label: "Rest",
     title: "Light that two surfaces or more have passed on",
     only: "light after the first bounce",
@@ -32,7 +28,7 @@ export const PATHS: readonly PathWords[] = [
 
 /** What is missing in the picture, in words; null where nothing is. */
 export function limitWords({ show, bounces }: Transport): string | null {
-  const only = PATHS.find((path) => path.show === show)?.only ?? null;
+  const only = PATHS.find((path) => path.value === show)?.only ?? null;
   if (only !== null) return `Only ${only}`;
   if (bounces >= MAX_BOUNCES) return null;
   return bounces === 0 ? "Only direct light" : `At most ${bounces} ${bounces === 1 ? "bounce" : "bounces"}`;
