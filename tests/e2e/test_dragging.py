@@ -30,12 +30,14 @@ def open_editor(server: Server, browser: Browser) -> Iterator[Editor]:
 
 @dataclass(frozen=True)
 class Draggable:
-    """A thing that is dragged: where it is, which way it goes in pixels a move, and what of it changes."""
+    """A thing that is dragged: where it is, which way it goes in pixels a move, and what of it changes; what makes it
+    ready before the first drag, and after each, so that the same drag changes something again."""
 
     thing: Callable[[Editor], Locator]
     way: Place = (5, 0)
     read: Callable[[Editor, Locator], str | None] = lambda _, thing: thing.get_attribute("aria-valuenow")
     prepare: Callable[[Editor], object] = lambda _: None
+    clear: Callable[[Editor], object] = lambda _: None
 
 
 def ball(term: int) -> Callable[[Editor], None]:
@@ -103,7 +105,13 @@ DRAGGABLES = {
         lambda editor, _: editor.page.locator(".plot [role=slider]").nth(1).get_attribute("aria-valuenow"),
         curve("p"),
     ),
-    "drawing": Draggable(lambda editor: editor.page.locator(".plot svg"), (6, 5), painted, curve("d")),
+    "drawing": Draggable(  # over a stroke, the same stroke is no news
+        lambda editor: editor.page.locator(".plot svg"),
+        (6, 5),
+        painted,
+        curve("d"),
+        lambda editor: editor.page.keyboard.press("Control+z"),
+    ),
     "stretch": Draggable(lambda editor: editor.page.locator(".plot svg"), (7, 1), painted, curve("t")),
     "material map": Draggable(
         lambda editor: editor.page.locator(".material-map svg"),
@@ -136,6 +144,7 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
     mouse.up()
     assert seen[0] != before or seen[1] != before
     assert len(set(seen[1:])) == NUM_MOVES - 1, seen
+    it.clear(editor)
 
 
 @pytest.mark.parametrize("name", DRAGGABLES)
