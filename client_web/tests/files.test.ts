@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { isOfUse, sortFiles, stem, together, type Dropped } from "../src/start/files";
+import type { Dropped } from "../src/start/dropped";
+import { isOfUse, sortFiles, stem, together } from "../src/start/files";
 import { resolve } from "../src/start/named";
 import { previewSize, recipeProblem } from "../src/start/recipe";
 

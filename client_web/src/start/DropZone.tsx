@@ -4,6 +4,7 @@ import type { SceneBody } from "../protocol";
 import { showError } from "../ui/toasts";
 import { useFileDrop } from "../ui/useFileDrop";
 import { ChosenScenes } from "./ChosenScenes";
+import type { Dropped } from "./dropped";
 import {
   chosenFiles,
   COMPANION_SUFFIXES,
@@ -14,7 +15,6 @@ import {
   sortFiles,
   together,
   type Chosen,
-  type Dropped,
 } from "./files";
 import { useImport, type Sending } from "./useImport";
 

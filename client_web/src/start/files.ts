@@ -1,4 +1,5 @@
 /** Which of the dropped files are scenes, which belong to one, and which is the environment. */
+import type { Dropped } from "./dropped";
 import { namedBy } from "./named";
 
 /** As the server reads them. */
@@ -7,12 +8,6 @@ export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
 const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".gif"];
 /** What may belong to a scene. */
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
-
-/** A file and its name with the folders that it was dropped in. */
-export interface Dropped {
-  path: string;
-  file: File;
-}
 
 export interface ScenePart extends Dropped {
   /** The files that it names. */

@@ -1,5 +1,5 @@
 /** Files of what was dropped, folders and the folders in them included. */
-import type { Dropped } from "./files";
+import type { Dropped } from "./dropped";
 
 const MAX_FILES = 3000;
 const MAX_DEPTH = 12;

@@ -1,5 +1,5 @@
 /** The files that a scene file names, looked for among those that were dropped with it. */
-import type { Dropped } from "./files";
+import type { Dropped } from "./dropped";
 
 interface Named {
   companions: Dropped[];

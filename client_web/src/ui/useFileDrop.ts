@@ -1,6 +1,6 @@
 /** Files and folders dropped anywhere on the page; whether some are held over it. */
 import { useEffect, useState } from "preact/hooks";
-import type { Dropped } from "../start/files";
+import type { Dropped } from "../start/dropped";
 import { droppedFiles } from "../start/folders";
 import { attempt } from "./toasts";
 
