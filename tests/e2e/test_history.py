@@ -16,6 +16,7 @@ def steps(editor: Editor) -> list[str | None]:
 def test_a_typed_number_is_one_step(editor: Editor) -> None:
     editor.choose("Ball", 1)
     page, slider = editor.page, editor.slider(SIGMA)
+    expect(page.locator(".tile.step img")).to_have_count(1)  # taken when the hand has rested a while
     slider.focus()
     page.keyboard.type("0.35")
     expect(page.get_by_role("textbox", name=f"{SIGMA}, as a number")).to_have_value("0.35")
