@@ -2,29 +2,9 @@ import { describe, expect, test } from "vitest";
 import type { Frame } from "../src/net/frame";
 import { Arrivals } from "../src/picture/arrival";
 import { worst } from "../src/picture/fidelity";
+import { onePixel } from "./frames";
 
-function frame(view: string, complete: boolean, at: number, width = 4): Frame {
-  const words = new Uint32Array([at]);
-  return {
-    header: {
-      frame: 1,
-      revision: at,
-      view,
-      width,
-      height: 1,
-      tiles: [[at, 0, 1, 1]],
-      format: "rgb9e5",
-      exact: false,
-      fidelity: "preview",
-      complete,
-      kind: "picture",
-      alpha: false,
-      ms: { wait: 0, update: 0, encode: 0 },
-    },
-    payload: new Uint8Array(words.buffer),
-    alpha: null,
-  };
-}
+const frame = (view: string, complete: boolean, at: number, width = 4): Frame => onePixel(view, complete, at, width);
 
 describe("a view's first picture", () => {
   test("is kept aside until it is whole, with all that came for it", () => {

@@ -1,10 +1,10 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import type { Frame } from "../src/net/frame";
 import type { SessionHandlers } from "../src/net/session";
 import { stage } from "../src/picture/stage";
 import type { HelloMessage } from "../src/protocol";
 import { connect, disconnect } from "../src/state/live";
 import * as store from "../src/state/store";
+import { onePixel } from "./frames";
 import { LOOK } from "./look";
 
 /** The sessions that were opened, the newest last. */
@@ -46,27 +46,7 @@ function greet(bake: string): FakeSession {
   return session;
 }
 
-function frame(view: string, complete = true): Frame {
-  return {
-    header: {
-      frame: 1,
-      revision: 0,
-      view,
-      width: 1,
-      height: 1,
-      tiles: [[0, 0, 1, 1]],
-      format: "rgb9e5",
-      exact: false,
-      fidelity: "preview",
-      complete,
-      kind: "picture",
-      alpha: false,
-      ms: { wait: 0, update: 0, encode: 0 },
-    },
-    payload: new Uint8Array(4),
-    alpha: null,
-  };
-}
+const frame = (view: string, complete = true) => onePixel(view, complete);
 
 /** Both views of an old bake are shown, the hand is in the first; a new bake has said hello. */
 async function newBake(): Promise<FakeSession> {
