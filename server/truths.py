@@ -11,7 +11,6 @@ import json
 import os
 import threading
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,22 +73,28 @@ class TruthQueue:
             CancelledError: the server closes.
         """
         key = request.bake, request.view
-        if key in self._pass_s:
-            return request.passes * self._pass_s[key]
-        if not self._sampling.acquire(blocking=False):
-            raise BusyError("another comparison is being estimated; ask again in a moment")
-        try:
-            if key not in self._pass_s:
-                look = looks.validate(request.look, transfer.default_look).on_the_map()
-                view = transfer.views[request.view]
-                size = max(1, view.width // _SAMPLE), max(1, view.height // _SAMPLE)
-                scale = view.width * view.height / (size[0] * size[1])
-                closes = partial(getattr, self._backlog, "is_closing")
-                of_pass = partial(self._pass, transfer, request.view, look, size, 0, is_stopped=closes)
-                self._pass_s[key] = sampled(lambda tell: of_pass(tell=tell), scale)
-        finally:
-            self._sampling.release()
+        if key not in self._pass_s:
+            if not self._sampling.acquire(blocking=False):
+                raise BusyError("another comparison is being estimated; ask again in a moment")
+            try:
+                self._pass_s[key] = self._sampled_pass(request, transfer)
+            finally:
+                self._sampling.release()
         return request.passes * self._pass_s[key]
+
+    def _sampled_pass(self, request: TruthRequest, transfer: Transfer) -> float:
+        """Seconds of a pass, by one of a small picture."""
+        look = looks.validate(request.look, transfer.default_look).on_the_map()
+        view = transfer.views[request.view]
+        size = max(1, view.width // _SAMPLE), max(1, view.height // _SAMPLE)
+
+        def closes() -> bool:
+            return self._backlog.is_closing
+
+        return sampled(
+            lambda tell: self._pass(transfer, request.view, look, size, 0, tell, closes),
+            view.width * view.height / (size[0] * size[1]),
+        )
 
     def get(self, identity: str) -> TruthStatus:
         """A comparison. Raises NotFoundError."""
