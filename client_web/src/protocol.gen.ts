@@ -35,11 +35,13 @@ export interface BrushMessage {
   to: number;
 }
 
-/** client → server: change the look; `revision` must be newer than the last. */
+/** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
 export interface EditMessage {
   type: "edit";
   revision: number;
   patch: PatchOperation[];
+  hand?: string | null;
+  solo?: string[] | null;
 }
 
 /** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
@@ -115,7 +117,7 @@ export interface TruthRequest {
   dry_run?: boolean;
 }
 
-/** client → server: show this view alone. `size` is the space the client has; frames come in the baked size. */
+/** client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down to fit into it, until views are shown otherwise; all other frames come in the baked size. */
 export interface ViewMessage {
   type: "view";
   name: string;
@@ -128,7 +130,7 @@ export interface ViewsMessage {
   names: string[];
 }
 
-/** A bake; `progress` 0…1, `problem` one sentence where it failed. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. */
+/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. */
 export interface BakeBody {
   id: string;
   scene: string;
@@ -141,6 +143,8 @@ export interface BakeBody {
   seconds_left: number | null;
   bytes: number;
   problem: string | null;
+  code: string | null;
+  is_current: boolean;
   recipe: RecipeBody;
   plan: PlanBody | null;
 }
@@ -232,14 +236,16 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` is the last one of a resumed session, else 0. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. */
 export interface HelloMessage {
   type: "hello";
   session: string;
   bake: string;
   method: string;
+  axes: ("curve" | "parameter" | "light" | "environment" | "bounces" | "eye")[];
   scene: string;
   look: Record<string, unknown>;
+  solo: string[] | null;
   revision: number;
   resumed: boolean;
   view: string;
@@ -480,12 +486,13 @@ export interface TruthPlanBody {
   seconds: number;
 }
 
-/** A baked view, its size in pixels and its camera. */
+/** A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. */
 export interface ViewInfo {
   name: string;
   width: number;
   height: number;
   camera: CameraInfo;
+  eye: "baked" | "free";
 }
 
 export type ClientMessage =

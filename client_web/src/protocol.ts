@@ -1,4 +1,6 @@
-/** What the server and the editor say to each other: the generated messages, and the look document they carry. */
+/** What the server and the editor say to each other: the generated messages, and the look document they carry, with the
+ * names that the editor has for what is in them. */
+import type * as doc from "./look.gen";
 import type * as gen from "./protocol.gen";
 
 export type {
@@ -31,78 +33,29 @@ export type {
   TruthPlanBody,
   TruthRequest,
 } from "./protocol.gen";
+export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
 export { MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];
-export type ParamValue = number | Rgb;
 export type Point = [degrees: number, value: number];
 export type Handle = [degrees: number, was: number, becomes: number];
 export type Tile = [x: number, y: number, width: number, height: number];
 export type PatchOp = gen.PatchOperation;
 
-/** A curve by `points` or `bands`, or a change to these or to what the parameters give by the other three. */
-export interface CurveOverride {
-  points?: Point[];
-  bands?: number[] | number[][];
-  factors?: number[] | number[][];
-  offsets?: number[] | number[][];
-  handles?: Handle[];
-  channels?: string;
-}
-export type CurveEdits = CurveOverride | CurveOverride[];
-
-export interface Term {
-  model: string;
-  data?: string;
-  color: Rgb;
-  params?: Record<string, ParamValue>;
-  texture?: string | null;
-  curves?: Record<string, CurveEdits>;
-}
-export interface MaterialLook {
-  terms: Term[];
-  /** Of a ground alone: only shadows on it are shown. */
-  catcher?: boolean;
-}
-/** What is seen where no surface is; it lights nothing. `color` is radiance, `blur` degrees. */
-export interface Background {
-  kind: "map" | "blurred" | "color" | "transparent";
-  color: Rgb;
-  blur: number;
-}
 export type Fidelity = gen.FrameHeader["fidelity"];
 
-export interface Look {
+/** A term as people write it: what it leaves out is as its model says. */
+export type Term = Pick<doc.TermLook, "model" | "color"> & Partial<doc.TermLook>;
+export type ParamValue = doc.TermLook["params"][string];
+export type CurveEdits = doc.TermLook["curves"][string];
+export interface MaterialLook extends Omit<doc.MaterialLook, "terms"> {
+  terms: Term[];
+}
+export interface Look extends Omit<doc.Look, "materials"> {
   materials: Record<string, MaterialLook>;
-  /** `map` names an environment of the server, null the scene's own. */
-  environment: { map?: string | null; scale: number; color: Rgb; rotation: number };
-  background: Background;
-  lights: Record<string, Light>;
-  /** Which light paths are shown; `bounces` between surfaces. */
-  transport: Transport;
-  display: { exposure: number; tone_map: string };
 }
-interface AnyLight {
-  scale: number;
-  color: Rgb;
-  on: boolean;
-  emission: Rgb;
-}
-/** Directions need not be unit; degrees, metres. */
-export type Light = AnyLight &
-  (
-    | { kind: "point"; position: Triple }
-    | { kind: "spot"; position: Triple; direction: Triple; cone: [inner: number, outer: number] }
-    | { kind: "directional"; direction: Triple }
-    | { kind: "rectangle"; position: Triple; direction: Triple; rotation: number; size: [width: number, height: number] }
-    | { kind: "mesh"; material: string }
-  );
-export type LightKind = Light["kind"];
-export interface Transport {
-  show: "all" | "direct" | "first_bounce" | "further_bounces";
-  bounces: number;
-}
+export type LightKind = doc.LightLook["kind"];
 
 /** A library material, its terms in look-document form. */
 export type MeasuredBody = Omit<gen.MeasuredBody, "terms"> & { terms: Term[] };

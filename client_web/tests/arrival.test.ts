@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
-import type { Frame } from "../src/net/frame";
+import type { Frame } from "../src/net/binaryFrame";
 import { Arrivals } from "../src/picture/arrival";
-import { worst } from "../src/picture/fidelity";
+import { worst } from "../src/state/fidelity";
 import { onePixel } from "./frames";
 
 const frame = (view: string, complete: boolean, at: number, width = 4): Frame => onePixel(view, complete, at, width);

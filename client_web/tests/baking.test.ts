@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
-import { bakingWords, hasProgress, phaseWords, type Baking } from "../src/start/baking";
+import { bakingWords, hasProgress, phaseWords } from "../src/scene/baking";
+import type { Baking } from "../src/state/bakes";
 
 const running: Baking = { id: "b", state: "running", progress: 0, phase: "tracing", seconds_left: null, problem: null };
 

@@ -1,6 +1,8 @@
 import { expect, test } from "vitest";
 import type { ModelBody } from "../src/protocol";
-import { curvePath, look, models, selectedCurve, selectedMaterial, selectedTerm } from "../src/state/store";
+import { look } from "../src/state/look";
+import { models } from "../src/state/scene";
+import { curvePath, selectedCurve, selectedMaterial, selectedTerm } from "../src/state/selection";
 import { LOOK } from "./look";
 
 test("no curve is open on a ground that only catches shadows, and the same one again on its surface", () => {

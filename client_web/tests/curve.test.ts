@@ -1,11 +1,11 @@
 import { describe, expect, test } from "vitest";
-import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "../src/curve/axes";
-import { joined, readChannels, writeChannels } from "../src/curve/channels";
-import { bandSamples, fitPoints, knotSamples, MAX_POINTS, Stroke } from "../src/curve/fit";
-import { bandsOfPoints, pchip } from "../src/curve/pchip";
-import { addPoint, movePoint, removePoint } from "../src/curve/points";
-import { mainStretch, shareOf } from "../src/curve/stretch";
-import type { CurveOverride, Point } from "../src/protocol";
+import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "../src/curve/model/axes";
+import { joined, readChannels, writeChannels } from "../src/curve/model/channels";
+import { bandSamples, fitPoints, knotSamples, MAX_POINTS, Stroke } from "../src/curve/model/fit";
+import { bandsOfPoints, pchip } from "../src/curve/model/pchip";
+import { addPoint, movePoint, removePoint } from "../src/curve/model/points";
+import { mainStretch, shareOf } from "../src/curve/model/stretch";
+import type { DrawnCurve, Point } from "../src/protocol";
 
 const LINEAR: Axes = { stretched: false, log: false, top: 5 };
 const POINTS: Point[] = [
@@ -210,8 +210,8 @@ describe("points", () => {
 });
 
 describe("channels", () => {
-  const red: CurveOverride = { points: [[0, 1], [90, 0]] };
-  const rest: CurveOverride = { handles: [[0, 2, 2], [90, 1, 3]], factors: [1, 0.5] };
+  const red: DrawnCurve = { points: [[0, 1], [90, 0]] };
+  const rest: DrawnCurve = { handles: [[0, 2, 2], [90, 1, 3]], factors: [1, 0.5] };
 
   test("equal channels share one object, and reading gives back what was written", () => {
     expect(writeChannels([rest, rest, { ...rest }])).toEqual({ ...rest, channels: "rgb" });

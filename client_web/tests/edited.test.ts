@@ -1,11 +1,11 @@
 import { describe, expect, test } from "vitest";
-import { readChannels, type Drawn } from "../src/curve/channels";
-import { applied, layerOf, valueOn } from "../src/curve/edited";
-import { MAX_POINTS, Stroke } from "../src/curve/fit";
-import type { Axes } from "../src/curve/axes";
-import { bentCurve, curveModel, pointsOf } from "../src/curve/model";
-import { addPoint, movePoint, removePoint } from "../src/curve/points";
-import { bandsWithin, drawOver, scaleOver, shiftOver, type Cloth } from "../src/curve/stretches";
+import type { Axes } from "../src/curve/model/axes";
+import { readChannels, type Drawn } from "../src/curve/model/channels";
+import { applied, layerOf, valueOn } from "../src/curve/model/edited";
+import { MAX_POINTS, Stroke } from "../src/curve/model/fit";
+import { bentCurve, curveModel, pointsOf } from "../src/curve/model/model";
+import { addPoint, movePoint, removePoint } from "../src/curve/model/points";
+import { bandsWithin, drawOver, scaleOver, shiftOver, type Cloth } from "../src/curve/model/stretches";
 import type { CurveBody, CurveEdits, CurveMessage, Handle, Point } from "../src/protocol";
 
 const BANDS = 256;

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
+import { luminance } from "../src/color/tonemap";
 import { emissionOf, LUMENS_A_WATT, measureOf, wattsOf } from "../src/lights/power";
 import { atKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/lights/temperature";
-import { luminance } from "../src/picture/tonemap";
 import type { Light } from "../src/protocol";
 
 const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] } as const;

@@ -1,7 +1,6 @@
 import { describe, expect, it } from "vitest";
+import { changeAt } from "../src/document/change";
 import { environmentOf } from "../src/outline/environments";
-import { diffLooks } from "../src/state/diff";
-import { setAt } from "../src/state/pointer";
 import { LOOK } from "./look";
 
 const file = (name: string) => new File([], name);
@@ -19,10 +18,10 @@ describe("an environment among dropped files", () => {
 });
 
 describe("another environment", () => {
-  it("travels as one operation, also where the look knew none", () => {
-    const lit = setAt(LOOK, "/environment/map", "env:0123456789abcdef");
-    expect(diffLooks(LOOK, lit)).toEqual([{ op: "add", path: "/environment/map", value: "env:0123456789abcdef" }]);
-    const back = setAt(lit, "/environment/map", null);
-    expect(diffLooks(lit, back)).toEqual([{ op: "replace", path: "/environment/map", value: null }]);
+  it("travels as one operation", () => {
+    const lit = changeAt(LOOK, "/environment/map", "env:0123456789abcdef");
+    expect(lit.patch).toEqual([{ op: "replace", path: "/environment/map", value: "env:0123456789abcdef" }]);
+    const back = changeAt(lit.after, "/environment/map", null);
+    expect(back.patch).toEqual([{ op: "replace", path: "/environment/map", value: null }]);
   });
 });

@@ -1,9 +1,10 @@
 import { expect, test, vi } from "vitest";
 import { fileStem } from "../src/looks/export";
 import type { SceneBody } from "../src/protocol";
-import { scene, viewName } from "../src/state/store";
+import { scene } from "../src/state/scene";
+import { viewName } from "../src/state/views";
 
-vi.mock("../src/state/live", () => ({ whenExact: () => Promise.resolve() }));
+vi.mock("../src/live/live", () => ({ whenExact: () => Promise.resolve() }));
 
 function called(name: string, view: string): string {
   scene.value = { name } as SceneBody;

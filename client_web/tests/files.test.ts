@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import type { Dropped } from "../src/start/dropped";
-import { isOfUse, sortFiles, stem, together } from "../src/start/files";
-import { resolve } from "../src/start/named";
-import { previewSize, recipeProblem } from "../src/start/recipe";
+import type { Dropped } from "../src/files/dropped";
+import { isOfUse, sortFiles, stem, together } from "../src/files/files";
+import { resolve } from "../src/files/named";
+import { previewSize, recipeProblem } from "../src/scene/recipe";
 
 const dropped = (path: string, content: BlobPart = ""): Dropped => ({
   path,

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
-import { FrameError, parseFrame } from "../src/net/frame";
+import { decodeRgb9e5, encodeRgb9e5 } from "../src/color/rgb9e5";
+import { FrameError, parseFrame } from "../src/net/binaryFrame";
 import { applyFrame, brushImage, emptyPixels, normalised } from "../src/picture/pixels";
-import { decodeRgb9e5, encodeRgb9e5 } from "../src/picture/rgb9e5";
 
 const HEADER = {
   frame: 12,

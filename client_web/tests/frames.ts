@@ -1,4 +1,4 @@
-import type { Frame } from "../src/net/frame";
+import type { Frame } from "../src/net/binaryFrame";
 
 /** A frame of one pixel, `at` from the left, whose word is `at` too; of that revision. */
 export function onePixel(view: string, complete: boolean, at = 0, width = 1): Frame {

@@ -1,7 +1,15 @@
 import { describe, expect, test } from "vitest";
-import { BINS_PER_STOP, binOf, histogramOf, MIDDLE_GREY, MIN_STOP, NUM_BINS, percentile } from "../src/picture/histogram";
-import { encodeRgb9e5 } from "../src/picture/rgb9e5";
-import { nextSolo } from "../src/state/solo";
+import { encodeRgb9e5 } from "../src/color/rgb9e5";
+import {
+  BINS_PER_STOP,
+  binOf,
+  histogramOf,
+  MIDDLE_GREY,
+  MIN_STOP,
+  NUM_BINS,
+  percentile,
+} from "../src/picture/histogram";
+import { nextSolo } from "../src/seen/solo";
 
 const total = (bins: Uint32Array) => bins.reduce((a, b) => a + b, 0);
 

@@ -1,14 +1,15 @@
 import { beforeEach, describe, expect, test } from "vitest";
+import { changeAt } from "../src/document/change";
+import { History, type Perform } from "../src/edit/history";
 import type { Look } from "../src/protocol";
-import { History, type Perform } from "../src/state/history";
-import { setAt } from "../src/state/pointer";
-import { LOOK } from "./look";
+import { LOOK, lookWith } from "./look";
 
 let value = 0;
 let now = 0;
 let history: History;
 
-const exposed = (exposure: number): Look => setAt(LOOK, "/display/exposure", exposure);
+const EXPOSURE = "/display/exposure";
+const exposed = (exposure: number): Look => lookWith(LOOK, EXPOSURE, exposure);
 
 /** The look is a number here: its exposure. */
 const perform: Perform = (step, back) => {
@@ -19,7 +20,7 @@ const undo = () => goTo(history.cursor.value - 1);
 const redo = () => goTo(history.cursor.value + 1);
 
 function change(to: number, key?: string): void {
-  const step = { of: "look" as const, label: `to ${to}`, before: exposed(value), after: exposed(to) };
+  const step = { of: "look" as const, label: `to ${to}`, ...changeAt(exposed(value), EXPOSURE, to) };
   value = to;
   history.record(key === undefined ? step : { ...step, key });
 }
@@ -86,6 +87,10 @@ describe("History", () => {
     for (let v = 10; v < 60; v++) change(v, "/sigma");
     history.seal();
     expect(history.steps.value).toHaveLength(2);
+    expect(history.steps.value[1]).toMatchObject({
+      patch: [{ op: "replace", path: EXPOSURE, value: 59 }],
+      inverse: [{ op: "replace", path: EXPOSURE, value: 1 }],
+    });
     await undo();
     expect(value).toBe(1);
     await redo();

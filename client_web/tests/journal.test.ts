@@ -1,9 +1,9 @@
 import { describe, expect, test } from "vitest";
+import { changeAt } from "../src/document/change";
+import { History, type Step } from "../src/edit/history";
+import { fromText, toText, type Story } from "../src/edit/journal";
 import type { Look } from "../src/protocol";
-import { History, type Step } from "../src/state/history";
-import { fromText, toText, type Story } from "../src/state/journal";
-import { setAt } from "../src/state/pointer";
-import { LOOK } from "./look";
+import { LOOK, lookWith } from "./look";
 
 const LONG = 1 << 20;
 const SIGMA = "/materials/Teapot/terms/1/params/sigma";
@@ -20,9 +20,9 @@ function storyOf(edits: typeof EDITS): { story: Story; looks: Look[] } {
   const looks = [LOOK];
   for (const [path, value] of edits) {
     const before = looks.at(-1) as Look;
-    const after = setAt(before, path, value);
-    looks.push(after);
-    history.record({ of: "look", label: path, before, after });
+    const change = changeAt(before, path, value);
+    looks.push(change.after);
+    history.record({ of: "look", label: path, ...change });
   }
   return { story: { steps: history.steps.value, cursor: history.cursor.value }, looks };
 }
@@ -51,7 +51,7 @@ describe("the kept history", () => {
 
   test("is not taken up where it leads to another look", () => {
     const { story } = storyOf(EDITS);
-    expect(read(toText(story, LONG, none), setAt(LOOK, SIGMA, 0.9))).toBeNull();
+    expect(read(toText(story, LONG, none), lookWith(LOOK, SIGMA, 0.9))).toBeNull();
   });
 
   test("forgets the oldest steps where it is too long, and what is left still undoes", () => {

@@ -1,13 +1,14 @@
 import { describe, expect, test } from "vitest";
+import { stepName } from "../src/edit/step";
 import { cameraOf, project, pushed, slid } from "../src/lights/camera";
 import { anglesOf, numbersOf } from "../src/lights/fields";
+import { acrossOf, aimed, anchorsOf, moved, outlineOf, placed } from "../src/lights/handleGeometry";
 import { beside, completedLight, freeLightName, lightFor, withKind } from "../src/lights/kinds";
-import { acrossOf, aimed, anchorsOf, moved, outlineOf, placed } from "../src/lights/shape";
 import { add, cross, dot, length, subtract, unit } from "../src/lights/vector";
 import type { Light, Triple } from "../src/protocol";
-import { ENVIRONMENT, seenOf, wholeOf } from "../src/state/solo";
-import { stepName } from "../src/state/step";
-import { seenPaths, soloLight } from "../src/state/store";
+import { seenPaths, wholeOf, withSeenPaths } from "../src/seen/paths";
+import { seenOf } from "../src/seen/rendered";
+import { ENVIRONMENT, soloLight, sourcesAlone } from "../src/seen/solo";
 import { LOOK } from "./look";
 
 // at (0, 1, 5), looking along −Z, 90° high, twice as wide as high
@@ -15,6 +16,7 @@ const camera = cameraOf({
   name: "front",
   width: 200,
   height: 100,
+  eye: "baked",
   camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2 },
 });
 const close = (a: readonly number[], b: readonly number[]) => a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));
@@ -151,21 +153,23 @@ describe("one light alone", () => {
     soloLight.value = "Spot";
     const alone = seenOf(lit);
     expect([alone.lights["Spot"]?.on, alone.lights["Sun"]?.on, alone.environment.scale]).toEqual([true, false, 0]);
-    expect(wholeOf(alone)).toBe(lit);
+    expect(sourcesAlone(lit)).toEqual(["Spot"]);
     soloLight.value = ENVIRONMENT;
     expect(seenOf(lit).environment).toBe(lit.environment);
+    expect(sourcesAlone(lit)).toEqual(["environment"]);
   });
 
   test("is no other look where there is no such light", () => {
     soloLight.value = "gone";
     expect(seenOf(lit)).toBe(lit);
+    expect(sourcesAlone(lit)).toBeNull();
     soloLight.value = null;
     expect(seenOf(lit)).toBe(lit);
   });
 
   test("is seen by some light paths, which the look does not take up", () => {
     seenPaths.value = { show: "direct", bounces: 3 };
-    const seen = seenOf(lit);
+    const seen = withSeenPaths(lit);
     expect(seen.transport).toEqual({ show: "direct", bounces: 3 });
     expect(seen.lights).toBe(lit.lights);
     expect(wholeOf(seen)).toBe(lit);

@@ -1,9 +1,12 @@
 import { beforeEach, expect, test, vi } from "vitest";
+import { connect } from "../src/live/connect";
+import { disconnect } from "../src/live/connections";
 import type { SessionHandlers } from "../src/net/session";
 import { stage } from "../src/picture/stage";
 import type { HelloMessage } from "../src/protocol";
-import { connect, disconnect } from "../src/state/live";
-import * as store from "../src/state/store";
+import { bake } from "../src/state/bakes";
+import { look } from "../src/state/look";
+import { shownViews, viewName } from "../src/state/views";
 import { onePixel } from "./frames";
 import { LOOK } from "./look";
 
@@ -51,8 +54,8 @@ const frame = (view: string, complete = true) => onePixel(view, complete);
 /** Both views of an old bake are shown, the hand is in the first; a new bake has said hello. */
 async function newBake(): Promise<FakeSession> {
   const old = greet("old");
-  for (const view of store.shownViews.value) await old.handlers.frame(frame(view));
-  for (const view of store.shownViews.value) stage.of(view).idsOf = "new"; // none are fetched
+  for (const view of shownViews.value) await old.handlers.frame(frame(view));
+  for (const view of shownViews.value) stage.of(view).idsOf = "new"; // none are fetched
   return greet("new");
 }
 
@@ -60,34 +63,34 @@ beforeEach(() => {
   disconnect();
   stage.clear();
   for (const { name } of VIEWS) stage.of(name).idsOf = "old";
-  store.look.value = LOOK;
-  store.shownViews.value = ["front", "left"];
-  store.viewName.value = "front";
+  look.value = LOOK;
+  shownViews.value = ["front", "left"];
+  viewName.value = "front";
 });
 
 test("a new bake takes over when the view in hand is whole", async () => {
   const session = await newBake();
   await session.handlers.frame(frame("left"));
   await session.handlers.frame(frame("front", false));
-  expect(store.bake.value).toBe("old");
+  expect(bake.value).toBe("old");
   await session.handlers.frame(frame("front"));
-  expect(store.bake.value).toBe("new");
+  expect(bake.value).toBe("new");
 });
 
 test("a new bake takes over when the hand comes to a view that is whole", async () => {
   const session = await newBake();
   await session.handlers.frame(frame("left"));
-  store.viewName.value = "left";
-  expect(store.bake.value).toBe("new");
+  viewName.value = "left";
+  expect(bake.value).toBe("new");
 });
 
 test("a new bake takes over when a view that is whole is shown alone", async () => {
   const session = await newBake();
-  store.viewName.value = "left";
+  viewName.value = "left";
   await session.handlers.frame(frame("left", false));
   await session.handlers.frame(frame("front"));
-  expect(store.bake.value).toBe("old");
-  store.shownViews.value = ["front"];
-  store.viewName.value = "front";
-  expect(store.bake.value).toBe("new");
+  expect(bake.value).toBe("old");
+  shownViews.value = ["front"];
+  viewName.value = "front";
+  expect(bake.value).toBe("new");
 });

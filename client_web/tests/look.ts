@@ -1,4 +1,5 @@
 /** A small look for tests. */
+import { changeAt } from "../src/document/change";
 import type { Look } from "../src/protocol";
 
 export const LOOK: Look = {
@@ -11,9 +12,14 @@ export const LOOK: Look = {
     },
     "a/b~c": { terms: [{ model: "lambert", color: [0.5, 0.5, 0.5] }] },
   },
-  environment: { scale: 1, color: [1, 1, 1], rotation: 0 },
+  environment: { map: null, scale: 1, color: [1, 1, 1], rotation: 0 },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   lights: {},
   transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },
 };
+
+/** A look with another value at a pointer. */
+export function lookWith(look: Look, path: string, value: unknown): Look {
+  return changeAt(look, path, value).after;
+}

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { limitWords } from "../src/outline/paths";
+import { limitWords } from "../src/seen/pathWords";
 
 test("a picture says which light it lacks", () => {
   expect(limitWords({ show: "all", bounces: 24 })).toBeNull();

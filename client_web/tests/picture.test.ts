@@ -1,7 +1,7 @@
-import { deflateSync } from "node:zlib";
+import { crc32, deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
+import { srgbDecode, srgbEncode, toDisplay } from "../src/color/tonemap";
 import { decodeIds } from "../src/picture/png16";
-import { srgbDecode, srgbEncode, toDisplay } from "../src/picture/tonemap";
 import { FIT, fitWidth, pan, shownWidth, toPicture, toScreen, zoomAt } from "../src/picture/transform";
 import type { Rgb } from "../src/protocol";
 
@@ -68,6 +68,7 @@ describe("decodeIds", () => {
     new DataView(bytes.buffer).setUint32(0, body.length);
     bytes.set(new TextEncoder().encode(type), 4);
     bytes.set(body, 8);
+    new DataView(bytes.buffer).setUint32(8 + body.length, crc32(bytes.subarray(4, 8 + body.length)));
     return bytes;
   }
 
@@ -107,15 +108,21 @@ describe("decodeIds", () => {
     return bytes.buffer.slice(0, bytes.length - cut);
   }
 
-  test("all sixteen bits survive, through every filter", async () => {
-    const ids = await decodeIds(png());
+  test("all sixteen bits survive, through every filter", () => {
+    const ids = decodeIds(png());
     expect([ids.width, ids.height]).toEqual([WIDTH, 5]);
     expect([...ids.values]).toEqual(values);
   });
 
-  test("what is no such image is refused", async () => {
-    await expect(decodeIds(new ArrayBuffer(100))).rejects.toThrow("not a PNG");
-    await expect(decodeIds(png(8))).rejects.toThrow("not 16-bit grey");
-    await expect(decodeIds(png(16, 20))).rejects.toThrow();
+  test("what is no such image is refused", () => {
+    expect(() => decodeIds(new ArrayBuffer(100))).toThrow("not a PNG");
+    expect(() => decodeIds(png(8))).toThrow("not 16-bit grey");
+    expect(() => decodeIds(png(16, 20))).toThrow();
+    const damaged = png();
+    new Uint8Array(damaged).set([1], damaged.byteLength - 20);
+    expect(() => decodeIds(damaged)).toThrow("CRC");
+    const huge = png();
+    new DataView(huge).setUint32(16, 1 << 30);
+    expect(() => decodeIds(huge)).toThrow("no usable size");
   });
 });

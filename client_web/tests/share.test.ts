@@ -1,10 +1,13 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import { openShare, share } from "../src/looks/share";
 import type { ShareBody, ShareRequest } from "../src/protocol";
-import * as store from "../src/state/store";
+import { seenPaths } from "../src/seen/paths";
+import { bake } from "../src/state/bakes";
+import { look } from "../src/state/look";
+import { shownViews, viewName } from "../src/state/views";
 import { LOOK } from "./look";
 
-vi.mock("../src/state/open", () => ({
+vi.mock("../src/scene/open", () => ({
   openScene: (_scene: string, _place: unknown, _choice: unknown, arrived: () => void) => {
     arrived();
     return Promise.resolve();
@@ -16,10 +19,10 @@ const PATHS = { show: "first_bounce", bounces: 24 } as const;
 let saved: ShareRequest;
 
 beforeEach(() => {
-  store.bake.value = "b".repeat(16);
-  store.look.value = LOOK;
-  store.shownViews.value = ["front"];
-  store.viewName.value = "front";
+  bake.value = "b".repeat(16);
+  look.value = LOOK;
+  shownViews.value = ["front"];
+  viewName.value = "front";
   vi.stubGlobal("window", { setTimeout: () => 0 });
   vi.stubGlobal("location", { href: "http://relume.example/" });
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
@@ -38,10 +41,10 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
     [PATHS, null],
     [null, PATHS],
   ]) {
-    store.seenPaths.value = sent ?? null;
+    seenPaths.value = sent ?? null;
     await share();
-    store.seenPaths.value = visitors ?? null;
+    seenPaths.value = visitors ?? null;
     await openShare("a");
-    expect(store.seenPaths.value).toEqual(sent);
+    expect(seenPaths.value).toEqual(sent);
   }
 });

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
+import { stepName } from "../src/edit/step";
 import type { Look, ModelBody } from "../src/protocol";
-import { stepName } from "../src/state/step";
 import { LOOK } from "./look";
 
 const models = [{ model: "ward", curves: [{ name: "h", label: "half angle θh" }] }] as unknown as ModelBody[];

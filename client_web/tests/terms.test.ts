@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { texturesOf } from "../src/inspector/terms";
 import type { SceneBody } from "../src/protocol";
-import { scene } from "../src/state/store";
+import { scene } from "../src/state/scene";
 
 test("a material offers the images that its own terms take, in their order", () => {
   const materials = [

@@ -1,12 +1,22 @@
 import { describe, expect, test } from "vitest";
-import { fromHex, strength, toHex } from "../src/inspector/color";
+import { gauge } from "../src/app/metrics";
+import { fromHex, strength, toHex } from "../src/color/color";
 import { defaultTerm, modelsFor, withModel } from "../src/inspector/terms";
 import { freeName } from "../src/looks/names";
 import type { ModelBody, Rgb } from "../src/protocol";
-import { gauge } from "../src/state/metrics";
-import { placeFromUrl, placeToUrl } from "../src/state/url";
+import { placeFromUrl, placeToUrl } from "../src/scene/url";
 import { chord } from "../src/ui/chord";
-import { formatBytes, formatNumber, formatSeconds, fromFraction, keyStep, parseNumber, snap, tickLabel, toFraction } from "../src/ui/scale";
+import {
+  formatBytes,
+  formatNumber,
+  formatSeconds,
+  fromFraction,
+  keyStep,
+  parseNumber,
+  snap,
+  tickLabel,
+  toFraction,
+} from "../src/ui/scale";
 
 describe("slider scales", () => {
   const log = { minimum: 0.01, maximum: 1, scale: "log" } as const;

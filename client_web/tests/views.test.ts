@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
-import { columnsFor } from "../src/picture/grid";
 import { availableOf, sideBySideOf } from "../src/state/views";
+import { columnsFor } from "../src/viewport/grid";
 
 describe("views side by side", () => {
   const all = ["a", "b", "c", "d", "e", "f"];

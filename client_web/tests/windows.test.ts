@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
+import { leaving } from "../src/app/rowRoom";
 import { fittingPanels, inspectorWidthIn } from "../src/state/room";
-import { leaving } from "../src/ui/fit";
 
 describe("a row that is too narrow", () => {
   const parts = [

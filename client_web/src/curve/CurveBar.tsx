@@ -1,10 +1,10 @@
 /** The curve editor's switches: tools and channels above the plot, axes and resets below it. */
+import { inspectorWidth } from "../state/panels";
 import { IconButton } from "../ui/Button";
 import type { IconName } from "../ui/Icon";
 import { Switch } from "../ui/Switch";
-import { inspectorWidth } from "../state/panels";
-import { CHANNELS, type Active } from "./channels";
-import { copyOf, put } from "./model";
+import { CHANNELS, type Active } from "./model/channels";
+import { copyOf, put } from "./model/model";
 import { active, isStretched, lights, logarithmic, stretched, tableOpen, tool, type Tool } from "./settings";
 import type { Hand } from "./tools";
 

@@ -1,18 +1,20 @@
 /** The curve editor: a term's one-dimensional factor, under the hand. */
 import { useEffect, useMemo, useState } from "preact/hooks";
+import { holdCurve } from "../live/touch";
 import type { CurveEdits, CurveBody } from "../protocol";
-import { holdCurve } from "../state/live";
-import { curvePath, curveShape, probe } from "../state/store";
-import { clearBrush } from "./brush";
+import { curveShape } from "../state/curveShape";
+import { probe } from "../state/probe";
+import { curvePath } from "../state/selection";
 import { CurveBar, CurveTools } from "./CurveBar";
 import { Handles } from "./Handles";
-import { curveModel, pointsOf } from "./model";
 import { Plot } from "./Plot";
 import { PointTable } from "./PointTable";
 import { Readout, type Contributions } from "./Readout";
-import { active, tableOpen, tool } from "./settings";
-import { shareOf } from "./stretch";
 import { StretchBar } from "./StretchBar";
+import { clearBrush } from "./brush";
+import { curveModel, pointsOf } from "./model/model";
+import { shareOf } from "./model/stretch";
+import { active, tableOpen, tool } from "./settings";
 import { picked, selection } from "./tools";
 import { stretchKey, usePlot } from "./usePlot";
 

@@ -1,11 +1,11 @@
 /** The curve's points: each a slider for keyboard and screen reader. */
 import type { Point } from "../protocol";
 import { formatNumber } from "../ui/scale";
-import { valueAt, yFraction } from "./axes";
-import { valueOn } from "./edited";
-import { putPoints } from "./model";
-import { plotX, plotY, type Frame } from "./frame";
-import { movePoint, removePoint } from "./points";
+import { valueAt, yFraction } from "./model/axes";
+import { valueOn } from "./model/edited";
+import { putPoints } from "./model/model";
+import { movePoint, removePoint } from "./model/points";
+import { plotX, plotY, type Frame } from "./plotScale";
 import { bandOf, picked, type Hand } from "./tools";
 
 interface Props {

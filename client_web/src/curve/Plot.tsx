@@ -1,7 +1,7 @@
 /** The plot without hands: one canvas, painted when what it shows has changed. */
 import { useLayoutEffect, useRef } from "preact/hooks";
-import type { Frame } from "./frame";
 import { paintPlot, type PlotContent } from "./paint";
+import type { Frame } from "./plotScale";
 
 interface Props extends PlotContent {
   frame: Frame;

@@ -1,11 +1,12 @@
 /** The points as numbers. */
+import { MAX_CURVE_VALUE } from "../look.gen";
 import type { Point } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { NumberField } from "../ui/NumberField";
 import { deletePoint, moveTo, resetPoint } from "./Handles";
-import { outlineOf } from "./fit";
-import { putPoints } from "./model";
-import { addPoint } from "./points";
+import { outlineOf } from "./model/fit";
+import { putPoints } from "./model/model";
+import { addPoint } from "./model/points";
 import { bandOf, picked, type Hand } from "./tools";
 
 /** Half-way along the widest gap, degrees. */
@@ -60,7 +61,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   label={`Point ${index + 1}, value`}
                   value={value}
                   minimum={0}
-                  maximum={1e6}
+                  maximum={MAX_CURVE_VALUE}
                   step={Math.max(0.01, value / 50)}
                   onChange={(y) => moveTo(hand, points, index, degrees, y)}
                 />

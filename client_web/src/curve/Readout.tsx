@@ -1,9 +1,9 @@
 /** One line under the plot: where the pointer is, where a pixel's light comes from, or what to do. */
 import { formatNumber } from "../ui/scale";
-import { valueAt, type Axes } from "./axes";
-import type { CurveModel } from "./model";
+import { valueAt, type Axes } from "./model/axes";
+import type { CurveModel } from "./model/model";
+import { mainStretch } from "./model/stretch";
 import { tool } from "./settings";
-import { mainStretch } from "./stretch";
 import { picked, selection, type Spot } from "./tools";
 
 const HINTS = {

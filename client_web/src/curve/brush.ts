@@ -1,7 +1,8 @@
 /** Curve → pixels: pointing at a stretch asks the server which pixels it lights. */
+import { send } from "../live/connections";
 import { stage } from "../picture/stage";
-import { send } from "../state/live";
-import { brushed, curvePath } from "../state/store";
+import { brushed } from "../state/curveShape";
+import { curvePath } from "../state/selection";
 import { lights } from "./settings";
 
 const DWELL_MS = 120;

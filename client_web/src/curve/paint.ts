@@ -2,8 +2,8 @@
  * than a drawing of many elements, and what stands around it is left alone. */
 import type { Point } from "../protocol";
 import { tickLabel } from "../ui/scale";
-import { MAX_DEGREES, xTicks, yTicks } from "./axes";
-import { inner, plotX, plotY, type Frame } from "./frame";
+import { MAX_DEGREES, xTicks, yTicks } from "./model/axes";
+import { inner, plotX, plotY, type Frame } from "./plotScale";
 
 export interface PlotContent {
   lines: Point[][];

@@ -1,6 +1,6 @@
 /** How the curve editor is set; kept for the whole visit. */
 import { signal } from "@preact/signals";
-import type { Active } from "./channels";
+import type { Active } from "./model/channels";
 
 export type Tool = "draw" | "points" | "stretch";
 

@@ -1,11 +1,11 @@
 /** What the pointer does in the plot: draw, move points, or scale and shift a stretch. */
 import { signal } from "@preact/signals";
 import type { Point } from "../protocol";
-import { MAX_DEGREES, valueAt, yFraction, type Axes } from "./axes";
-import { Stroke } from "./fit";
-import { pointsOf, put, putPoints, type CurveModel } from "./model";
-import { addPoint, movePoint } from "./points";
-import { drawOver, scaleOver, shiftOver, type Cloth } from "./stretches";
+import { MAX_DEGREES, valueAt, yFraction, type Axes } from "./model/axes";
+import { Stroke } from "./model/fit";
+import { pointsOf, put, putPoints, type CurveModel } from "./model/model";
+import { addPoint, movePoint } from "./model/points";
+import { drawOver, scaleOver, shiftOver, type Cloth } from "./model/stretches";
 
 /** A place in the plot. */
 export interface Spot {

@@ -1,12 +1,12 @@
 /** Pointer and keys in the plot: where they are, what they take hold of, which gesture is under way. */
 import { useRef, useState } from "preact/hooks";
-import { history } from "../state/store";
+import { history } from "../edit/history";
 import { useDrag } from "../ui/drag";
-import { niceTop, type Axes } from "./axes";
 import { brush, clearBrush } from "./brush";
-import { channelsOf } from "./channels";
-import { plotAt, plotX, plotY, type Frame } from "./frame";
-import { largestValue, pointsOf, type CurveModel } from "./model";
+import { niceTop, type Axes } from "./model/axes";
+import { channelsOf } from "./model/channels";
+import { largestValue, pointsOf, type CurveModel } from "./model/model";
+import { plotAt, plotX, plotY, type Frame } from "./plotScale";
 import { active, isStretched, logarithmic, tool } from "./settings";
 import {
   applyScale,

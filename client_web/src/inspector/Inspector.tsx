@@ -1,26 +1,18 @@
 /** What is selected: a light, or a material with its terms as cards. */
+import { pointer } from "../document/pointer";
+import { edit } from "../edit/edit";
+import { history } from "../edit/history";
 import { openLibrary } from "../library/library";
 import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lights";
-import { edit } from "../state/edit";
-import { pointer } from "../state/pointer";
+import { MAX_TERMS } from "../look.gen";
+import { defaultLook, look } from "../state/look";
 import { shownPanels } from "../state/room";
-import {
-  defaultLook,
-  history,
-  look,
-  models,
-  selectedCurve,
-  selectedLight,
-  selectedMaterial,
-  selectedTerm,
-  terms,
-} from "../state/store";
+import { models } from "../state/scene";
+import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
 import { defaultTerm, modelsFor } from "./terms";
-
-const MAX_TERMS = 8;
 
 function replaceTerms(label: string, material: string, next: unknown): void {
   history.seal();

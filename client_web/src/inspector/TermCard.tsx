@@ -1,15 +1,16 @@
 /** One term of the selected material: model, colour, parameters, and its curves; the open curve unfolds in place. */
 import { useMemo } from "preact/hooks";
+import { toHex } from "../color/color";
 import { CurveEditor } from "../curve/CurveEditor";
+import { pointer } from "../document/pointer";
+import { edit } from "../edit/edit";
+import { hold } from "../live/touch";
 import type { ModelBody, Rgb, Term } from "../protocol";
-import { edit } from "../state/edit";
-import { hold } from "../state/live";
-import { pointer } from "../state/pointer";
-import { defaultLook, models, modelOf, selectedCurve, selectedTerm } from "../state/store";
+import { defaultLook } from "../state/look";
+import { modelOf, models } from "../state/scene";
+import { selectedCurve, selectedTerm, selectTerm } from "../state/selection";
 import { IconButton } from "../ui/Button";
-import { selectTerm } from "../state/select";
-import { toHex } from "./color";
-import { ColorField } from "./ColorField";
+import { ColorField } from "../ui/ColorField";
 import { ParamRow } from "./ParamRow";
 import { modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 

@@ -1,6 +1,6 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
 import type { ModelBody, Term } from "../protocol";
-import { scene } from "../state/store";
+import { scene } from "../state/scene";
 
 /** The images that a material may have, in words. */
 export const TEXTURES: Record<string, string> = { diffuse: "Base colour", specular: "Highlight" };

@@ -1,8 +1,9 @@
 /** Materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
 import { useRef } from "preact/hooks";
-import { IconButton } from "../ui/Button";
 import { libraryOpen } from "../state/panels";
-import { models, selectedMaterial } from "../state/store";
+import { models } from "../state/scene";
+import { selectedMaterial } from "../state/selection";
+import { IconButton } from "../ui/Button";
 import { NavigationMap } from "./NavigationMap";
 import {
   DRAG_TYPE,

@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { getMaterialMap, materialAt } from "../net/api";
 import type { MaterialMapBody } from "../protocol";
-import { selectedMaterial } from "../state/store";
+import { selectedMaterial } from "../state/selection";
 import { useDrag } from "../ui/drag";
 import { attempt, note } from "../ui/toasts";
 import { giveTerms, library } from "./library";

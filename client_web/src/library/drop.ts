@@ -1,7 +1,7 @@
 /** A library material dragged over the picture: the object below is outlined, and takes it when it is dropped. */
 import { hitAt } from "../picture/hit";
 import type { Screen } from "../picture/screen";
-import { hoveredMaterial } from "../state/store";
+import { hoveredMaterial } from "../state/selection";
 import { DRAG_TYPE, putOn } from "./library";
 
 export function acceptMaterials(screen: Screen): () => void {

@@ -1,13 +1,12 @@
 /** The library: fitted materials, measurements that were imported here, and putting one onto an object. */
 import { computed, signal } from "@preact/signals";
+import { pointer } from "../document/pointer";
+import { edit } from "../edit/edit";
 import { listMaterials, listMeasured, materialThumbnail } from "../net/api";
 import { uploadMeasured } from "../net/upload";
 import type { MaterialBody, MeasuredBody, Term } from "../protocol";
-import { edit } from "../state/edit";
-import { pointer } from "../state/pointer";
 import { togglePanel } from "../state/room";
-import { select } from "../state/select";
-import { selectedMaterial } from "../state/store";
+import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
 
 export const DRAG_TYPE = "application/x-relume-material";

@@ -1,8 +1,8 @@
 /** What a light sends out: its colour as numbers and as a temperature, its whole in watts and in lumens. */
-import { ColorField } from "../inspector/ColorField";
+import { hold } from "../live/touch";
 import type { Light, Rgb } from "../protocol";
-import { hold } from "../state/live";
-import { defaultLook } from "../state/store";
+import { defaultLook } from "../state/look";
+import { ColorField } from "../ui/ColorField";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { NumberField } from "../ui/NumberField";
 import { UNITS } from "./kinds";

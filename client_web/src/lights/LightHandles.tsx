@@ -1,19 +1,20 @@
 /** Over a view's picture: a handle for each light, and for the selected one its size and what it aims at. */
 import { useRef } from "preact/hooks";
-import { toHex } from "../inspector/color";
-import { transformOf } from "../picture/places";
+import { toHex } from "../color/color";
+import { hold } from "../live/touch";
 import type { Screen } from "../picture/screen";
 import { shownWidth, toScreen } from "../picture/transform";
+import { transformOf } from "../picture/viewTransforms";
 import type { Light, Rgb, Triple } from "../protocol";
-import { hold } from "../state/live";
-import { selectLight } from "../state/select";
+import { drawn, handlesOpen } from "../state/display";
 import { aimLocked } from "../state/panels";
-import { drawn, handlesOpen, selectedLight, views } from "../state/store";
+import { selectedLight, selectLight } from "../state/selection";
+import { views } from "../state/views";
 import { useDrag } from "../ui/drag";
 import { formatNumber } from "../ui/scale";
 import { cameraOf, project, pushed, slid, type Camera } from "./camera";
+import { aimed, anchorsOf, moved, outlineOf, type Change } from "./handleGeometry";
 import { changeLight, lightPath, lights, removeLight } from "./lights";
-import { aimed, anchorsOf, moved, outlineOf, type Change } from "./shape";
 
 /** How a point of the world lies on a canvas, and how the canvas pulls at it. */
 class Ground {

@@ -1,18 +1,19 @@
 /** The selected light: its kind, how strong it is, and where it is. */
+import { edit } from "../edit/edit";
+import { hold } from "../live/touch";
+import { MAX_LIGHT_NAME } from "../look.gen";
 import type { Light, Triple } from "../protocol";
-import { edit } from "../state/edit";
-import { hold } from "../state/live";
+import { defaultLook } from "../state/look";
 import { aimLocked } from "../state/panels";
-import { defaultLook } from "../state/store";
 import { IconButton } from "../ui/Button";
 import { EditableName } from "../ui/EditableName";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { NumberField } from "../ui/NumberField";
 import { Emission } from "./Emission";
 import { anglesOf, numbersOf, type AngleField, type NumbersField } from "./fields";
-import { completedLight, KINDS, labelOf, MAX_LIGHT_NAME, withKind, type AddedKind } from "./kinds";
+import { placed } from "./handleGeometry";
+import { completedLight, KINDS, labelOf, withKind, type AddedKind } from "./kinds";
 import { changeLight, duplicateLight, editLight, isAdded, lightPath, removeLight, renameLight } from "./lights";
-import { placed } from "./shape";
 
 interface Shown {
   name: string;

@@ -1,18 +1,19 @@
 /** The lights of the scene as a mixer: each switched on and off, alone, stronger or weaker, and tinted. */
-import { fromHex, toHex } from "../inspector/color";
+import { fromHex, toHex } from "../color/color";
+import { hold } from "../live/touch";
 import type { Light } from "../protocol";
-import { selectLight } from "../state/select";
-import { hold } from "../state/live";
+import { soloLight, toggleLightSolo } from "../seen/solo";
+import { handlesOpen } from "../state/display";
+import { defaultLook } from "../state/look";
 import { folded, toggleFolded } from "../state/panels";
-import { toggleLightSolo } from "../state/solo";
-import { defaultLook, handlesOpen, selectedLight, soloLight } from "../state/store";
+import { selectedLight, selectLight } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { Section } from "../ui/Section";
 import { Slider } from "../ui/Slider";
 import { Switch } from "../ui/Switch";
 import { KINDS, labelOf } from "./kinds";
 import { editLight, lightPath, lights } from "./lights";
-import { adding, placing, startPlacing, stopAdding } from "./place";
+import { adding, placing, startPlacing, stopAdding } from "./placing";
 
 const TITLE = "Lights";
 

@@ -1,7 +1,7 @@
 /** While a light is being placed: what to do, a way without the pointer, and the way out. */
 import { useEffect, useRef } from "preact/hooks";
 import { KINDS } from "./kinds";
-import { placeInTheMiddle, placing, stopAdding } from "./place";
+import { placeInTheMiddle, placing, stopAdding } from "./placing";
 
 /** The bar goes, and with it the focus: the keys go on here. */
 function focusOn(selector: string): void {

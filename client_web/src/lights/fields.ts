@@ -1,4 +1,5 @@
 /** What of a light the inspector shows as numbers and as angles: which field, in which range, and how it is changed. */
+import { RANGES } from "../look.gen";
 import type { Light, Triple } from "../protocol";
 import { length } from "./vector";
 
@@ -20,17 +21,17 @@ export interface NumbersField {
   allows?(values: number[]): boolean;
 }
 
-const FARTHEST = 1e6;
-const XYZ = { names: ["x", "y", "z"], minimum: -FARTHEST, maximum: FARTHEST };
+const XYZ = ["x", "y", "z"];
 
 const NUMBERS: readonly NumbersField[] = [
-  { field: "position", deed: "Move", label: "Position", unit: "m", ...XYZ, step: 0.01 },
+  { field: "position", deed: "Move", label: "Position", unit: "m", names: XYZ, ...RANGES.light.position, step: 0.01 },
   {
     field: "direction",
     deed: "Aim",
     label: "Direction",
     unit: "",
-    ...XYZ,
+    names: XYZ,
+    ...RANGES.light.direction,
     step: 0.05,
     allows: (values) => length(values as Triple) > 0,
   },
@@ -40,8 +41,7 @@ const NUMBERS: readonly NumbersField[] = [
     label: "Size",
     unit: "m",
     names: ["width", "height"],
-    minimum: 1e-4,
-    maximum: 1e4,
+    ...RANGES.light.size,
     step: 0.01,
   },
 ];
@@ -74,8 +74,7 @@ const ANGLES: readonly AngleField[] = [
     field: "cone",
     deed: "Cone",
     label: "Cone, full light",
-    minimum: 0,
-    maximum: 90,
+    ...RANGES.light.cone,
     read: (light) => cone(light)[0],
     changed: (light, angle) => [angle, Math.max(angle, cone(light)[1])],
   },
@@ -84,7 +83,7 @@ const ANGLES: readonly AngleField[] = [
     deed: "Cone",
     label: "Cone, edge",
     minimum: 1,
-    maximum: 90,
+    maximum: RANGES.light.cone.maximum,
     read: (light) => cone(light)[1],
     changed: (light, angle) => [Math.min(cone(light)[0], angle), angle],
   },

@@ -1,8 +1,7 @@
 /** The kinds of light: their words, and a new light of each. */
+import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../protocol";
 import { add, length, scaled, subtract, tidy } from "./vector";
-
-export const MAX_LIGHTS = 64;
 
 /** Kinds that can be added; a mesh that shines only comes with a scene. */
 export type AddedKind = Exclude<LightKind, "mesh">;
@@ -58,25 +57,22 @@ export function lightFor(kind: AddedKind, { position, normal, distance, radiance
   const place = tidy(add(position, scaled(normal, offset)));
   const direction = tidy(subtract(position, place));
   const irradiance = SHARE * (radiance > 0 ? radiance : 1);
-  const common = { scale: 1, color: [1, 1, 1] as Rgb, on: true };
   const grey = (value: number): Rgb => Array<number>(3).fill(Number(value.toPrecision(2))) as Rgb;
   const intensity = grey(irradiance * offset ** 2);
   switch (kind) {
     case "point":
-      return { kind, ...common, emission: intensity, position: place };
+      return { ...DEFAULT_LIGHTS.point, emission: intensity, position: place };
     case "spot":
-      return { kind, ...common, emission: intensity, position: place, direction, cone: [20, 30] };
+      return { ...DEFAULT_LIGHTS.spot, emission: intensity, position: place, direction };
     case "directional":
-      return { kind, ...common, emission: grey(irradiance), direction };
+      return { ...DEFAULT_LIGHTS.directional, emission: grey(irradiance), direction };
     case "rectangle": {
       const side = Number((SIDE * offset).toPrecision(2));
       const emission = grey((irradiance * offset ** 2) / side ** 2);
-      return { kind, ...common, emission, position: place, direction, rotation: 0, size: [side, side] };
+      return { ...DEFAULT_LIGHTS.rectangle, emission, position: place, direction, size: [side, side] };
     }
   }
 }
-
-export const MAX_LIGHT_NAME = 80;
 
 /** The first of "Spot", "Spot 2", … that is free; after "Key 2" comes "Key 3". */
 export function freeLightName(like: string, taken: readonly string[]): string {
@@ -96,26 +92,15 @@ export function beside(light: Light): Light {
   return { ...light, position: tidy(add(light.position, [BESIDE * Math.max(reach, 0.1), 0, 0])) };
 }
 
-const DEFAULTS: { [K in LightKind]: Partial<Extract<Light, { kind: K }>> } = {
-  point: { position: [0, 1, 0] },
-  spot: { position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
-  directional: { direction: [0, -1, 0] },
-  rectangle: { position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
-  mesh: {},
-};
-
 /** A light with what a partial look says of it; what it does not say is as in `base`, or else as in a new light. */
 export function completedLight(partial: Partial<Light>, base: Light | undefined): Light {
   const kind = partial.kind ?? base?.kind ?? "point";
-  const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] };
-  const start = base?.kind === kind ? base : { ...common, kind, ...DEFAULTS[kind] };
-  return { ...start, ...partial } as Light;
+  return { ...(base?.kind === kind ? base : DEFAULT_LIGHTS[kind]), ...partial } as Light;
 }
 
 /** The same light as another kind: what both have stays. */
 export function withKind(light: Light, kind: AddedKind): Light {
-  const { scale, color, on, emission } = light;
-  const own = Object.keys(DEFAULTS[kind]);
-  const shared = Object.fromEntries(Object.entries(light).filter(([field]) => own.includes(field)));
-  return { kind, scale, color, on, emission, ...DEFAULTS[kind], ...shared } as Light;
+  const start = DEFAULT_LIGHTS[kind];
+  const shared = Object.entries(light).filter(([field]) => field !== "kind" && field in start);
+  return { ...start, ...Object.fromEntries(shared) } as Light;
 }

@@ -1,12 +1,15 @@
 /** The lights of the look: which is selected, and changing, adding and removing them. */
 import { batch, computed } from "@preact/signals";
+import { pointer } from "../document/pointer";
+import { edit, replaceLook } from "../edit/edit";
+import { MAX_LIGHTS } from "../look.gen";
 import type { Light, Look, Triple } from "../protocol";
-import { commit, edit } from "../state/edit";
-import { pointer } from "../state/pointer";
-import { defaultLook, look, selectedLight, soloLight } from "../state/store";
+import { soloLight } from "../seen/solo";
+import { defaultLook, look } from "../state/look";
+import { selectedLight } from "../state/selection";
 import { note } from "../ui/toasts";
-import { beside, freeLightName, MAX_LIGHTS } from "./kinds";
-import type { Change } from "./shape";
+import type { Change } from "./handleGeometry";
+import { beside, freeLightName } from "./kinds";
 
 export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
 export const lightNames = computed(() => Object.keys(lights.value));
@@ -59,7 +62,7 @@ export function renameLight(name: string, to: string): void {
   if (current.lights[to] !== undefined) return note(`There is a light “${to}” already; take another name.`);
   const renamed = Object.entries(current.lights).map(([each, light]) => [each === name ? to : each, light]);
   batch(() => {
-    commit(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
+    replaceLook(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
     if (selectedLight.peek() === name) selectedLight.value = to;
     if (soloLight.peek() === name) soloLight.value = to;
   });

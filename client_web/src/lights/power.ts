@@ -1,7 +1,7 @@
 /** How strong a light is as a whole: in watts, and as eyes count it.
  *
  * relume's light is radiometric; 683 lumens are a watt, as in imported files. Of R, G and B the luminance counts. */
-import { luminance } from "../picture/tonemap";
+import { luminance } from "../color/tonemap";
 import type { Light, Rgb } from "../protocol";
 
 export const LUMENS_A_WATT = 683;

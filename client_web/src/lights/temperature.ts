@@ -1,5 +1,5 @@
 /** Colours of glowing bodies: temperature in kelvin to linear Rec. 709, and the temperature next to a colour. */
-import { luminance } from "../picture/tonemap";
+import { luminance } from "../color/tonemap";
 import type { Rgb } from "../protocol";
 
 export const COOLEST = 1000;

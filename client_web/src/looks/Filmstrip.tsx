@@ -1,15 +1,17 @@
 /** Saved looks, and the steps of this visit: click one to return to it. */
 import { useEffect, useRef } from "preact/hooks";
+import { replaceLook } from "../edit/edit";
+import { history } from "../edit/history";
 import type { Look } from "../protocol";
-import { commit } from "../state/edit";
-import { defaultLook, history, look, scene } from "../state/store";
-import { goTo } from "../state/undo";
+import { defaultLook, look } from "../state/look";
+import { scene } from "../state/scene";
+import { lookThumbnail, thumbnailsMade } from "../state/thumbnails";
 import { IconButton } from "../ui/Button";
 import { EditableName } from "../ui/EditableName";
 import { Icon } from "../ui/Icon";
 import { completed, justSaved, markLook, saveLook, sideA } from "./compare";
 import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
-import { historyThumbnail, thumbnailsMade } from "./strip";
+import { goTo } from "./undo";
 
 const MAX_STEPS = 40;
 const MAX_NAME = 80;
@@ -43,7 +45,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
         class="tile-picture"
         aria-label={`Show ${saved.name}`}
         aria-pressed={shown}
-        onClick={() => commit(`Show ${saved.name}`, whole)}
+        onClick={() => replaceLook(`Show ${saved.name}`, whole)}
       >
         <Picture image={thumbnailOf(saved.name)} text={saved.name} />
         {sideA.value?.label === saved.name && <span class="mark">A</span>}
@@ -80,7 +82,7 @@ function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }
         class="tile-picture"
         aria-label={`Show ${name}`}
         aria-pressed={shown}
-        onClick={() => commit(`Show ${name}`, whole)}
+        onClick={() => replaceLook(`Show ${name}`, whole)}
       >
         <Picture image={null} text={name} />
         {sideA.value?.label === name && <span class="mark">A</span>}
@@ -128,7 +130,7 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
         aria-current={current ? "step" : undefined}
         onClick={() => goTo(count)}
       >
-        <Picture image={historyThumbnail(of)} text={label} />
+        <Picture image={lookThumbnail(of)} text={label} />
       </button>
       <span class="tile-name" title={label}>
         {label}

@@ -1,13 +1,18 @@
 /** A and B: A is a picture that was kept, B is the live one. */
 import { effect, signal } from "@preact/signals";
+import { isSame } from "../document/difference";
+import { replaceLook } from "../edit/edit";
+import { history } from "../edit/history";
 import { completedLight } from "../lights/kinds";
+import { withPicturesOf } from "../live/want";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
-import { diffLooks } from "../state/diff";
-import { commit } from "../state/edit";
-import { withPicturesOf } from "../state/live";
+import { connection } from "../state/connection";
+import { held, showBefore, wipe } from "../state/display";
+import { exact } from "../state/fidelity";
+import { defaultLook, look } from "../state/look";
 import { filmstripOpen } from "../state/panels";
-import { connection, defaultLook, exact, held, history, look, scene, showBefore, wipe } from "../state/store";
+import { scene } from "../state/scene";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
 import { addLook, keepThumbnail, unusedName } from "./shelf";
@@ -56,9 +61,9 @@ export function swapA(): void {
   const [a, live] = [sideA.value, look.value];
   if (a === null || live === null) return;
   stage.keepReference();
-  if (diffLooks(live, a.look).length > 0 && history.keepUndone())
+  if (!isSame(live, a.look) && history.keepUndone())
     note("What you had undone is kept in the history, before the swap.");
-  commit("Swap A and B", a.look);
+  replaceLook("Swap A and B", a.look);
   sideA.value = { look: live, label: "swapped" };
 }
 

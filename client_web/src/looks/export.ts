@@ -1,13 +1,16 @@
 /** Export: PNG as displayed, made here; EXR in linear radiance, rendered by the server. Both are of the light that is
  * shown: one source alone, or some of its paths. */
 import { signal } from "@preact/signals";
+import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
-import { lightLimits, lightLimitWords } from "../picture/limits";
 import { stage } from "../picture/stage";
 import type { RenderBody } from "../protocol";
-import { whenExact } from "../state/live";
-import { seenOf } from "../state/solo";
-import { bake, look, scene, viewName } from "../state/store";
+import { lightLimits, lightLimitWords } from "../seen/limits";
+import { seenOf } from "../seen/rendered";
+import { bake } from "../state/bakes";
+import { look } from "../state/look";
+import { scene } from "../state/scene";
+import { viewName } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 import { pngBlob } from "./image";
 

@@ -1,7 +1,7 @@
 /** Pictures made on the client from what it holds: thumbnails and PNG export. Same tone map as the canvas. */
+import { decodeRgb9e5 } from "../color/rgb9e5";
+import { toDisplay } from "../color/tonemap";
 import type { Pixels } from "../picture/pixels";
-import { decodeRgb9e5 } from "../picture/rgb9e5";
-import { toDisplay } from "../picture/tonemap";
 import type { Look, Rgb } from "../protocol";
 
 const THUMBNAIL_WIDTH = 144;

@@ -1,11 +1,16 @@
 /** Links that carry the look: saved on the server, never changed, opened as a step that can be undone. */
 import { signal } from "@preact/signals";
+import { replaceLook } from "../edit/edit";
+import { history } from "../edit/history";
 import { getShare, makeShare } from "../net/api";
 import type { ShareBody } from "../protocol";
-import { commit } from "../state/edit";
-import { openScene } from "../state/open";
-import * as store from "../state/store";
-import type { Place } from "../state/url";
+import { openScene } from "../scene/open";
+import type { Place } from "../scene/url";
+import { seenPaths } from "../seen/paths";
+import { solo, soloLight } from "../seen/solo";
+import { bake, bakes } from "../state/bakes";
+import { look } from "../state/look";
+import { shownViews, viewName } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 
 /** A link that the browser did not let us copy: it is shown to be copied by hand. */
@@ -13,17 +18,17 @@ export const linkToCopy = signal<string | null>(null);
 
 /** Save what is seen now, and copy the link to it. */
 export async function share(): Promise<void> {
-  const [bake, look] = [store.bake.value, store.look.value];
-  if (bake === null || look === null) return;
+  const [id, current] = [bake.value, look.value];
+  if (id === null || current === null) return;
   await attempt(async () => {
     const made = await makeShare({
-      bake,
-      view: store.viewName.value,
-      views: store.shownViews.value,
-      look: { ...look },
-      solo: store.solo.value,
-      solo_light: store.soloLight.value,
-      paths: store.seenPaths.value,
+      bake: id,
+      view: viewName.value,
+      views: shownViews.value,
+      look: { ...current },
+      solo: solo.value,
+      solo_light: soloLight.value,
+      paths: seenPaths.value,
     });
     const link = new URL(made.url, location.href).href;
     try {
@@ -41,12 +46,12 @@ function placeOf(shared: ShareBody): Place {
 }
 
 /** Take over what was seen: the look is a step, which undo takes back to the visitor's own. */
-function takeOver({ look, solo, solo_light, paths }: ShareBody): void {
-  if (JSON.stringify(store.look.peek()) !== JSON.stringify(look)) commit("Shared look", look);
-  store.history.seal();
-  store.solo.value = solo;
-  store.soloLight.value = solo_light;
-  store.seenPaths.value = paths;
+function takeOver(shared: ShareBody): void {
+  replaceLook("Shared look", shared.look);
+  history.seal();
+  solo.value = shared.solo;
+  soloLight.value = shared.solo_light;
+  seenPaths.value = shared.paths;
 }
 
 /** Open what a link carries. */
@@ -55,7 +60,7 @@ export async function openShare(id: string): Promise<void> {
     const shared = await getShare(id);
     if (shared.lacking.length > 0) throw new Error(shared.lacking.join(" "));
     await openScene(shared.scene, placeOf(shared), undefined, () => takeOver(shared));
-    if (store.bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
+    if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
       note("The bake of this link is gone. Its look is shown in another bake of the scene.");
   });
 }

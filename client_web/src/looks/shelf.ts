@@ -1,9 +1,10 @@
 /** Saved looks on the server, each with its version; saving and deleting can be undone. */
 import { signal } from "@preact/signals";
+import { history } from "../edit/history";
+import type { NamedLook } from "../edit/history";
 import { ApiError, json, request } from "../net/api";
 import type { Look, LookEntry } from "../protocol";
-import type { NamedLook } from "../state/history";
-import { history, scene } from "../state/store";
+import { scene } from "../state/scene";
 import { attempt } from "../ui/toasts";
 import { freeName } from "./names";
 

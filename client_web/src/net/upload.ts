@@ -1,6 +1,6 @@
 /** Imports: multipart uploads with progress, which fetch cannot report. */
+import type { Dropped } from "../files/dropped";
 import type { EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
-import type { Dropped } from "../start/dropped";
 import { ApiError } from "./api";
 
 export interface Upload {

@@ -1,8 +1,9 @@
 /** What is seen behind the objects: the map, the map out of focus, a colour, or nothing. */
-import { LabelledColor } from "../inspector/LabelledColor";
+import { edit } from "../edit/edit";
+import { RANGES } from "../look.gen";
 import type { Background } from "../protocol";
-import { edit } from "../state/edit";
-import { defaultLook, look } from "../state/store";
+import { defaultLook, look } from "../state/look";
+import { LabelledColor } from "../ui/LabelledColor";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { RadioRow, type Choice } from "../ui/RadioRow";
 import { Section } from "../ui/Section";
@@ -32,8 +33,7 @@ export function BackgroundPanel() {
           label="Background blur"
           value={shown.blur}
           initial={initial.blur}
-          minimum={2}
-          maximum={60}
+          {...RANGES.background.blur}
           scale="log"
           unit="°"
           onChange={(value) => edit("Background blur", "/background/blur", value)}

@@ -1,7 +1,8 @@
 /** Small pictures of environments to choose from: the scene's own first, then built-in ones, then imported ones. */
 import { useEffect, useRef } from "preact/hooks";
 import { ownEnvironmentThumbnail } from "../net/api";
-import { bake, look } from "../state/store";
+import { bake } from "../state/bakes";
+import { look } from "../state/look";
 import { IconButton } from "../ui/Button";
 import { onRadioKey } from "../ui/radio";
 import { choose, environments, importing, loadEnvironments, take } from "./environments";

@@ -1,15 +1,15 @@
 /** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
 import { useRef } from "preact/hooks";
-import { LabelledColor } from "../inspector/LabelledColor";
-import { edit } from "../state/edit";
-import { hold } from "../state/live";
-import { ENVIRONMENT, toggleLightSolo } from "../state/solo";
-import { defaultLook, look, soloLight } from "../state/store";
+import { edit } from "../edit/edit";
+import { hold } from "../live/touch";
+import { ENVIRONMENT, soloLight, toggleLightSolo } from "../seen/solo";
+import { defaultLook, look } from "../state/look";
 import { IconButton } from "../ui/Button";
+import { LabelledColor } from "../ui/LabelledColor";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { Section } from "../ui/Section";
-import { imported, offerToDelete } from "./environments";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
+import { imported, offerToDelete } from "./environments";
 
 function Actions({ scale }: { scale: number }) {
   /** How bright it was when it was switched off. */

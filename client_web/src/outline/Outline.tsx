@@ -1,10 +1,11 @@
 /** What is in the scene: materials to select, the lights and the light around them. */
-import { toHex } from "../inspector/color";
-import type { MaterialLook } from "../protocol";
-import { select } from "../state/select";
-import { defaultLook, hoveredMaterial, look, materialNames, modelOf, selectedMaterial, solo } from "../state/store";
-import { toggleMaterialSolo } from "../state/solo";
+import { toHex } from "../color/color";
 import { LightsPanel } from "../lights/LightsPanel";
+import type { MaterialLook } from "../protocol";
+import { solo, toggleMaterialSolo } from "../seen/solo";
+import { defaultLook, look } from "../state/look";
+import { materialNames, modelOf } from "../state/scene";
+import { hoveredMaterial, select, selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { Section } from "../ui/Section";
 import { BackgroundPanel } from "./BackgroundPanel";

@@ -1,14 +1,16 @@
 /** Which light paths are shown, of a bake that has light between surfaces. */
-import { seePaths, shownPaths } from "../state/paths";
-import { defaultLook, method } from "../state/store";
+import { DEFAULTS, RANGES } from "../look.gen";
+import { PATHS } from "../seen/pathWords";
+import { seePaths, shownPaths } from "../seen/paths";
+import { axes } from "../state/bakes";
+import { defaultLook } from "../state/look";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { RadioRow } from "../ui/RadioRow";
 import { Section } from "../ui/Section";
-import { MAX_BOUNCES, PATHS } from "./paths";
 
 export function TransportPanel() {
   const transport = shownPaths.value;
-  if (transport === null || method.value !== "gather") return null;
+  if (transport === null || !axes.value.includes("bounces")) return null;
   return (
     <Section title="Light paths">
       <RadioRow
@@ -21,9 +23,8 @@ export function TransportPanel() {
         title="How many surfaces light may meet before the one that is seen"
         label="Bounces"
         value={transport.bounces}
-        initial={defaultLook.value?.transport.bounces ?? MAX_BOUNCES}
-        minimum={0}
-        maximum={MAX_BOUNCES}
+        initial={defaultLook.value?.transport.bounces ?? DEFAULTS.transport.bounces}
+        {...RANGES.transport.bounces}
         step={1}
         scale="linear"
         onChange={(bounces) => seePaths({ ...transport, bounces })}

@@ -1,11 +1,11 @@
 /** The environments that a look may name: the list, choosing one, and importing a file. */
 import { computed, signal } from "@preact/signals";
+import { edit } from "../edit/edit";
+import { isEnvironment } from "../files/files";
 import { deleteEnvironment, listEnvironments } from "../net/api";
 import { uploadEnvironment } from "../net/upload";
 import type { EnvironmentBody } from "../protocol";
-import { isEnvironment } from "../start/files";
-import { edit } from "../state/edit";
-import { look } from "../state/store";
+import { look } from "../state/look";
 import { attempt, note, showError } from "../ui/toasts";
 
 export const environments = signal<EnvironmentBody[]>([]);

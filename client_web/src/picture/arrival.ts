@@ -1,6 +1,6 @@
 /** The first picture of a view on its way, of a new bake or after a view was opened: kept aside until something of
  * every material is there, so that no half picture takes the place of a whole one. */
-import type { Frame } from "../net/frame";
+import type { Frame } from "../net/binaryFrame";
 import type { FrameHeader } from "../protocol";
 import { applyFrame, emptyPixels, takeAlpha, type Pixels } from "./pixels";
 import type { Ids } from "./png16";

@@ -1,6 +1,6 @@
 /** How often each brightness occurs in a picture: luminance, red, green and blue in stops about middle grey. */
-import { decodeRgb9e5 } from "./rgb9e5";
-import { luminance } from "./tonemap";
+import { decodeRgb9e5 } from "../color/rgb9e5";
+import { luminance } from "../color/tonemap";
 
 export const MIDDLE_GREY = 0.18;
 export const MIN_STOP = -10;

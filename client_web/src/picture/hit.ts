@@ -1,7 +1,7 @@
 /** What lies under the pointer. */
 import type { Screen } from "./screen";
 import { toPicture } from "./transform";
-import { transformOf } from "./places";
+import { transformOf } from "./viewTransforms";
 
 export interface Hit {
   /** In the canvas, CSS pixels. */

@@ -1,12 +1,13 @@
 /** One view's picture: takes the frames of a session, keeps them, and says what lies where. The screen it is on draws
  * it; a picture that is on no screen keeps what it has. */
-import type { Frame } from "../net/frame";
+import { decodeRgb9e5 } from "../color/rgb9e5";
+import type { Frame } from "../net/binaryFrame";
 import type { Fidelity, Rgb } from "../protocol";
+import { brushed } from "../state/curveShape";
+import { materialNames } from "../state/scene";
 import type { Arrival } from "./arrival";
-import { brushed, materialNames } from "../state/store";
 import { applyFrame, brushImage, copyPixels, emptyPixels, normalised, takeAlpha, type Pixels } from "./pixels";
 import type { Ids } from "./png16";
-import { decodeRgb9e5 } from "./rgb9e5";
 import type { Renderer } from "./renderer";
 import type { Canvas } from "./transform";
 

@@ -1,8 +1,8 @@
 /** The picture as the client holds it: RGB9_E5 words, kept so that probes, export, thumbnails and a lost GPU context
  * need no round trip. */
+import { encodeRgb9e5 } from "../color/rgb9e5";
+import type { Frame } from "../net/binaryFrame";
 import type { Tile } from "../protocol";
-import type { Frame } from "../net/frame";
-import { encodeRgb9e5 } from "./rgb9e5";
 
 export interface Pixels {
   readonly width: number;

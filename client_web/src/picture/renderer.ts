@@ -1,8 +1,8 @@
 /** The WebGL2 side of the picture. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
 import type { Tile } from "../protocol";
+import { allocate, makeTexture, Program } from "./gl";
 import type { Pixels } from "./pixels";
 import { fragment, VERTEX, type Features } from "./shaders";
-import { allocate, makeTexture, Program } from "./gl";
 
 const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
 type Unit = (typeof UNITS)[number];

@@ -1,12 +1,18 @@
 /** A canvas that shows one picture, as the view's settings say. Each has a graphics context of its own: a frame of one
  * view then draws that view alone, where a shared canvas would have to draw all of them again. */
 import { effect } from "@preact/signals";
-import { frameDrawn } from "../state/stats";
-import * as store from "../state/store";
+import { solo } from "../seen/solo";
+import { brushed } from "../state/curveShape";
+import { drawn, falseColour, held, showBefore, wipe } from "../state/display";
+import { frameDrawn } from "../state/latency";
+import { exposure, toneMap } from "../state/look";
+import { materialNames } from "../state/scene";
+import { hoveredMaterial } from "../state/selection";
+import { focusedView, sideBySide } from "../state/views";
 import type { Picture, Shows } from "./picture";
 import { Renderer } from "./renderer";
 import { MARGIN_ALONE, MARGIN_BESIDE, shownWidth, toScreen, type Canvas } from "./transform";
-import { transformOf } from "./places";
+import { transformOf } from "./viewTransforms";
 
 const MAX_WAIT_MS = 250;
 const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
@@ -107,26 +113,26 @@ export class Screen implements Shows {
 
   size(): Canvas {
     const [width, height] = this.box;
-    const margin = store.sideBySide.value ? MARGIN_BESIDE : MARGIN_ALONE;
+    const margin = sideBySide.value ? MARGIN_BESIDE : MARGIN_ALONE;
     return { width, height, aspect: this.shown.aspect, margin };
   }
 
   private settings() {
     const { reference, ids, brush, view } = this.shown;
-    const hovered = store.hoveredMaterial.value;
-    const alone = store.solo.value;
-    const { on, at } = store.wipe.value;
-    const before = store.showBefore.value; // read also while there is no A yet: a redraw follows what was read
+    const hovered = hoveredMaterial.value;
+    const alone = solo.value;
+    const { on, at } = wipe.value;
+    const before = showBefore.value; // read also while there is no A yet: a redraw follows what was read
     return {
-      held: store.held.value,
+      held: held.value,
       transform: transformOf(view),
-      exposure: store.exposure.value,
-      toneMap: store.toneMap.value,
-      falseColour: store.falseColour.value,
+      exposure: exposure.value,
+      toneMap: toneMap.value,
+      falseColour: falseColour.value,
       wipe: reference === null ? -1 : before ? 2 : on ? at : -1,
-      hover: hovered === null || ids === null ? -1 : store.materialNames.value.indexOf(hovered),
-      solo: alone === null || ids === null ? -1 : store.materialNames.value.indexOf(alone),
-      brush: store.brushed.value !== null && brush !== null,
+      hover: hovered === null || ids === null ? -1 : materialNames.value.indexOf(hovered),
+      solo: alone === null || ids === null ? -1 : materialNames.value.indexOf(alone),
+      brush: brushed.value !== null && brush !== null,
     };
   }
 
@@ -148,8 +154,8 @@ export class Screen implements Shows {
       surround: SURROUND,
     });
     this.blank = false;
-    if (shown.view === store.focusedView.peek()) frameDrawn(shown.revision);
-    store.drawn.value += 1;
+    if (shown.view === focusedView.peek()) frameDrawn(shown.revision);
+    drawn.value += 1;
     this.drawnThisFrame = true;
     requestAnimationFrame(() => (this.drawnThisFrame = false));
   }

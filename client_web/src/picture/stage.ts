@@ -1,5 +1,6 @@
 /** The pictures of all views of the open scene that were shown; which of them are shown is the store's to say. */
-import { brushed, shownViews, viewName } from "../state/store";
+import { brushed } from "../state/curveShape";
+import { shownViews, viewName } from "../state/views";
 import { Picture } from "./picture";
 
 class Stage {

@@ -1,7 +1,7 @@
 /** Zoom of the active view, as buttons and keys know it. */
-import { moveTo, transformOf } from "./places";
 import { stage } from "./stage";
 import { FIT, shownWidth, zoomAt, type Canvas } from "./transform";
+import { moveTo, transformOf } from "./viewTransforms";
 
 const NOWHERE: Canvas = { width: 1, height: 1, aspect: 1, margin: 0 };
 

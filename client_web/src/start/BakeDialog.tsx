@@ -1,7 +1,7 @@
 /** After an import, and on request: what a bake will cost. Not modal: the page stays usable. */
 import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
-import { viewsToBake, type BakeChoice } from "../state/open";
+import { viewsToBake, type BakeChoice } from "../scene/bakeChoice";
 import { IconButton } from "../ui/Button";
 import { PresetList } from "./PresetList";
 import { Remarks } from "./Remarks";

@@ -2,9 +2,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { listBuiltIns, takeBuiltIn } from "../net/api";
 import type { BuiltInBody, SceneBody } from "../protocol";
-import { viewsToBake, type BakeChoice } from "../state/open";
+import { viewsToBake, type BakeChoice } from "../scene/bakeChoice";
+import type { Method } from "../scene/methods";
 import { attempt } from "../ui/toasts";
-import type { Method } from "./methods";
 
 interface Props {
   /** Without a choice, where it has been baked before. */

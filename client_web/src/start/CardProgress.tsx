@@ -2,7 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { followBake } from "../net/events";
 import type { BakeBody, SceneBody } from "../protocol";
-import { bakingWords, hasProgress, useElapsed } from "./baking";
+import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
 
 export function CardProgress({ scene, onReady }: { scene: SceneBody; onReady(): void }) {
   const [bake, setBake] = useState<BakeBody | null>(null);

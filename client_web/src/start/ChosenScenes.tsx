@@ -1,6 +1,6 @@
 /** The scenes among the chosen files, each with what belongs to it and what it lacks. */
+import { stem, type ScenePart } from "../files/files";
 import { IconButton } from "../ui/Button";
-import { stem, type ScenePart } from "./files";
 
 interface Props {
   scenes: readonly ScenePart[];

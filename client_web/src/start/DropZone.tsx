@@ -1,10 +1,6 @@
 /** Import: drop files and folders anywhere on the page, or choose them; then the uploads with their progress. */
 import { useEffect, useState } from "preact/hooks";
-import type { SceneBody } from "../protocol";
-import { showError } from "../ui/toasts";
-import { useFileDrop } from "../ui/useFileDrop";
-import { ChosenScenes } from "./ChosenScenes";
-import type { Dropped } from "./dropped";
+import type { Dropped } from "../files/dropped";
 import {
   chosenFiles,
   COMPANION_SUFFIXES,
@@ -15,7 +11,11 @@ import {
   sortFiles,
   together,
   type Chosen,
-} from "./files";
+} from "../files/files";
+import type { SceneBody } from "../protocol";
+import { showError } from "../ui/toasts";
+import { ChosenScenes } from "./ChosenScenes";
+import { useFileDrop } from "./useFileDrop";
 import { useImport, type Sending } from "./useImport";
 
 const NOTHING: Chosen = { scenes: [], environment: null };

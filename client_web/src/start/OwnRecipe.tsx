@@ -2,8 +2,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { planBake } from "../net/api";
 import type { BakeRequest } from "../protocol";
+import { LIGHTS, recipeProblem, SIDE, type OwnRecipe as Recipe } from "../scene/recipe";
 import { PlanWords, type Planned } from "./PlanWords";
-import { LIGHTS, recipeProblem, SIDE, type OwnRecipe as Recipe } from "./recipe";
 
 const TYPING_MS = 300;
 

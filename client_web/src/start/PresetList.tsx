@@ -2,11 +2,11 @@
 import { useEffect, useId, useState } from "preact/hooks";
 import { planBake } from "../net/api";
 import { MAX_VIEWS_SHOWN, type SceneBody } from "../protocol";
-import type { BakeChoice, Preset } from "../state/open";
-import { METHODS, type Method } from "./methods";
+import type { BakeChoice, Preset } from "../scene/bakeChoice";
+import { METHODS, type Method } from "../scene/methods";
+import type { Size } from "../scene/recipe";
 import { OwnRecipe } from "./OwnRecipe";
 import { PlanWords, type Planned } from "./PlanWords";
-import type { Size } from "./recipe";
 
 const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "preview", label: "Preview", help: "to find the look" },

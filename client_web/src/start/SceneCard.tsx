@@ -1,9 +1,9 @@
 import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { IconButton } from "../ui/Button";
+import { formatCount } from "../ui/scale";
 import { CardProgress } from "./CardProgress";
 import { countsOf, Remarks } from "./Remarks";
-import { formatCount } from "../ui/scale";
 
 interface Props {
   scene: SceneBody;

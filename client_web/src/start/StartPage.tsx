@@ -2,7 +2,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { addGround, deleteScene, listScenes } from "../net/api";
 import type { SceneBody } from "../protocol";
-import { openScene, type BakeChoice } from "../state/open";
+import type { BakeChoice } from "../scene/bakeChoice";
+import { openScene } from "../scene/open";
 import { attempt, note } from "../ui/toasts";
 import { BakeDialog } from "./BakeDialog";
 import { BuiltIns } from "./BuiltIns";

@@ -1,9 +1,9 @@
 /** Chosen scenes on their way to the server. */
 import { useState } from "preact/hooks";
+import { stem, type Chosen } from "../files/files";
 import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
 import { showError } from "../ui/toasts";
-import { stem, type Chosen } from "./files";
 
 export interface Sending {
   name: string;

@@ -1,7 +1,21 @@
 /** Which views are shown, and which of them the hand is in. */
-import { batch } from "@preact/signals";
-import { MAX_VIEWS_SHOWN } from "../protocol";
-import { pointedView, shownViews, sideBySide, viewName, views } from "./store";
+import { batch, computed, signal } from "@preact/signals";
+import { MAX_VIEWS_SHOWN, type HelloMessage } from "../protocol";
+
+/** Those that the shown bake has. */
+export const views = signal<HelloMessage["views"]>([]);
+/** The active view: what buttons and keys mean. It is one of those that are shown. */
+export const viewName = signal("");
+export const shownViews = signal<string[]>([]);
+export const sideBySide = computed(() => shownViews.value.length > 1);
+/** The view that the pointer is over. */
+export const pointedView = signal<string | null>(null);
+/** The view whose frames go first. */
+export const focusedView = computed(() => {
+  const pointed = pointedView.value;
+  return pointed !== null && shownViews.value.includes(pointed) ? pointed : viewName.value;
+});
+export const view = computed(() => views.value.find((v) => v.name === viewName.value) ?? null);
 
 /** As many views as fit, in their order, the active one among them. */
 export function sideBySideOf(all: readonly string[], active: string): string[] {

@@ -2,10 +2,14 @@
 import { signal } from "@preact/signals";
 import { forgetTruth, getTruth, planTruth, resumeTruth, startTruth, stopTruth } from "../net/api";
 import type { TruthBody, TruthPlanBody, TruthRequest } from "../protocol";
+import { seenPaths } from "../seen/paths";
+import { seenOf } from "../seen/rendered";
+import { soloLight } from "../seen/solo";
+import { bake } from "../state/bakes";
+import { look } from "../state/look";
 import { truthOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
-import { seenOf } from "../state/solo";
-import { bake, look, seenPaths, soloLight, viewName } from "../state/store";
+import { viewName } from "../state/views";
 import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;

@@ -1,6 +1,6 @@
 /** A number that is typed: Enter or leaving takes it, Escape leaves it as it was, arrows step it. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
-import { history } from "../state/store";
+import { history } from "../edit/history";
 import { formatNumber, parseNumber } from "./scale";
 
 interface Props {

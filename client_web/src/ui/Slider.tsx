@@ -1,8 +1,8 @@
 /** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
  * Digits type a number at once. Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
 import { useRef, useState } from "preact/hooks";
-import { useDrag } from "./drag";
 import { NumberField } from "./NumberField";
+import { useDrag } from "./drag";
 import { formatNumber, fromFraction, keyStep, snap, toFraction, type Range } from "./scale";
 
 export interface SliderProps extends Range {

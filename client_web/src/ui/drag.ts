@@ -1,7 +1,7 @@
 /** Dragging, the same everywhere: the pointer is captured, the browser's own dragging of text and pictures stays away,
  * and however the pointer is lost, the drag ends. */
 import { useEffect, useRef } from "preact/hooks";
-import { history } from "../state/store";
+import { history } from "../edit/history";
 
 type Pulled = PointerEvent & { readonly currentTarget: Element };
 

@@ -1,0 +1,45 @@
+/** The editor's layout: what stands where. Everything but the picture collapses. */
+import { Inspector } from "../inspector/Inspector";
+import { LibraryPanel } from "../library/LibraryPanel";
+import { Filmstrip } from "../looks/Filmstrip";
+import { Outline } from "../outline/Outline";
+import { take } from "../outline/environments";
+import { useFileDrop } from "../start/useFileDrop";
+import { filmstripOpen, helpOpen } from "../state/panels";
+import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/room";
+import { TruthPanel } from "../truth/TruthPanel";
+import { Splitter } from "../ui/Splitter";
+import { PictureView } from "../viewport/PictureView";
+import { Help } from "./Help";
+import { StatusBar } from "./StatusBar";
+import { TopBar } from "./TopBar";
+import { useKeyboard } from "./keyboard";
+
+export function Editor() {
+  useKeyboard();
+  const { outline, library, truth } = panelWidths.value;
+  const widths = { outline, library, truth, inspector: inspectorShownWidth.value };
+  const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
+  const shown = (name: SidePanel) => shownPanels.value.includes(name);
+  const over = useFileDrop((files) => void take(files.map(({ file }) => file)));
+  return (
+    <div class={`editor ${over ? "over" : ""}`} style={style}>
+      <TopBar />
+      <div class="middle">
+        {shown("outline") && <Outline />}
+        <PictureView />
+        {shown("library") && <LibraryPanel />}
+        {shown("truth") && <TruthPanel />}
+        {shown("inspector") && (
+          <aside class="side" aria-label="Inspector">
+            <Splitter />
+            <Inspector />
+          </aside>
+        )}
+      </div>
+      {filmstripOpen.value && <Filmstrip />}
+      <StatusBar />
+      {helpOpen.value && <Help />}
+    </div>
+  );
+}

@@ -1,0 +1,48 @@
+/** The keyboard map. Lies over a corner of the picture, never in its way for long: Escape or ? closes it. */
+import { useEffect, useRef } from "preact/hooks";
+import { helpOpen } from "../state/panels";
+import { IconButton } from "../ui/Button";
+import { ACTIONS, FOCUS_KEYS } from "./actions";
+
+const GROUPS = ["Picture", "Look", "Compare", "Curve", "Panels"] as const;
+
+export function Help() {
+  const panel = useRef<HTMLDivElement>(null);
+  useEffect(() => panel.current?.focus(), []);
+  return (
+    <div class="help" ref={panel} tabIndex={-1} role="dialog" aria-label="Keyboard map">
+      <header class="panel-head">
+        <h2>Keyboard</h2>
+        <IconButton icon="close" label="Close" keys="Esc" onClick={() => (helpOpen.value = false)} />
+      </header>
+      <div class="help-groups">
+        {GROUPS.map((group) => (
+          <dl key={group}>
+            <h3>{group}</h3>
+            {ACTIONS.filter((action) => action.group === group).map((action) => (
+              <div key={action.label}>
+                <dt>{action.label}</dt>
+                <dd>
+                  {action.keys.map((key) => (
+                    <kbd key={key}>{key}</kbd>
+                  ))}
+                </dd>
+              </div>
+            ))}
+          </dl>
+        ))}
+        <dl>
+          <h3>With the focus</h3>
+          {FOCUS_KEYS.map(([label, keys]) => (
+            <div key={label}>
+              <dt>{label}</dt>
+              <dd>
+                <kbd>{keys}</kbd>
+              </dd>
+            </div>
+          ))}
+        </dl>
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,34 @@
+/** Makes a link that carries the look, and copies it; where the browser forbids that, the link is there to be copied. */
+import { useEffect, useRef } from "preact/hooks";
+import { linkToCopy, share } from "../looks/share";
+import { IconButton } from "../ui/Button";
+
+export function ShareButton() {
+  const link = linkToCopy.value;
+  const field = useRef<HTMLInputElement>(null);
+  const menu = useRef<HTMLDivElement>(null);
+  const close = () => {
+    linkToCopy.value = null;
+    menu.current?.querySelector("button")?.focus();
+  };
+  const escape = (event: KeyboardEvent) => {
+    if (event.key !== "Escape" || link === null) return;
+    event.stopPropagation(); // a menu that the button is in stays
+    close();
+  };
+  useEffect(() => field.current?.select(), [link]);
+  return (
+    <div class="share-link" ref={menu} onKeyDown={escape}>
+      <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void share()} />
+      {link !== null && (
+        <div class="menu-body" role="dialog" aria-label="Link to this picture">
+          <label>
+            This browser does not let the editor copy. Copy the link yourself (Ctrl+C):
+            <input ref={field} type="text" readOnly value={link} />
+          </label>
+          <button onClick={close}>Close</button>
+        </div>
+      )}
+    </div>
+  );
+}

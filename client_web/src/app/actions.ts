@@ -1,0 +1,91 @@
+/** Everything that has a key: the keyboard and the help page read the same list. */
+import { logarithmic, tool } from "../curve/settings";
+import { edit } from "../edit/edit";
+import { markA, saveLook, swapA, toggleWipe } from "../looks/compare";
+import { exportPng } from "../looks/export";
+import { redo, undo } from "../looks/undo";
+import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
+import { toggleSolo } from "../seen/solo";
+import { falseColour, handlesOpen, showBefore, wipe } from "../state/display";
+import { look } from "../state/look";
+import { filmstripOpen, helpOpen, histogramOpen, inspectorOpen, outlineOpen } from "../state/panels";
+import { toggleSideBySide } from "../state/views";
+
+export interface Action {
+  group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";
+  label: string;
+  /** `KeyboardEvent.key`, with "Ctrl+" and "Shift+" in front where they matter. */
+  keys: string[];
+  run(): void;
+  /** For keys that act while they are held. */
+  release?(): void;
+}
+
+const THIRD = 1 / 3;
+
+function expose(stops: number): void {
+  const now = look.value?.display.exposure ?? 0;
+  edit("Exposure", "/display/exposure", Number((now + stops).toFixed(6)));
+}
+
+function moveWipe(by: number): void {
+  if (wipe.value.on) wipe.value = { on: true, at: Math.min(1, Math.max(0, wipe.value.at + by)) };
+}
+
+function togglePanels(): void {
+  const open = !(outlineOpen.value || inspectorOpen.value || filmstripOpen.value);
+  outlineOpen.value = inspectorOpen.value = filmstripOpen.value = open;
+}
+
+export const ACTIONS: readonly Action[] = [
+  { group: "Picture", label: "Zoom in", keys: ["+", "="], run: () => zoomBy(1.25) },
+  { group: "Picture", label: "Zoom out", keys: ["-"], run: () => zoomBy(1 / 1.25) },
+  { group: "Picture", label: "Fit", keys: ["f"], run: zoomFit },
+  { group: "Picture", label: "One to one", keys: ["1"], run: zoomActual },
+  { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
+  { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColour.value = !falseColour.value) },
+  { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
+  { group: "Picture", label: "Selected material or light alone", keys: ["s"], run: toggleSolo },
+  { group: "Picture", label: "Handles of lights", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
+  { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => expose(-THIRD) },
+  { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => expose(THIRD) },
+  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
+  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: redo },
+  { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
+  { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
+  { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: markA },
+  { group: "Compare", label: "Swap A and B", keys: ["x"], run: swapA },
+  { group: "Compare", label: "Wipe between A and B, the live picture", keys: ["w"], run: toggleWipe },
+  { group: "Compare", label: "Move the wipe", keys: ["[", "]"], run: () => undefined },
+  {
+    group: "Compare",
+    label: "Show A while held",
+    keys: ["c"],
+    run: () => (showBefore.value = true),
+    release: () => (showBefore.value = false),
+  },
+  { group: "Curve", label: "Points", keys: ["p"], run: () => (tool.value = "points") },
+  { group: "Curve", label: "Draw", keys: ["d"], run: () => (tool.value = "draw") },
+  { group: "Curve", label: "Scale and shift a stretch", keys: ["t"], run: () => (tool.value = "stretch") },
+  { group: "Curve", label: "Logarithmic values", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
+  { group: "Panels", label: "Only the picture", keys: ["\\"], run: togglePanels },
+  { group: "Panels", label: "These keys", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
+];
+
+/** Keys of controls that have the focus; listed, handled where they belong. */
+export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
+  ["Slider: step, large step, ends", "← →  Page  Home End"],
+  ["Slider: fine steps, type, reset", "Shift  Enter or a digit  Delete"],
+  ["Curve point: move, fine", "← → ↑ ↓  Shift"],
+  ["Curve point: pick up and put down", "Enter, click"],
+  ["Curve point: delete, reset", "Delete  R"],
+  ["Stretch: scale, shift", "↑ ↓  ← →"],
+  ["Handle of a light: move", "← → ↑ ↓"],
+  ["Handle of a light: away, near", "Shift ↑ ↓"],
+  ["Picture: pan", "← → ↑ ↓"],
+  ["One of several views: show it alone", "Enter, double-click"],
+];
+
+export function onWipeKey(key: string): void {
+  moveWipe(key === "[" ? -0.02 : 0.02);
+}

@@ -1,0 +1,54 @@
+import { render } from "preact";
+import { history } from "../edit/history";
+import { openShare } from "../looks/share";
+import { followThumbnails } from "../looks/thumbnails";
+import { openScene } from "../scene/open";
+import { followPlace } from "../scene/persistence";
+import { placeFromUrl } from "../scene/url";
+import { StartPage } from "../start/StartPage";
+import { followPanels } from "../state/panels";
+import { followRoom } from "../state/room";
+import { page } from "../state/scene";
+import { Toasts } from "../ui/toasts";
+import { Editor } from "./Editor";
+import "../ui/base.css";
+import "../ui/controls.css";
+import "../outline/outline.css";
+import "../viewport/viewport.css";
+import "../inspector/inspector.css";
+import "../looks/looks.css";
+import "../start/start.css";
+import "../start/bake.css";
+import "../curve/curve.css";
+import "../library/library.css";
+import "../lights/lights.css";
+import "../truth/truth.css";
+import "./layout.css";
+import "./bars.css";
+
+function App() {
+  return (
+    <>
+      {page.value === "editor" ? <Editor /> : <StartPage />}
+      <Toasts />
+    </>
+  );
+}
+
+function start(): void {
+  const place = placeFromUrl(location.search);
+  const shared = new URLSearchParams(location.search).get("share");
+  if (shared !== null) void openShare(shared);
+  else if (place.scene !== null) void openScene(place.scene, place);
+  followPlace();
+  followPanels();
+  followRoom();
+  followThumbnails();
+  // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
+  window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
+  for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());
+  window.addEventListener("popstate", () => location.reload());
+  render(<App />, document.getElementById("app") as HTMLElement);
+}
+
+start();

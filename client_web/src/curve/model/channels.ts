@@ -1,0 +1,64 @@
+/** A curve's edits in the look, seen per channel, and back in the shortest form. */
+import type { CurveEdits, DrawnCurve } from "../../protocol";
+
+export type ChannelName = "r" | "g" | "b";
+export const CHANNELS: readonly ChannelName[] = ["r", "g", "b"];
+/** What is drawn of one channel: `bands`, `factors` and `offsets` are its own J numbers. */
+export type Drawn = Omit<DrawnCurve, "channels">;
+/** Null where the model's parameters make the curve. */
+export type Channels = readonly [Drawn | null, Drawn | null, Drawn | null];
+export type Active = "rgb" | ChannelName;
+
+const CHANNELS_OF: Record<Active, number[]> = { rgb: [0, 1, 2], r: [0], g: [1], b: [2] };
+
+export function channelsOf(active: Active): number[] {
+  return CHANNELS_OF[active];
+}
+
+/** A channel's row of J numbers for all, 3 · J flat, or three lists of J. */
+function rowOf(rows: number[] | number[][], channel: number, numBands: number): number[] {
+  if (Array.isArray(rows[0])) return (rows as number[][])[channel] ?? [];
+  const flat = rows as number[];
+  return flat.length === 3 * numBands ? flat.slice(channel * numBands, (channel + 1) * numBands) : flat;
+}
+
+function drawnOf({ points, bands, factors, offsets, handles }: DrawnCurve, channel: number, num: number): Drawn {
+  return {
+    ...(points && { points }),
+    ...(bands && { bands: rowOf(bands, channel, num) }),
+    ...(factors && { factors: rowOf(factors, channel, num) }),
+    ...(offsets && { offsets: rowOf(offsets, channel, num) }),
+    ...(handles && { handles }),
+  };
+}
+
+export function readChannels(edits: CurveEdits | undefined, numBands: number): Channels {
+  const result: [Drawn | null, Drawn | null, Drawn | null] = [null, null, null];
+  const list = edits === undefined ? [] : Array.isArray(edits) ? edits : [edits];
+  for (const override of list) {
+    CHANNELS.forEach((name, channel) => {
+      if ((override.channels ?? "rgb").includes(name)) result[channel] = drawnOf(override, channel, numBands);
+    });
+  }
+  return result;
+}
+
+/** Channels that are drawn alike share one object; undefined where nothing is drawn. */
+export function writeChannels(channels: Channels): CurveEdits | undefined {
+  const groups = new Map<string, DrawnCurve & { channels: string }>();
+  channels.forEach((drawn, channel) => {
+    if (drawn === null) return;
+    const key = JSON.stringify(drawn);
+    const group = groups.get(key) ?? { ...drawn, channels: "" };
+    group.channels += CHANNELS[channel] as ChannelName;
+    groups.set(key, group);
+  });
+  const list = [...groups.values()];
+  return list.length === 0 ? undefined : list.length === 1 ? list[0] : list;
+}
+
+/** Whether all three channels are drawn alike (or none). */
+export function joined(channels: Channels): boolean {
+  const [r, g, b] = channels.map((drawn) => JSON.stringify(drawn));
+  return r === g && g === b;
+}

@@ -1,0 +1,121 @@
+/** From many samples to few points: the curve that people hold in their hand. */
+import { MAX_CURVE_VALUE } from "../../look.gen";
+import type { Point } from "../../protocol";
+import { xFraction, yFraction, type Axes } from "./axes";
+import { valueOn } from "./edited";
+import { pchip } from "./pchip";
+
+export const MAX_POINTS = 64;
+const TOLERANCE = 0.004;
+
+/** Six digits are more than a picture can show and keep the document readable. */
+export function tidyValue(value: number): number {
+  return Number(Math.min(MAX_CURVE_VALUE, Math.max(0, value)).toPrecision(6));
+}
+
+export function tidyPoint(degrees: number, value: number): Point {
+  return [Number(degrees.toFixed(3)), tidyValue(value)];
+}
+
+/** Few points whose monotone cubic stays within `TOLERANCE` of the plot's height of all `samples` (angles increasing).
+ * Greedy: the worst sample becomes the next point. */
+export function fitPoints(samples: readonly Point[], axes: Axes, maxPoints = 24): Point[] {
+  const first = samples[0];
+  const last = samples.at(-1);
+  if (first === undefined || last === undefined) return [];
+  if (samples.length <= 2) return samples.map(([x, y]) => tidyPoint(x, y));
+  const chosen = new Set<number>([0, samples.length - 1]);
+  while (chosen.size < Math.min(maxPoints, samples.length)) {
+    const points = [...chosen].sort((a, b) => a - b).map((i) => samples[i] as Point);
+    const curve = pchip(points);
+    let worst = TOLERANCE;
+    let at = -1;
+    samples.forEach(([x, y], i) => {
+      const error = Math.abs(yFraction(axes, y) - yFraction(axes, curve(x)));
+      if (error > worst && !chosen.has(i)) [worst, at] = [error, i];
+    });
+    if (at < 0) break;
+    chosen.add(at);
+  }
+  return [...chosen].sort((a, b) => a - b).map((i) => tidyPoint(...(samples[i] as Point)));
+}
+
+/** Band averages as samples at the bands' middles, the ends carried to 0° and 90°. */
+export function bandSamples(bands: readonly number[], maxDegrees = 90): Point[] {
+  const width = maxDegrees / bands.length;
+  const inner = bands.map((value, j): Point => [(j + 0.5) * width, value]);
+  return [[0, bands[0] ?? 0], ...inner, [maxDegrees, bands.at(-1) ?? 0]];
+}
+
+/** Band averages as samples that points may stand on: the first and the last band's at 0° and at 90°. */
+export function knotSamples(bands: readonly number[], maxDegrees = 90): Point[] {
+  const width = maxDegrees / bands.length;
+  const last = bands.length - 1;
+  return bands.map((value, j) => [j === 0 ? 0 : j === last ? maxDegrees : (j + 0.5) * width, value]);
+}
+
+/** Points at the angles of others, on the curve to the last digit: where they stand once their angles are tidy. */
+export function outlineOf(points: readonly Point[], bands: readonly number[]): Point[] {
+  return points.map(([degrees]) => {
+    const [x] = tidyPoint(degrees, 0);
+    return tidyPoint(x, valueOn(bands, x));
+  });
+}
+
+/** A freehand stroke: a height for each band it covers; the newest pass wins, smoothed in the plot. */
+export class Stroke {
+  private readonly values: Float64Array;
+  private last: Point | null = null;
+
+  constructor(
+    private readonly numBands: number,
+    private readonly axes: Axes,
+  ) {
+    // heights in the plot, so that smoothing means the same on linear and logarithmic axes
+    this.values = new Float64Array(numBands).fill(Number.NaN);
+  }
+
+  private bin(degrees: number): number {
+    return Math.min(this.numBands - 1, Math.max(0, Math.floor((degrees / 90) * this.numBands)));
+  }
+
+  add(degrees: number, height: number): void {
+    const [fromX, fromY] = this.last ?? [degrees, height];
+    const [a, b] = [this.bin(fromX), this.bin(degrees)];
+    const step = a <= b ? 1 : -1;
+    for (let j = a; j !== b + step; j += step) {
+      this.values[j] = a === b ? height : fromY + ((height - fromY) * (j - a)) / (b - a);
+    }
+    this.last = [degrees, height];
+  }
+
+  /** First and last band that was drawn. */
+  range(): [first: number, last: number] | null {
+    const a = this.values.findIndex((v) => !Number.isNaN(v));
+    const b = this.values.findLastIndex((v) => !Number.isNaN(v));
+    return a < 0 ? null : [a, b];
+  }
+
+  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay where the hand
+   * put them. */
+  heights(passes = 6): number[] {
+    const range = this.range();
+    if (range === null) return [];
+    let heights = Array.from(this.values.subarray(range[0], range[1] + 1));
+    for (let pass = 0; pass < passes; pass++) {
+      heights = heights.map((v, i) => {
+        const [before, after] = [heights[i - 1], heights[i + 1]];
+        return before === undefined || after === undefined ? v : 0.25 * before + 0.5 * v + 0.25 * after;
+      });
+    }
+    return heights;
+  }
+
+  /** Share of the plot's width that it takes, for deciding how many points it deserves. */
+  share(): number {
+    const [first, last] = this.range() ?? [0, 0];
+    return (
+      xFraction(this.axes, (90 * (last + 1)) / this.numBands) - xFraction(this.axes, (90 * first) / this.numBands)
+    );
+  }
+}

@@ -1,0 +1,46 @@
+/** The one way to change the look: an undoable step, and its patch to the server. */
+import { changeAt, changeTo, type Change } from "../document/change";
+import type { Look } from "../protocol";
+import { look } from "../state/look";
+import { models } from "../state/scene";
+import { hand, heldAt } from "./hand";
+import { history } from "./history";
+import { stepName } from "./step";
+
+type Listener = (change: Change, inputTime: number) => void;
+let listener: Listener = () => undefined;
+
+/** Who takes changes of the look to the server. */
+export function onChange(take: Listener): void {
+  listener = take;
+}
+
+/** When the hand moved, on the clock of performance.now; inside an event handler the event's own time. */
+function inputNow(): number {
+  const event = window.event;
+  return event !== undefined && event.timeStamp > 0 ? event.timeStamp : performance.now();
+}
+
+/** Make a change without a step of the history, by a hand that is on `held`. */
+export function show(change: Change, held: string | null = null): void {
+  hand.value = held;
+  look.value = change.after;
+  listener(change, inputNow());
+}
+
+function commit(label: string, change: Change, key?: string): void {
+  if (change.patch.length === 0) return;
+  show(change, key === undefined ? null : heldAt(key, change.after));
+  history.record({ of: "look", label, ...(key === undefined ? {} : { key }), ...change });
+}
+
+/** Put another look in the place of the one that is edited, as one step. */
+export function replaceLook(label: string, next: Look): void {
+  if (look.value !== null) commit(label, changeTo(look.value, next));
+}
+
+/** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */
+export function edit(deed: string, path: string, value: unknown): void {
+  if (look.value === null) return;
+  commit(stepName(path, deed, look.value, models.value), changeAt(look.value, path, value), path);
+}

@@ -1,0 +1,43 @@
+/** Whether what is on the screens is the look's picture, and how near it is. */
+import { stage } from "../picture/stage";
+import type { FrameHeader } from "../protocol";
+import { exact, fidelity, worst } from "../state/fidelity";
+import { connections, type BakeConnection } from "./connections";
+
+const waiters: (() => void)[] = [];
+
+function sayFidelity(): void {
+  fidelity.value = worst(stage.shown.filter((each) => each.isThere).map((each) => each.fidelity));
+}
+
+/** What is shown of these views is not what the server has. */
+export function nothingIsExact(shown: string[]): void {
+  for (const picture of shown.map((view) => stage.of(view))) {
+    picture.exactRevision = -1;
+    picture.fidelity = "approximate";
+  }
+  exact.value = false;
+  sayFidelity();
+}
+
+/** A frame is on the screen. */
+export function noteShown(of: BakeConnection, header: FrameHeader): void {
+  const picture = stage.of(header.view);
+  picture.exactRevision = header.exact ? header.revision : -1;
+  picture.fidelity = header.fidelity;
+  exact.value = stage.shown.every((each) => each.exactRevision >= of.session.revision);
+  sayFidelity();
+  if (exact.value) for (const done of waiters.splice(0)) done();
+}
+
+/** Resolves when the picture is exact for everything that was sent. */
+export function whenExact(): Promise<void> {
+  if (exact.peek()) return Promise.resolve();
+  return new Promise((done) => waiters.push(done));
+}
+
+/** Whether the active view has a picture of the newest look, be it a first one. */
+export function isDrawn(): boolean {
+  const session = connections.shown?.session;
+  return session !== undefined && !session.pending && stage.active.revision >= session.revision;
+}

@@ -1,0 +1,102 @@
+/** What each message of a server does to what the editor knows. */
+import { history } from "../edit/history";
+import { problemText } from "../net/api";
+import type { SessionHandlers } from "../net/session";
+import type { HelloMessage, Look } from "../protocol";
+import { wholeOf } from "../seen/paths";
+import { coming } from "../state/bakes";
+import { connection, freezing, retryInMs } from "../state/connection";
+import { showShape } from "../state/curveShape";
+import { exact } from "../state/fidelity";
+import { editSent } from "../state/latency";
+import { defaultLook, look } from "../state/look";
+import { probe } from "../state/probe";
+import { curvePath } from "../state/selection";
+import { focusedView } from "../state/views";
+import { showError } from "../ui/toasts";
+import { connections, type BakeConnection } from "./connections";
+import { answered } from "./probing";
+import { showBake, takeFrame } from "./swap";
+import { shownOf, tellViews } from "./tellViews";
+import { want } from "./want";
+
+let onBakeReady: (bake: string) => void = () => undefined;
+
+/** Who is told that a bake of the scene is ready. */
+export function whenBakeIsReady(take: typeof onBakeReady): void {
+  onBakeReady = take;
+}
+
+/** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. */
+function takeUp(own: Look): Look {
+  defaultLook.value ??= own;
+  const kept = look.peek();
+  if (kept !== null && Object.keys(own).every((section) => section in kept)) return kept;
+  return (look.value = { ...own, ...kept });
+}
+
+/** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
+function welcome(of: BakeConnection, hello: HelloMessage): void {
+  want(of, takeUp(hello.look as unknown as Look), performance.now());
+  of.greeted(hello);
+  tellViews(of, shownOf(hello), focusedView.peek());
+  if (of === connections.shown) {
+    freezing.value = null;
+    showBake(of);
+  }
+  of.session.send({ type: "stream", format: "auto", quality: 80 });
+  const curve = curvePath.peek();
+  if (curve !== null) of.session.send({ type: "touch", curve });
+}
+
+/** The server has refused the edit that was made last: what it took before is shown again. */
+function takeBack(of: BakeConnection, lastGood: Look | null): void {
+  history.drop();
+  if (lastGood === null) return;
+  look.value = wholeOf(lastGood);
+  want(of, look.value, performance.now());
+}
+
+export function handlersOf(self: BakeConnection): SessionHandlers {
+  const isShown = () => self === connections.shown;
+  return {
+    connection(state, retryIn) {
+      if (!isShown()) return;
+      connection.value = state;
+      retryInMs.value = retryIn;
+    },
+    hello: (message) => welcome(self, message),
+    frame: (frame) => takeFrame(self, frame),
+    status({ state, view, what, progress }) {
+      if (isShown()) freezing.value = state === "ready" ? null : { state, view, what, progress };
+    },
+    problem({ problem, revision }, lastGood) {
+      showError(`${problemText(problem)} The look is as it was before.`);
+      if (isShown() && revision !== null) takeBack(self, lastGood);
+    },
+    probe(message) {
+      answered(message);
+      const at = probe.peek();
+      if (isShown() && at?.view === message.view) probe.value = { ...at, answer: message };
+    },
+    curve(message) {
+      if (isShown() && message.curve === curvePath.peek()) showShape(message);
+    },
+    bake({ bake: id, state, progress, phase, seconds_left }) {
+      if (state === "ready") onBakeReady(id);
+      else coming.value = { id, state: state as "running", progress, phase, seconds_left, problem: null };
+    },
+    sent(revision, inputTime) {
+      if (!isShown()) return;
+      exact.value = false;
+      editSent(revision, inputTime);
+    },
+    ended(reason) {
+      if (self === connections.incoming) connections.incoming = null;
+      if (coming.peek()?.id === self.bake) coming.value = null;
+      showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
+    },
+    broken: (text) =>
+      showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),
+  };
+}

@@ -1,0 +1,162 @@
+// Written by `python -m server.typescript` from the server's models. Do not edit.
+
+
+/** What the eye sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing. */
+export interface BackgroundLook {
+  kind: "map" | "blurred" | "color" | "transparent";
+  color: [number, number, number];
+  blur: number;
+}
+
+/** Light from infinitely far that travels along `direction`; emission is irradiance across it, W/m². */
+export interface DirectionalLook {
+  scale: number;
+  color: [number, number, number];
+  on: boolean;
+  emission: [number, number, number];
+  kind: "directional";
+  direction: [number, number, number];
+}
+
+/** How radiance becomes a picture: `exposure` in stops, then the tone map. */
+export interface DisplayLook {
+  exposure: number;
+  tone_map: "agx" | "filmic" | "none";
+}
+
+/** A curve drawn by hand: `points`, [degrees, value], or `bands`, J values or three times J; or a change to one of them or to what the parameters give: `factors` and `offsets` of bands, `handles`, [degrees, was, becomes]. */
+export interface DrawnCurve {
+  points?: [number, number][];
+  bands?: number[] | number[][];
+  factors?: number[] | number[][];
+  offsets?: number[] | number[][];
+  handles?: [number, number, number][];
+  channels?: string;
+}
+
+/** The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.environments`; None: the scene's own. */
+export interface EnvironmentLook {
+  map: string | null;
+  scale: number;
+  color: [number, number, number];
+  rotation: number;
+}
+
+/** A complete, valid look; made by `relume.look.validate`. */
+export interface Look {
+  materials: Record<string, MaterialLook>;
+  environment: EnvironmentLook;
+  background: BackgroundLook;
+  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;
+  transport: TransportLook;
+  display: DisplayLook;
+}
+
+/** A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is reflected onto it. */
+export interface MaterialLook {
+  terms: TermLook[];
+  catcher?: boolean;
+}
+
+/** All surfaces of a material shine, and are seen to; emission is radiance. */
+export interface MeshLook {
+  scale: number;
+  color: [number, number, number];
+  on: boolean;
+  emission: [number, number, number];
+  kind: "mesh";
+  material: string;
+}
+
+/** Shines alike in all directions; emission is radiant intensity, W/sr. */
+export interface PointLook {
+  scale: number;
+  color: [number, number, number];
+  on: boolean;
+  emission: [number, number, number];
+  kind: "point";
+  position: [number, number, number];
+}
+
+/** Shines to the side that `direction` points to; emission is radiance. The camera does not see it. `rotation` turns it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or +Z where `direction` is vertical. `size`: width and height, metres. */
+export interface RectangleLook {
+  scale: number;
+  color: [number, number, number];
+  on: boolean;
+  emission: [number, number, number];
+  kind: "rectangle";
+  position: [number, number, number];
+  direction: [number, number, number];
+  rotation: number;
+  size: [number, number];
+}
+
+/** A point that shines into a cone of half-angles inner and outer, degrees; emission is W/sr along the axis. */
+export interface SpotLook {
+  scale: number;
+  color: [number, number, number];
+  on: boolean;
+  emission: [number, number, number];
+  kind: "spot";
+  position: [number, number, number];
+  direction: [number, number, number];
+  cone: [number, number];
+}
+
+/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. */
+export interface TermLook {
+  model: string;
+  data?: string;
+  color: [number, number, number];
+  texture: "diffuse" | "specular" | null;
+  params: Record<string, number | [number, number, number]>;
+  curves: Record<string, DrawnCurve | DrawnCurve[]>;
+}
+
+/** Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any, those with one, or those with more. */
+export interface TransportLook {
+  show: "all" | "direct" | "first_bounce" | "further_bounces";
+  bounces: number;
+}
+
+export type LightLook =
+  | PointLook
+  | SpotLook
+  | DirectionalLook
+  | RectangleLook
+  | MeshLook;
+
+type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };
+
+/** A light of each kind, complete. */
+export const DEFAULT_LIGHTS: LightsByKind = {
+  point: { kind: "point", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0] },
+  spot: { kind: "spot", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
+  directional: { kind: "directional", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], direction: [0, -1, 0] },
+  rectangle: { kind: "rectangle", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
+  mesh: { kind: "mesh", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], material: "" },
+};
+
+export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {
+  environment: { map: null, scale: 1, color: [1, 1, 1], rotation: 0 },
+  background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
+  transport: { show: "all", bounces: 24 },
+  display: { exposure: 0, tone_map: "agx" },
+};
+
+/** What numbers may be, each of those of a field. */
+export const RANGES = {
+  environment: { scale: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, rotation: { minimum: -360, maximum: 360 } },
+  background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },
+  transport: { bounces: { minimum: 0, maximum: 24 } },
+  display: { exposure: { minimum: -20, maximum: 20 } },
+  light: { scale: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000 }, position: { minimum: -1000000, maximum: 1000000 }, direction: { minimum: -1000000, maximum: 1000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 0.0001, maximum: 10000 }, cone: { minimum: 0, maximum: 90 } },
+  term: { color: { minimum: 0, maximum: 10000 } },
+} as const;
+
+export const MAX_TERMS = 16;
+export const MAX_LIGHTS = 64;
+export const MAX_LIGHT_NAME = 80;
+export const MAX_CURVE_POINTS = 4096;
+export const MAX_CURVE_VALUE = 1000000;
+export const MAX_OPERATIONS = 256;

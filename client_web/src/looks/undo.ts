@@ -1,0 +1,24 @@
+/** Undo and redo for buttons and keys: what cannot be undone now is said, and stays to be undone later. */
+import { changeTo, type Change } from "../document/change";
+import { show } from "../edit/edit";
+import { history, type LookStep, type Step } from "../edit/history";
+import { look } from "../state/look";
+import { attempt } from "../ui/toasts";
+import { exchange } from "./shelf";
+
+function reversed({ before, after, patch, inverse }: LookStep): Change {
+  return { before: after, after: before, patch: inverse, inverse: patch };
+}
+
+/** Make a change of the look that is there: where that is not what the change begins with, because the server refused
+ * an edit in between, the way to its end is another. */
+function perform(step: Step, back: boolean): void | Promise<void> {
+  if (step.of === "shelf") return back ? exchange(step.after, step.before) : exchange(step.before, step.after);
+  const change = back ? reversed(step) : step;
+  const current = look.peek();
+  show(current === null || current === change.before ? change : changeTo(current, change.after));
+}
+
+export const goTo = (count: number) => void attempt(() => history.goTo(count, perform));
+export const undo = () => goTo(history.heading - 1);
+export const redo = () => goTo(history.heading + 1);

@@ -1,0 +1,130 @@
+/** Edits on their way to the server: only the newest look counts, each message has its revision. What an edit changed is
+ * known from where it was made; looks are compared only where no edit leads from what the server holds. */
+import { changeBy, type Change } from "../document/change";
+import { differenceOf } from "../document/difference";
+import { escapeToken } from "../document/pointer";
+import { MAX_OPERATIONS } from "../look.gen";
+import { MAX_MESSAGE_BYTES, type Look, type PatchOp } from "../protocol";
+
+/** A little room is left for the message around the patch. */
+export const MAX_PATCH_BYTES = MAX_MESSAGE_BYTES - 1024;
+
+/** What the user wants to see. */
+export interface Wanted {
+  look: Look;
+  /** What the hand is on. */
+  hand: string | null;
+  /** Sources of light that alone are shown; null: all. */
+  solo: readonly string[] | null;
+  /** When the hand moved (performance.now clock). */
+  inputTime: number;
+}
+
+export interface Edit extends Omit<Wanted, "look"> {
+  revision: number;
+  patch: readonly PatchOp[];
+}
+
+function messageBytes(patch: readonly PatchOp[]): number {
+  return new TextEncoder().encode(JSON.stringify(patch)).length;
+}
+
+function chunked(patch: readonly PatchOp[]): PatchOp[][] {
+  const parts: PatchOp[][] = [patch.slice(0, MAX_OPERATIONS)];
+  for (let i = MAX_OPERATIONS; i < patch.length; i += MAX_OPERATIONS) parts.push(patch.slice(i, i + MAX_OPERATIONS));
+  return parts;
+}
+
+/** Split a patch that is too long for one message: the whole look goes material by material. */
+function splitPatch(patch: readonly PatchOp[]): PatchOp[][] {
+  if (messageBytes(patch) <= MAX_PATCH_BYTES) return chunked(patch);
+  return patch.flatMap((operation) => {
+    if (operation.path !== "") return [[operation]];
+    const look = operation.value as Look;
+    const { materials, ...rest } = look;
+    return [
+      ...Object.entries(rest).map(([key, value]) => [{ op: "replace" as const, path: `/${key}`, value }]),
+      ...Object.entries(materials).map(([name, value]) => [
+        { op: "replace" as const, path: `/materials/${escapeToken(name)}`, value },
+      ]),
+    ];
+  });
+}
+
+/** The whole look where nothing is known of the server's. */
+function differenceTo(wanted: Look, sent: Look | null): PatchOp[] {
+  return sent === null ? [{ op: "replace", path: "", value: wanted }] : differenceOf(sent, wanted);
+}
+
+export class EditQueue {
+  private sent: Look | null = null;
+  private sentSolo: readonly string[] | null = null;
+  private wanted: Wanted | null = null;
+  /** From `sent` to the wanted look; null where no edits lead there. */
+  private way: readonly PatchOp[] | null = null;
+  private outstanding: { revision: number; look: Look }[] = [];
+  /** The newest look that the server has shown a frame of. */
+  private confirmed: Look | null = null;
+  revision = 0;
+
+  /** Start afresh: the server holds `look` at `revision` (null: unknown, so the next edit is the whole look), and shows
+   * these sources of light. */
+  reset(look: Look | null, revision = 0, solo: readonly string[] | null = null): void {
+    this.sent = look;
+    this.sentSolo = solo;
+    this.way = null;
+    this.confirmed = look;
+    this.revision = Math.max(this.revision, revision);
+    this.outstanding = [];
+  }
+
+  /** The user wants this now; `change` is the edit that made the look, where one did. */
+  want(wanted: Wanted, change: Change | null = null): void {
+    this.way = wanted.look === this.sent ? [] : this.extended(change);
+    this.wanted = wanted;
+  }
+
+  /** The way to what was wanted last, and on by a change. */
+  private extended(change: Change | null): readonly PatchOp[] | null {
+    if (this.sent === null || this.way === null || change === null || change.before !== this.wanted?.look) return null;
+    return this.way.length === 0 ? change.patch : changeBy(this.sent, [...this.way, ...change.patch]).patch;
+  }
+
+  get pending(): boolean {
+    return this.wanted !== null && (this.wanted.look !== this.sent || !this.isSoloSent(this.wanted));
+  }
+
+  private isSoloSent({ solo }: Wanted): boolean {
+    return JSON.stringify(solo) === JSON.stringify(this.sentSolo);
+  }
+
+  /** The messages that bring the server to the wanted look; empty where it is there already. */
+  take(): Edit[] {
+    if (this.wanted === null || !this.pending) return [];
+    const { look, hand, solo, inputTime } = this.wanted;
+    const patch = this.way ?? differenceTo(look, this.sent);
+    this.sent = look;
+    this.way = [];
+    if (patch.length === 0 && this.isSoloSent(this.wanted)) return [];
+    this.sentSolo = solo;
+    return splitPatch(patch).map((part) => {
+      this.revision += 1;
+      this.outstanding.push({ revision: this.revision, look });
+      return { revision: this.revision, patch: part, hand, solo, inputTime };
+    });
+  }
+
+  /** A frame of this revision has come: everything up to it was accepted. */
+  confirm(revision: number): void {
+    while (this.outstanding[0] && this.outstanding[0].revision <= revision) {
+      this.confirmed = (this.outstanding.shift() as { look: Look }).look;
+    }
+  }
+
+  /** The server refused a revision: what it holds is no longer known; returns the last look it accepted. */
+  refuse(revision: number): Look | null {
+    this.outstanding = this.outstanding.filter((entry) => entry.revision !== revision);
+    this.sent = this.way = null;
+    return this.confirmed;
+  }
+}

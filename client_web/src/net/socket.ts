@@ -1,0 +1,96 @@
+/** The transport of a live session: a WebSocket that connects again by itself, with the token that finds its look. */
+import { SUBPROTOCOL, type ClientMessage } from "../protocol";
+import { backoffMs } from "./backoff";
+
+/** Another version of the protocol, no such bake, not ready, damaged: trying again gives the same. */
+const FINAL_CODES = new Set([1002, 4404, 4409, 4410]);
+/** A token that was refused so often is not tried for ever. */
+const MAX_RESUMES = 3;
+
+export type Connection = "connecting" | "open" | "reconnecting" | "closed";
+
+export interface SocketHandlers {
+  connection(state: Connection, retryInMs: number): void;
+  received(data: string | ArrayBuffer): void;
+  /** The server will not have this session again; no use in trying. */
+  ended(reason: string): void;
+}
+
+export class LiveSocket {
+  private socket: WebSocket | null = null;
+  private attempt = 0;
+  private retry = 0;
+  private greeted = false;
+  private closed = false;
+  /** Names this session to the server, so that a lost connection finds its look again. */
+  private resume: string | null = null;
+
+  constructor(
+    readonly bake: string,
+    private readonly handlers: SocketHandlers,
+  ) {}
+
+  connect(): void {
+    this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
+    const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
+    url.protocol = url.protocol.replace("http", "ws");
+    if (this.resume !== null) url.searchParams.set("resume", this.resume);
+    const socket = new WebSocket(url, SUBPROTOCOL);
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.handlers.received(event.data);
+    socket.onclose = (event) => this.lost(socket, event);
+    this.socket = socket;
+  }
+
+  /** The server has said hello: messages may go, and `resume` names the session from now on. */
+  greet(resume: string): void {
+    this.attempt = 0;
+    this.greeted = true;
+    this.resume = resume;
+  }
+
+  private lost(socket: WebSocket, event: CloseEvent): void {
+    if (this.closed || socket !== this.socket) return;
+    this.greeted = false;
+    if (FINAL_CODES.has(event.code)) {
+      this.close();
+      this.handlers.ended(event.reason || `code ${event.code}`);
+      return;
+    }
+    const wait = backoffMs(this.attempt++);
+    if (this.attempt > MAX_RESUMES) this.resume = null;
+    this.handlers.connection("reconnecting", wait);
+    this.retry = window.setTimeout(() => this.connect(), wait);
+  }
+
+  /** Try at once instead of waiting for the backoff. */
+  reconnectNow(): void {
+    if (this.greeted || this.closed) return;
+    clearTimeout(this.retry);
+    this.connect();
+  }
+
+  get isOpen(): boolean {
+    return this.greeted && this.socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Bytes that wait in the browser. */
+  get bufferedBytes(): number {
+    return this.socket?.bufferedAmount ?? 0;
+  }
+
+  /** Whether the message went. */
+  send(message: ClientMessage): boolean {
+    if (!this.isOpen) return false;
+    this.socket?.send(JSON.stringify(message));
+    return true;
+  }
+
+  close(): void {
+    this.closed = true;
+    this.greeted = false;
+    clearTimeout(this.retry);
+    this.socket?.close(1000);
+    this.handlers.connection("closed", 0);
+  }
+}

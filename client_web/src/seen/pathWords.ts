@@ -1,0 +1,36 @@
+/** Which light paths the picture shows, in words. */
+import { RANGES } from "../look.gen";
+import type { Transport } from "../protocol";
+import type { Choice } from "../ui/RadioRow";
+
+interface PathWords extends Choice<Transport["show"]> {
+  /** Of a picture that shows nothing else; null where it shows all. */
+  only: string | null;
+}
+
+const MAX_BOUNCES = RANGES.transport.bounces.maximum;
+
+export const PATHS: readonly PathWords[] = [
+  { value: "all", label: "All", title: "All light", only: null },
+  { value: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
+  {
+    value: "first_bounce",
+    label: "First bounce",
+    title: "Light that one surface has passed on",
+    only: "the first bounce",
+  },
+  {
+    value: "further_bounces",
+    label: "Rest",
+    title: "Light that two surfaces or more have passed on",
+    only: "light after the first bounce",
+  },
+];
+
+/** What is missing in the picture, in words; null where nothing is. */
+export function limitWords({ show, bounces }: Transport): string | null {
+  const only = PATHS.find((path) => path.value === show)?.only ?? null;
+  if (only !== null) return `Only ${only}`;
+  if (bounces >= MAX_BOUNCES) return null;
+  return bounces === 0 ? "Only direct light" : `At most ${bounces} ${bounces === 1 ? "bounce" : "bounces"}`;
+}

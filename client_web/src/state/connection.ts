@@ -1,0 +1,13 @@
+/** How the live session is doing. */
+import { signal } from "@preact/signals";
+import type { Connection } from "../net/socket";
+
+export const connection = signal<Connection>("connecting");
+export const retryInMs = signal(0);
+/** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
+export const freezing = signal<{
+  state: "freezing" | "shading";
+  view: string;
+  what: string;
+  progress: number;
+} | null>(null);

@@ -1,0 +1,12 @@
+/** The page that is open, the scene that is edited, and the models that its terms may have. */
+import { computed, signal } from "@preact/signals";
+import type { ModelBody, SceneBody, Term } from "../protocol";
+
+export const page = signal<"start" | "editor">("start");
+export const models = signal<ModelBody[]>([]);
+export const scene = signal<SceneBody | null>(null);
+export const materialNames = computed(() => scene.value?.materials.map((m) => m.name) ?? []);
+
+export function modelOf(term: Term): ModelBody | undefined {
+  return models.value.find((model) => model.model === term.model);
+}

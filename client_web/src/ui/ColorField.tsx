@@ -1,0 +1,50 @@
+/** A term's colour: a picker, and the three linear numbers. */
+import { fromHex, toHex } from "../color/color";
+import { RANGES } from "../look.gen";
+import type { Rgb } from "../protocol";
+import { IconButton } from "./Button";
+import { NumberField } from "./NumberField";
+
+export interface ColorProps {
+  label: string;
+  value: Rgb;
+  initial: Rgb | null;
+  /** The picker chooses the hue of a quantity, whose size it keeps; else a share of what there is. */
+  quantity?: boolean;
+  onChange(value: Rgb): void;
+}
+
+const CHANNELS = ["red", "green", "blue"] as const;
+
+export function ColorField({ label, value, initial, quantity = false, onChange }: ColorProps) {
+  const least = quantity ? 0 : 1;
+  const changed = initial !== null && value.some((v, i) => v !== initial[i]);
+  return (
+    <div class="color">
+      <input
+        type="color"
+        aria-label={`${label}: pick`}
+        title="Pick a colour"
+        value={toHex(value, least)}
+        onInput={(event) => onChange(fromHex(event.currentTarget.value, value, least))}
+      />
+      {CHANNELS.map((name, channel) => (
+        <label key={name} class={`channel ${name}`}>
+          <NumberField
+            label={`${label}, ${name}, linear`}
+            value={value[channel] as number}
+            {...RANGES.term.color}
+            step={0.01}
+            onChange={(next) => onChange(value.map((v, i) => (i === channel ? next : v)) as Rgb)}
+          />
+        </label>
+      ))}
+      <IconButton
+        icon="reset"
+        label={`Reset ${label}`}
+        disabled={!changed}
+        onClick={() => initial && onChange(initial)}
+      />
+    </div>
+  );
+}

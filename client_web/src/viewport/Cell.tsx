@@ -1,0 +1,167 @@
+/** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
+import { useEffect, useRef, useState } from "preact/hooks";
+import { acceptMaterials } from "../library/drop";
+import { LightHandles } from "../lights/LightHandles";
+import { placeAt, placing } from "../lights/placing";
+import { hitAt } from "../picture/hit";
+import { Screen } from "../picture/screen";
+import { stage } from "../picture/stage";
+import { pan, zoomAt } from "../picture/transform";
+import { moveTo, transformOf } from "../picture/viewTransforms";
+import { wipe } from "../state/display";
+import { scene } from "../state/scene";
+import { hoveredMaterial, select } from "../state/selection";
+import { pointedView, showAlone, sideBySide, viewName, workIn } from "../state/views";
+import { useDrag } from "../ui/drag";
+import { showError } from "../ui/toasts";
+import { Waiting } from "./Waiting";
+import { WipeHandle } from "./WipeHandle";
+import { leavePicture, probeAt } from "./probe";
+
+const CLICK_PX = 4;
+const PAN_PX = 48;
+
+function panBy(screen: Screen, dx: number, dy: number): void {
+  const { view } = screen.picture;
+  moveTo(view, pan(transformOf(view), screen.size(), dx, dy));
+}
+
+function onWheel(screen: Screen, event: WheelEvent): void {
+  event.preventDefault();
+  const { view } = screen.picture;
+  const { x, y } = hitAt(screen, event);
+  const lines = event.deltaMode === 1 ? 30 : 1;
+  const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
+  moveTo(view, zoomAt(transformOf(view), screen.size(), factor, x, y));
+}
+
+/** Keep the screen as large as its canvas, and take what is not the framework's to hear; returns how to stop. */
+function connect(screen: Screen): () => void {
+  const { canvas } = screen;
+  const fit = () => {
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    screen.resize(canvas.clientWidth, canvas.clientHeight);
+  };
+  const observer = new ResizeObserver(fit);
+  const wheel = (event: WheelEvent) => onWheel(screen, event);
+  const refuse = acceptMaterials(screen);
+  fit();
+  observer.observe(canvas);
+  // Preact's own wheel listeners are passive, and the page must not scroll
+  canvas.addEventListener("wheel", wheel, { passive: false });
+  return () => {
+    observer.disconnect();
+    canvas.removeEventListener("wheel", wheel);
+    refuse();
+    screen.close();
+  };
+}
+
+/** The screen of a canvas, once there is one; it shows the picture of `view`. */
+function useScreen(view: string) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [screen, setScreen] = useState<Screen | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  useEffect(() => {
+    try {
+      const made = new Screen(canvas.current as HTMLCanvasElement, stage.of(view));
+      setScreen(made);
+      return connect(made);
+    } catch (error) {
+      setFailure((error as Error).message);
+      showError(error);
+      return undefined;
+    }
+  }, []);
+  const picture = stage.of(view);
+  useEffect(() => {
+    if (screen !== null && screen.picture !== picture) screen.take(picture);
+  }, [screen, picture]);
+  return { canvas, screen, failure };
+}
+
+function usePointer(screen: Screen | null, view: string) {
+  const drag = useRef({ x: 0, y: 0, moved: false });
+  const begin = (event: PointerEvent) => {
+    drag.current = { x: event.clientX, y: event.clientY, moved: false };
+    return event.button <= 1;
+  };
+  const move = (event: PointerEvent) => {
+    if (screen === null) return;
+    pointedView.value = view;
+    const { x, y, moved } = drag.current;
+    const [dx, dy] = [event.clientX - x, event.clientY - y];
+    if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
+    drag.current = { x: event.clientX, y: event.clientY, moved: true };
+    panBy(screen, dx, dy);
+  };
+  const hover = (event: PointerEvent) => {
+    if (screen === null) return;
+    pointedView.value = view; // not when it enters: the view under a resting pointer may become another
+    const { px, py, material } = hitAt(screen, event);
+    probeAt(screen.picture, px, py);
+    hoveredMaterial.value = material;
+  };
+  const end = (event: PointerEvent, released: boolean) => {
+    if (screen === null || !released || drag.current.moved || event.button !== 0) return;
+    const { px, py, material } = hitAt(screen, event);
+    if (placing.peek() !== null) void placeAt(view, px, py);
+    else if (material !== null) select(material);
+  };
+  const leave = () => {
+    pointedView.value = hoveredMaterial.value = null;
+    leavePicture();
+  };
+  return { ...useDrag({ begin, move, hover, end }), onPointerLeave: leave };
+}
+
+function onKey(screen: Screen, event: KeyboardEvent): void {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (step !== undefined) panBy(screen, (step[0] as number) * PAN_PX, (step[1] as number) * PAN_PX);
+  else if (event.key === "Enter" && sideBySide.value) showAlone(screen.picture.view);
+  else return;
+  event.preventDefault();
+}
+
+/** The view's name, which also says where the hand works; a press shows the view alone. */
+function Name({ view }: { view: string }) {
+  return (
+    <button
+      class="cell-name"
+      title={`Show “${view}” alone (double-click in the picture, or Enter)`}
+      onClick={() => showAlone(view)}
+    >
+      {view}
+    </button>
+  );
+}
+
+export function Cell({ view }: { view: string }) {
+  scene.value; // another scene has other pictures, also under the same name
+  const { canvas, screen, failure } = useScreen(view);
+  const pointer = usePointer(screen, view);
+  const beside = sideBySide.value;
+  const label = beside ? `The view ${view}. Enter shows it alone.` : "The picture.";
+  return (
+    <div class={`cell ${beside && view === viewName.value ? "active" : ""}`}>
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        role="img"
+        aria-label={`${label} Arrow keys pan, plus and minus zoom; choose materials in the list.`}
+        onKeyDown={(event) => screen !== null && onKey(screen, event)}
+        onFocus={() => workIn(view)}
+        onDblClick={() => beside && showAlone(view)}
+        {...pointer}
+      />
+      {failure !== null && <p class="failure">{failure}</p>}
+      {screen !== null && <LightHandles screen={screen} />}
+      {wipe.value.on && screen !== null && <WipeHandle screen={screen} />}
+      <Waiting picture={stage.of(view)} />
+      {beside && <Name view={view} />}
+    </div>
+  );
+}

@@ -1,0 +1,50 @@
+/** How near the picture is to its look, in the picture's corner: said where it is not exact for longer than a blink, so
+ * that nothing flickers while a hand drags. */
+import { computed, effect, signal } from "@preact/signals";
+import type { Fidelity } from "../protocol";
+import { fidelity, settled } from "../state/fidelity";
+import { bakedLight } from "../state/look";
+
+export interface Mark {
+  words: string;
+  title: string;
+}
+
+const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
+  preview: { words: "Preview", title: "A few points are shaded, the others guessed from them. All are shaded next." },
+  approximate: { words: "Catching up", title: "The picture is of a moment ago; what the new one needs is being made." },
+  followed: { words: "Light followed closely", title: "Changed light is followed; at rest all of it is shaded anew." },
+  near: { words: "Nearly exact", title: "The slider is followed closely; at rest the material is shaded anew." },
+};
+const OTHER_LIGHT: Mark = {
+  words: "Baked for other light",
+  title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
+};
+
+const SHOWN_AFTER_MS = 300;
+const rough = signal<Exclude<Fidelity, "exact"> | null>(null);
+
+function say(): void {
+  const now = fidelity.peek();
+  if (now !== "exact") rough.value = now;
+}
+
+const isRough = computed(() => fidelity.value !== "exact");
+effect(() => {
+  if (settled.value) rough.value = null;
+});
+effect(() => {
+  const timer = isRough.value ? setTimeout(say, SHOWN_AFTER_MS) : undefined;
+  return () => clearTimeout(timer);
+});
+// a word that is there changes when another one has held
+effect(() => {
+  const timer = fidelity.value !== rough.peek() && rough.peek() !== null ? setTimeout(say, SHOWN_AFTER_MS) : undefined;
+  return () => clearTimeout(timer);
+});
+
+/** What is said now: of the picture, and of what its bake cannot know. */
+export function marks(): Mark[] {
+  const ofPicture = rough.value === null ? [] : [MARKS[rough.value]];
+  return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
+}

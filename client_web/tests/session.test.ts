@@ -1,0 +1,192 @@
+/** A session over a socket that is made here: hello, edits, acknowledgements, losing the connection and finding it again. */
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { changeAt } from "../src/document/change";
+import { Session, type SessionHandlers } from "../src/net/session";
+import type { ClientMessage, Look } from "../src/protocol";
+import { LOOK, lookWith } from "./look";
+
+const SIGMA = "/materials/Teapot/terms/1/params/sigma";
+
+class FakeSocket {
+  static readonly OPEN = 1;
+  static opened: FakeSocket[] = [];
+  readyState = FakeSocket.OPEN;
+  bufferedAmount = 0;
+  sent: ClientMessage[] = [];
+  onmessage: (event: { data: string | ArrayBuffer }) => void = () => undefined;
+  onclose: (event: { code: number; reason: string }) => void = () => undefined;
+
+  constructor(readonly url: URL) {
+    FakeSocket.opened.push(this);
+  }
+
+  send(text: string): void {
+    this.sent.push(JSON.parse(text) as ClientMessage);
+  }
+
+  close(): void {
+    this.readyState = 3;
+  }
+
+  /** The server says something. */
+  says(message: object): void {
+    this.onmessage({ data: JSON.stringify(message) });
+  }
+
+  hello(look: Look, revision: number, resume = "token"): void {
+    this.says({ type: "hello", look, revision, resume, solo: null });
+  }
+
+  get edits() {
+    return this.sent.filter((message) => message.type === "edit");
+  }
+}
+
+const handlers = {
+  connection: vi.fn(),
+  hello: vi.fn(),
+  frame: vi.fn(() => Promise.resolve()),
+  status: vi.fn(),
+  problem: vi.fn(),
+  probe: vi.fn(),
+  curve: vi.fn(),
+  bake: vi.fn(),
+  sent: vi.fn(),
+  ended: vi.fn(),
+  broken: vi.fn(),
+} satisfies SessionHandlers;
+
+let nextFrame: (() => void)[];
+let session: Session;
+const socket = () => FakeSocket.opened.at(-1) as FakeSocket;
+
+function animate(): void {
+  for (const draw of nextFrame.splice(0)) draw();
+}
+
+/** The server says hello with the look that is wanted. */
+function greet(): void {
+  socket().hello(LOOK, 0);
+  session.want({ look: LOOK, hand: null, solo: null, inputTime: 0 });
+  animate();
+}
+
+/** Edit a look, as a hand on this pointer does. */
+function edit(look: Look, path: string, value: unknown): Look {
+  const change = changeAt(look, path, value);
+  session.want({ look: change.after, hand: path, solo: null, inputTime: 0 }, change);
+  return change.after;
+}
+
+beforeEach(() => {
+  vi.clearAllMocks();
+  vi.useFakeTimers();
+  FakeSocket.opened = [];
+  nextFrame = [];
+  vi.stubGlobal("WebSocket", FakeSocket);
+  vi.stubGlobal("location", { href: "http://host/" });
+  vi.stubGlobal("window", { setTimeout });
+  vi.stubGlobal("requestAnimationFrame", (draw: () => void) => nextFrame.push(draw));
+  session = new Session("b1", handlers);
+  session.connect();
+});
+
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+test("the server's look that is the wanted one needs no edit", () => {
+  session.want({ look: LOOK, hand: null, solo: null, inputTime: 0 });
+  expect(socket().url.href).toBe("ws://host/api/bakes/b1/session");
+  socket().hello(structuredClone(LOOK), 0);
+  expect(socket().sent).toEqual([]);
+  expect(handlers.connection).toHaveBeenLastCalledWith("open", 0);
+});
+
+test("the first edit goes at once, more of them once in an animation frame", () => {
+  greet();
+  let look = edit(LOOK, SIGMA, 0.3);
+  look = edit(look, SIGMA, 0.4);
+  edit(look, SIGMA, 0.5);
+  expect(socket().edits).toEqual([
+    { type: "edit", revision: 1, patch: [{ op: "replace", path: SIGMA, value: 0.3 }], hand: SIGMA, solo: null },
+  ]);
+  animate();
+  expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
+});
+
+test("a frame is acknowledged when it is on the screen", async () => {
+  let drawn: () => void = () => undefined;
+  handlers.frame.mockReturnValueOnce(new Promise((done) => (drawn = done)));
+  socket().hello(LOOK, 0);
+  const header = new TextEncoder().encode(
+    JSON.stringify({ frame: 7, revision: 0, view: "v", width: 1, height: 1, tiles: [], format: "rgb9e5", kind: "picture" }),
+  );
+  const bytes = new Uint8Array(4 + header.length);
+  new DataView(bytes.buffer).setUint32(0, header.length, true);
+  bytes.set(header, 4);
+  socket().onmessage({ data: bytes.buffer });
+  expect(socket().sent).toEqual([]);
+  drawn();
+  await vi.waitFor(() => expect(socket().sent).toEqual([{ type: "ack", frame: 7 }]));
+});
+
+describe("a connection that is lost", () => {
+  test("is found again by its token; what the server has not heard of goes then, and revisions never fall", () => {
+    greet();
+    const accepted = edit(LOOK, SIGMA, 0.3);
+    animate();
+    const lost = edit(accepted, "/display/exposure", 1);
+    socket().onclose({ code: 1006, reason: "" });
+    edit(lost, SIGMA, 0.4);
+    vi.advanceTimersByTime(10_000);
+    expect(FakeSocket.opened).toHaveLength(2);
+    expect(socket().url.searchParams.get("resume")).toBe("token");
+    expect(socket().sent).toEqual([]);
+    socket().hello(structuredClone(accepted), 1);
+    const [again] = socket().edits;
+    expect(again?.revision).toBe(3);
+    expect(again?.patch).toEqual([
+      { op: "replace", path: SIGMA, value: 0.4 },
+      { op: "replace", path: "/display/exposure", value: 1 },
+    ]);
+  });
+
+  test("is not tried again where the server says that it is of no use", () => {
+    socket().hello(LOOK, 0);
+    socket().onclose({ code: 4404, reason: "no such bake" });
+    vi.advanceTimersByTime(60_000);
+    expect(FakeSocket.opened).toHaveLength(1);
+    expect(handlers.ended).toHaveBeenCalledWith("no such bake");
+  });
+
+  test("loses its token after some tries that failed", () => {
+    socket().hello(LOOK, 0);
+    for (let i = 0; i < 4; i++) {
+      socket().onclose({ code: 1006, reason: "" });
+      vi.advanceTimersByTime(10_000);
+    }
+    expect(FakeSocket.opened).toHaveLength(5);
+    expect(socket().url.searchParams.has("resume")).toBe(false);
+  });
+});
+
+test("an edit that is refused: the look that was accepted last is known, and the whole look goes next", () => {
+  greet();
+  edit(LOOK, SIGMA, 99);
+  const message = { type: "problem", revision: 1, problem: { detail: "too much" } };
+  socket().says(message);
+  expect(handlers.problem).toHaveBeenCalledWith(message, LOOK);
+  session.want({ look: lookWith(LOOK, SIGMA, 0.3), hand: null, solo: null, inputTime: 0 });
+  animate();
+  expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: "" }] });
+});
+
+test("what is no message is said, and does no harm", () => {
+  for (const text of ["{", "null", "[]", '"hello"', "{}"]) socket().onmessage({ data: text });
+  socket().onmessage({ data: new ArrayBuffer(2) });
+  expect(handlers.broken).toHaveBeenCalledTimes(6);
+  socket().says({ type: "news of a later server" });
+  socket().says({ type: "constructor" });
+  expect(handlers.broken).toHaveBeenCalledTimes(6);
+});
