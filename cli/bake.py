@@ -14,7 +14,7 @@ from cli.options import Data, SceneName, Scheduler, Size, parse_size
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from relume.transfer.base import Recipe
+    from relume.bake import Recipe
     from server.settings import Settings
     from worker.scenes import SceneRecord
     from worker.service import BakeService
@@ -43,7 +43,7 @@ def bake(
     This process bakes, unless a server on the same data folder is quicker to take it. Ctrl-C asks whether to keep going
     in the background or to cancel.
     """
-    from cli.house import find_scene, open_bakes, open_settings
+    from cli.data_folder import find_scene, open_bakes, open_settings
 
     settings = open_settings(data, scheduler=scheduler)
     service = open_bakes(settings)
@@ -61,8 +61,8 @@ def bake(
 def _recipe(
     record: SceneRecord, method: str, views: list[str] | None, size: str | None, lights: int | None, relightable: bool
 ) -> Recipe:
+    from relume.bake import Recipe
     from relume.errors import ParameterError
-    from relume.transfer.base import Recipe
     from worker.presets import PRESETS
 
     unknown = sorted(set(views or ()) - set(record.views))
@@ -106,8 +106,8 @@ def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
 
 
 def _report_rays(store: Path) -> None:
+    from relume.methods.store_io import read_rays
     from relume.store import open_store
-    from relume.transfer.stored import read_rays
 
     rays = read_rays(open_store(store))
     typer.echo(

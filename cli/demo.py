@@ -24,7 +24,7 @@ def demo(
     browser: Annotated[bool, typer.Option(help="Open the editor in a browser.")] = True,
 ) -> None:
     """Bake the built-in scene if it is not there, serve it, and open the editor."""
-    from cli.house import open_settings
+    from cli.data_folder import open_settings
     from server.app import serve
 
     settings = open_settings(data, port=port)
@@ -45,11 +45,11 @@ def _bake(settings: Settings, browser: bool) -> None:
 
 
 def _queue_and_follow(settings: Settings, browser: bool) -> str:
+    from cli.data_folder import open_bakes
     from cli.follow import follow
-    from cli.house import open_bakes
+    from relume.bake import Recipe
     from relume.errors import PlanError
     from relume.scene.demo import demo_scene
-    from relume.transfer.base import Recipe
     from worker.presets import PRESETS
     from worker.scenes import register_scene
 

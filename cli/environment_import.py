@@ -16,10 +16,10 @@ def environment_import(
     data: Data = None,
 ) -> None:
     """Import an environment; print its name in looks, and a warning for each thing that was changed."""
-    from cli.house import open_settings
-    from relume.environments.shelf import keep
+    from cli.data_folder import open_settings
+    from relume.asset_store import check_name
+    from relume.environments.asset_store import keep
     from relume.errors import ParameterError
-    from relume.shelf import check_name
     from worker.paths import environments_path
 
     if not file.is_file():

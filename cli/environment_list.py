@@ -9,9 +9,9 @@ from cli.options import Data
 
 def environment_list(data: Data = None) -> None:
     """List environments as looks name them (`environment.map`): built-in ones, then imported ones, newest first."""
-    from cli.house import open_settings
+    from cli.data_folder import open_settings
+    from relume.environments.asset_store import records
     from relume.environments.built_in import BUILT_IN
-    from relume.environments.shelf import records
     from worker.paths import environments_path
 
     for name, (label, _) in BUILT_IN.items():

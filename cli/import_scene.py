@@ -31,7 +31,7 @@ def import_scene(
     data: Data = None,
 ) -> None:
     """Register a scene; print its id, what was understood, and a warning for each thing that was not."""
-    from cli.house import open_bakes, open_settings
+    from cli.data_folder import open_bakes, open_settings
     from relume.scene.ground import with_ground
     from worker.scenes import get_scene, register_scene
 
@@ -56,8 +56,8 @@ def import_scene(
 
 
 def _find(file: Path | None, environment: Path | None, name: str | None, made_by_code: str | None) -> Scene:
+    from relume.environments.reading import read_environment
     from relume.errors import ParameterError
-    from relume.light.environment import read_environment
     from relume.scene.built_in import built_in
     from relume.scene.importer import import_scene as read_scene
 

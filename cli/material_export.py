@@ -17,10 +17,10 @@ def material_export(
     data: Data = None,
 ) -> None:
     """Write an edited material as a MERL file, for other renderers; any isotropic terms will do."""
-    from cli.house import open_settings
+    from cli.data_folder import open_settings
+    from relume.brdf.merl_grid import sample_terms
     from relume.errors import ParameterError
     from relume.look import complete, default_look
-    from relume.measured.export import sample_terms
     from relume.measured.merl import write_merl
     from relume.scene.model import Material
 

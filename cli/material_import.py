@@ -18,9 +18,9 @@ def material_import(
     """Import a measured material; print its name in looks, and how well its curves do alone."""
     import json
 
-    from cli.house import open_settings
-    from relume.measured.shelf import keep
-    from relume.shelf import check_name
+    from cli.data_folder import open_settings
+    from relume.asset_store import check_name
+    from relume.measured.asset_store import keep
     from worker.paths import materials_path
 
     record = keep(materials_path(open_settings(data).data), file, check_name(name or file.stem))

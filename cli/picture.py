@@ -37,10 +37,11 @@ def save_exr(
     from relume.exr.attributes import attributes_of
     from relume.exr.layers import layers_of
     from relume.exr.picture import export_exr
-    from relume.transfer.render import render_image
+    from relume.picture.transfer import Axis
+    from relume.render.image import render_image
 
     of = transfer.views[view]
-    layers = layers_of(look, reflects=transfer.method == "gather") if with_layers else []
+    layers = layers_of(look, reflects=Axis.BOUNCES in transfer.axes) if with_layers else []
     attributes = attributes_of(origin, of.camera, (of.width, of.height), look, layers)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("render", total=1.0)

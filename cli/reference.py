@@ -26,7 +26,7 @@ def reference(
     from rich.console import Console
     from rich.progress import Progress
 
-    from cli.house import complete_look, find_scene, open_bakes, open_settings
+    from cli.data_folder import complete_look, find_scene, open_bakes, open_settings
     from cli.picture import check_output, save
     from relume.errors import NotFoundError
     from relume.look import default_look

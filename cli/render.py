@@ -22,12 +22,13 @@ def render(
     data: Data = None,
 ) -> None:
     """Render one exact frame of a baked scene."""
-    from cli.house import complete_look, find_bake, find_scene, open_bakes, open_settings
+    from cli.data_folder import complete_look, find_bake, find_scene, open_bakes, open_settings
     from cli.picture import check_output, save, save_exr
     from relume.errors import ParameterError
     from relume.exr.attributes import Origin
-    from relume.transfer.opened import open_transfer
-    from relume.transfer.render import render_image
+    from relume.memory import Memory
+    from relume.methods.registry import open_transfer
+    from relume.render.image import render_image
 
     check_output(output)
     is_exr = output.suffix.lower() == ".exr"
@@ -38,7 +39,9 @@ def render(
     try:
         record = find_scene(service.ledger, scene)
         bake, view_name = find_bake(service, record, view)
-        transfer = open_transfer(service.store_path(bake.id))
+        transfer = open_transfer(service.store_path(bake.id), Memory(4 << 30))
+        if not bake.is_current:
+            typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
         document = complete_look(partial, transfer.default_look)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)

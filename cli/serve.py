@@ -24,7 +24,7 @@ Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen
 
 def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
     """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
-    from cli.house import open_settings
+    from cli.data_folder import open_settings
     from server.app import serve as run_server
 
     is_url = data is not None and "://" in data

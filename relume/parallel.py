@@ -67,6 +67,7 @@ def for_steps(
     """`for_ranges` for long work that is watched and may be stopped.
 
     Args:
+        kernel: called with the ends of ranges of at most `grain` out of `count`, from several threads.
         progress: called with the share done after each range. cancelled: asked before each.
         what: the work is called, in the error.
     Raises:

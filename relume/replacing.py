@@ -1,51 +1,36 @@
-"""Files that are never half there."""
+"""Files that are never half there: the one way in which relume writes a file that others may read meanwhile."""
 
 from __future__ import annotations
 
 import os
-import tempfile
 import uuid
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from relume.errors import RelumeError
 
-
-class Replacing:
-    """A file that takes its name only when it is complete and on the disk."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> BinaryIO:
-        handle, self._temporary = tempfile.mkstemp(prefix=".", suffix=".part", dir=self._path.parent)
-        self._file = os.fdopen(handle, "wb")
-        return self._file
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        try:
-            if kind is None:
-                self._file.flush()
-                os.fsync(self._file.fileno())
-            self._file.close()
-            if kind is None:
-                os.replace(self._temporary, self._path)
-        finally:
-            Path(self._temporary).unlink(missing_ok=True)
+UNFINISHED = ".unfinished-*"
+"""Names of files that a killed process left."""
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Let a library that wants a path write a file, beside the one that it becomes.
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file that takes its name only when it is complete and on the disk; a failure leaves the old one.
 
     Args:
-        write: called with the path to write to, whose suffix is that of `path`.
+        path: what the file will be called; its folder exists.
+    Yields:
+        The path to write to: hidden, in the same folder, with the same suffix in lower case, by which libraries choose
+        a format.
     Raises:
-        RelumeError: the file cannot be written.
+        RelumeError: the file cannot be written. Other errors than OSError pass as they are.
     """
-    unfinished = path.with_name(f".unfinished-{uuid.uuid4().hex}{path.suffix.lower()}")
+    unfinished = path.with_name(UNFINISHED.replace("*", uuid.uuid4().hex + path.suffix.lower()))
     try:
-        write(unfinished)
+        yield unfinished
+        with unfinished.open("rb") as file:
+            os.fsync(file.fileno())
         os.replace(unfinished, path)
     except OSError as error:
         reason = error.strerror or str(error)

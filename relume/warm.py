@@ -1,8 +1,8 @@
 """Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.warm`.
 
 Bakes a thumbnail of the built-in scene, shows each term with each of its curves, and along each parameter that moves
-several, and moves local lights. The compiled kernels lie in the cache that `relume.numerics` has chosen; every later
-process loads them from there.
+several, and moves local lights. The compiled kernels lie in the cache that `relume.kernel_cache` has chosen; every
+later process loads them from there.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from relume.bake import Recipe
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves
+from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.demo import demo_scene
 from relume.store import bake_here
-from relume.tonemap import tone_map
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
-from relume.transfer.registry import METHODS
 
 SIZE, NUM_LIGHTS = (64, 48), 64
 CACHE_BYTES = 1 << 28
@@ -38,9 +38,11 @@ def warm() -> None:
         scene = load_scene(folder / "scene")  # as the worker has it
         for method in METHODS.values():
             recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS)
-            transfer = open_transfer(bake_here(method, scene, recipe, folder / f"{method.name}.zarr"))
-            _edit_everything(transfer, Picture(transfer, recipe.views[0], FrozenCache(CACHE_BYTES)))
-            _move_lights(transfer, Picture(transfer, recipe.views[0], FrozenCache(CACHE_BYTES)))
+            transfer = open_transfer(
+                bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES)
+            )
+            _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
+            _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
 
 
 def _edit_everything(transfer: Transfer, picture: Picture) -> None:
@@ -71,7 +73,7 @@ def _move_lights(transfer: Transfer, picture: Picture) -> None:
 
 def _show(picture: Picture) -> None:
     """Freeze what waits, take a short and a full step, encode."""
-    while picture.waiting():
+    while picture.next_job():
         picture.freeze(lambda _: None, lambda: False)
     picture.advance(1)
     picture.advance(None)

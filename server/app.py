@@ -10,17 +10,17 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
-from relume.environments.shelf import SHELF as ENVIRONMENTS
-from relume.measured.shelf import SHELF as MATERIALS
+from relume.environments.asset_store import STORE as ENVIRONMENTS
+from relume.measured.asset_store import STORE as MATERIALS
 from server import errors
 from server.guard import Guard
-from server.live.library import open_library
+from server.library.opening import open_library
 from server.metrics import Metrics
-from server.protocol import MAX_MESSAGE_BYTES
 from server.routes import (
     bakes,
     built_ins,
     client,
+    comparisons,
     environments,
     health,
     library,
@@ -31,10 +31,10 @@ from server.routes import (
     scenes,
     session,
     shares,
-    truths,
 )
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
+from server.wire.protocol import MAX_MESSAGE_BYTES
 from worker.paths import environments_path, materials_path
 
 ROUTE_GROUPS = (
@@ -46,7 +46,7 @@ ROUTE_GROUPS = (
     environments,
     bakes,
     renders,
-    truths,
+    comparisons,
     looks,
     shares,
     session,

@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 
 from relume import errors as relume_errors
 from relume.errors import ProtocolError, RelumeError
-from server.protocol import Problem
+from server.wire.protocol import Problem
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"

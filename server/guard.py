@@ -2,6 +2,10 @@
 
 Pure ASGI, so that streaming and WebSockets pass without a detour. A page of another site must neither open a session
 (WebSockets know no same-origin policy) nor send a form; a DNS name that an attacker points here is refused by its Host.
+
+Starlette's own middleware does not do instead: TrustedHostMiddleware answers in plain text where every refusal here is
+a problem document, and looks at no Origin; CORSMiddleware adds headers for browsers to obey, but lets a foreign page's
+request and its WebSocket through. None counts the bytes of a body.
 """
 
 from __future__ import annotations

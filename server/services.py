@@ -13,22 +13,23 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from relume.environments.built_in import built_in
-from relume.memory import held_bytes
-from server import tables  # noqa: F401  its tables must be known before the database is opened
-from server.importing import remove_stray_uploads
-from server.live.bake_news import BakeNews
-from server.live.caretaker import Caretaker
-from server.live.ports import Library
-from server.live.resume import ResumeStore
-from server.live.session import House
-from server.live.threads import Threads
-from server.live.transfers import TransferPool
-from server.looks import LookShelf
+from relume.resident import held_bytes
+from server.files.importing import remove_stray_uploads
+from server.files.thumbnails import Thumbnails
+from server.library.caretaker import Caretaker
+from server.library.ports import Library
+from server.library.threads import Threads
+from server.library.transfers import TransferPool
+from server.live.sending.bake_news import BakeNews
+from server.live.session import SessionServices
+from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
-from server.renders import RenderQueue
+from server.queues.comparisons import ComparisonQueue
+from server.queues.renders import RenderQueue
+from server.records import tables  # noqa: F401  its tables must be known before the database is opened
+from server.records.looks import LookStore
+from server.records.shares import ShareStore
 from server.settings import Settings
-from server.shares import ShareShelf
-from server.truths import TruthQueue
 from worker.scenes import get_scene
 from worker.service import BakeService
 from worker.tasks import kept_bytes
@@ -45,14 +46,15 @@ class Services:
     settings: Settings
     metrics: Metrics
     bakes: BakeService
-    looks: LookShelf
-    shares: ShareShelf
+    looks: LookStore
+    shares: ShareStore
     renders: RenderQueue
-    truths: TruthQueue
+    comparisons: ComparisonQueue
     threads: Threads
     transfers: TransferPool
     caretaker: Caretaker
-    house: House
+    thumbnails: Thumbnails
+    live: SessionServices
     session_slots: threading.BoundedSemaphore
     import_slots: asyncio.Semaphore
 
@@ -81,8 +83,8 @@ async def open_services(
     renders = RenderQueue(
         service.ledger.sessions, settings.data, library, lambda scene: get_scene(service.ledger, scene).name
     )
-    truths = TruthQueue(service.ledger.sessions, settings.data, library)
-    house = House(
+    comparisons = ComparisonQueue(service.ledger.sessions, settings.data, library)
+    live = SessionServices(
         library=library,
         threads=threads,
         metrics=metrics,
@@ -92,7 +94,7 @@ async def open_services(
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes)
-    metrics.watch_cache(library.cache_used_bytes)
+    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
     metrics.watch_holders(
         {
             "frozen_cache": library.cache_used_bytes,
@@ -102,10 +104,10 @@ async def open_services(
         }
     )
     metrics.watch_workers(service.workers_resident_bytes)
-    looks = LookShelf(service.ledger.sessions)
+    looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     renders.start()
-    truths.start()
+    comparisons.start()
     rounds = asyncio.create_task(caretaker.run())
     try:
         yield Services(
@@ -113,19 +115,20 @@ async def open_services(
             metrics=metrics,
             bakes=service,
             looks=looks,
-            shares=ShareShelf(service.ledger.sessions),
+            shares=ShareStore(service.ledger.sessions),
             renders=renders,
-            truths=truths,
+            comparisons=comparisons,
             threads=threads,
             transfers=transfers,
             caretaker=caretaker,
-            house=house,
+            thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
+            live=live,
             session_slots=threading.BoundedSemaphore(settings.max_sessions),
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
         rounds.cancel()
-        await asyncio.to_thread(truths.close)
+        await asyncio.to_thread(comparisons.close)
         await asyncio.to_thread(renders.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)

@@ -9,7 +9,7 @@ from platformdirs import user_data_dir
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from worker.rest import DEFAULT_IDLE_S
+from worker.idle import DEFAULT_IDLE_S
 
 GIB = 1024**3
 
@@ -36,7 +36,7 @@ class Settings(BaseSettings):
     client: Path = Field(
         default=Path(__file__).resolve().parent.parent / "client_web" / "dist", description="the built editor"
     )
-    cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of the frozen caches")
+    cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of what is made from bakes")
     cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")

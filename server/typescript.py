@@ -1,19 +1,28 @@
-"""Writes the editor's types from the server's models: `python -m server.typescript [--check]`."""
+"""Writes the editor's types, and what it must know of looks, from the server's models: `python -m server.typescript
+[--check]`."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import get_args
 
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from server import bodies, protocol
+from relume.brdf.document import MAX_CURVE_VALUE, MAX_POINTS
+from relume.checks import MAX_COLOR
+from relume.look import LightLook, Look
+from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
+from relume.look.lights import LIGHT_RANGES, default_light
+from relume.look.patch import MAX_OPERATIONS
+from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
+from server.ts_syntax import interface, literal, union
+from server.wire import bodies, protocol
 
-TARGET = Path(__file__).resolve().parent.parent / "client_web" / "src" / "protocol.gen.ts"
+CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
 
 CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
@@ -66,83 +75,78 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 )
 
 
-def generate() -> str:
-    """The whole TypeScript file; the same models give the same text."""
+def generate_protocol() -> str:
+    """Messages and bodies; the same models give the same text."""
     parts = [HEAD]
     for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN"):
         value = getattr(protocol, name)
-        parts.append(f"export const {name} = {_literal(value)};")
+        parts.append(f"export const {name} = {literal(value)};")
     for mode, models in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in models], by_alias=True)  # type: ignore[misc]
-        parts.extend(_interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
+        parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
     parts = list(dict.fromkeys(parts))  # a part of inputs and outputs alike is written once
-    parts.append(_union("ClientMessage", CLIENT_MESSAGES))
-    parts.append(_union("ServerMessage", SERVER_MESSAGES))
+    parts.append(union("ClientMessage", CLIENT_MESSAGES))
+    parts.append(union("ServerMessage", SERVER_MESSAGES))
     return "\n\n".join(parts) + "\n"
 
 
-def _interface(name: str, schema: Mapping[str, Any], mode: str) -> str:
-    """One model as an interface; an input's defaulted fields are optional, an output's are always there."""
-    required = set(schema.get("required", ()))
-    lines = [f"/** {' '.join(schema['description'].split())} */"] if "description" in schema else []
-    lines.append(f"export interface {name} {{")
-    for field, body in schema.get("properties", {}).items():
-        optional = "?" if mode == "validation" and field not in required else ""
-        lines.append(f"  {field}{optional}: {_type(body)};")
-    if schema.get("additionalProperties") is True:
-        lines.append("  [extra: string]: unknown;")
-    return "\n".join([*lines, "}"])
+def generate_look() -> str:
+    """The look document: its types, what of it is as nobody has said anything, and the ranges of its numbers."""
+    _, schema = models_json_schema([(Look, "validation")])
+    lights: tuple[type[BaseModel], ...] = get_args(get_args(LightLook)[0])
+    parts = [HEAD, *(interface(name, body, "validation") for name, body in sorted(schema["$defs"].items()))]
+    parts.append(union("LightLook", lights))
+    parts.append('type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };')
+    kinds = [str(get_args(light.model_fields["kind"].annotation)[0]) for light in lights]
+    defaults = "".join(f"  {kind}: {literal(default_light(kind))},\n" for kind in kinds)
+    parts.append(
+        f"/** A light of each kind, complete. */\nexport const DEFAULT_LIGHTS: LightsByKind = {{\n{defaults}}};"
+    )
+    sections = "".join(f"  {name}: {literal(fields)},\n" for name, fields in DEFAULTS.items())
+    names = " | ".join(literal(name) for name in DEFAULTS)
+    parts.append(f"export const DEFAULTS: Readonly<Pick<Look, {names}>> = {{\n{sections}}};")
+    ranges = "".join(f"  {name}: {_ranges(fields)},\n" for name, fields in {**RANGES, **_OTHER_RANGES}.items())
+    parts.append(
+        f"/** What numbers may be, each of those of a field. */\nexport const RANGES = {{\n{ranges}}} as const;"
+    )
+    parts.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _MAXIMA.items()))
+    return "\n\n".join(parts) + "\n"
 
 
-def _type(schema: Mapping[str, Any]) -> str:
-    """A JSON schema as a TypeScript type."""
-    if "$ref" in schema:
-        return str(schema["$ref"]).rsplit("/", 1)[-1]
-    if "const" in schema:
-        return _literal(schema["const"])
-    if "enum" in schema:
-        return " | ".join(_literal(value) for value in schema["enum"])
-    if "anyOf" in schema:
-        return _join(_type(part) for part in schema["anyOf"])
-    kind = schema.get("type")
-    if kind == "array":
-        if "prefixItems" in schema:
-            return "[" + ", ".join(_type(part) for part in schema["prefixItems"]) + "]"
-        item = _type(schema.get("items", {}))
-        return f"({item})[]" if " | " in item else f"{item}[]"
-    if kind == "object":
-        values = schema.get("additionalProperties")
-        return f"Record<string, {_type(values) if isinstance(values, dict) else 'unknown'}>"
-    plain = {"string": "string", "integer": "number", "number": "number", "boolean": "boolean", "null": "null"}
-    return plain.get(str(kind), "unknown")
+_OTHER_RANGES = {"light": LIGHT_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
+_MAXIMA = {
+    "MAX_TERMS": MAX_TERMS,
+    "MAX_LIGHTS": MAX_LIGHTS,
+    "MAX_LIGHT_NAME": MAX_LIGHT_NAME,
+    "MAX_CURVE_POINTS": MAX_POINTS,
+    "MAX_CURVE_VALUE": MAX_CURVE_VALUE,
+    "MAX_OPERATIONS": MAX_OPERATIONS,
+}
 
 
-def _literal(value: object) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value).lower()
-
-
-def _join(parts: Iterable[str]) -> str:
-    return " | ".join(dict.fromkeys(parts))
-
-
-def _union(name: str, models: Iterable[type[BaseModel]]) -> str:
-    return f"export type {name} =\n" + "\n".join(f"  | {m.__name__}" for m in models) + ";"
+def _ranges(fields: Mapping[str, tuple[float, float]]) -> str:
+    return literal({name: {"minimum": least, "maximum": most} for name, (least, most) in fields.items()})
 
 
 def main() -> int:
-    """Write the file, or with --check say whether it is up to date."""
+    """Write the files, or with --check say which of them are stale."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="write nothing; fail when the file is stale")
-    text = generate()
-    if parser.parse_args().check:
-        if TARGET.exists() and TARGET.read_text(encoding="utf-8") == text:
-            return 0
-        sys.stderr.write(f"{TARGET.name} is stale; run python -m server.typescript\n")
-        return 1
-    TARGET.parent.mkdir(parents=True, exist_ok=True)
-    TARGET.write_text(text, encoding="utf-8")
-    return 0
+    parser.add_argument("--check", action="store_true", help="write nothing; fail when a file is stale")
+    is_check = parser.parse_args().check
+    stale = [path for path, generate in TARGETS.items() if _text(path) != generate()]
+    for path in stale:
+        if is_check:
+            sys.stderr.write(f"{path.name} is stale; run python -m server.typescript\n")
+        else:
+            path.write_text(TARGETS[path](), encoding="utf-8")
+    return int(is_check and bool(stale))
 
+
+def _text(path: Path) -> str | None:
+    return path.read_text(encoding="utf-8") if path.exists() else None
+
+
+TARGETS = {CLIENT / "protocol.gen.ts": generate_protocol, CLIENT / "look.gen.ts": generate_look}
 
 if __name__ == "__main__":
     sys.exit(main())

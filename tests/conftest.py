@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shared_bakes import baked, corner, gathered, transfer
 from xdist.scheduler import LoadScopeScheduling
+
+__all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
 TOGETHER = ("e2e",)  # folders whose tests share what is dear to start: a server, its bake, a browser
 
@@ -23,6 +26,11 @@ class _Sharing(LoadScopeScheduling):
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Sharing:
     """Called by xdist; its own groups, which are marks, are lost on the way with this pytest."""
     return _Sharing(config, log)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than there are processors: tests of servers and browsers wait as long as they compute."""
+    return (os.cpu_count() or 1) + 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.light.environment import texel_directions
+from relume.environments.equirect import texel_directions
+from relume.environments.model import Environment
+from relume.points import Points
 from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene, Texture
+from relume.scene.model import Camera, Material, Mesh, Scene, Texture
+from relume.trace.surface import any_tangent
+
+
+def points_at(position, normal, first=0):
+    """Points with any tangents; the first has this seed."""
+    position, normal = (np.ascontiguousarray(a, np.float32) for a in (position, normal))
+    return Points(position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32))
 
 
 def mesh(name, positions, faces, material, normals=None, tangents=None, uvs=None):

@@ -19,19 +19,20 @@ from pathlib import Path
 
 from sqlalchemy.exc import IntegrityError
 
+from relume.bake import Task
 from relume.errors import CancelledError, ChunkDamagedError, RelumeError
 from relume.scene.model import Scene
-from relume.store import fill, open_store, publish
-from relume.transfer.base import Task
+from relume.store import code_of, fill, open_store, publish
 from worker.lease import HEARTBEAT_S, LeaseKeeper
 from worker.ledger import Ledger
 from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
 from worker.status import Phase, TaskCost
-from worker.tasks import Job, rest, run_task, scene_of
+from worker.tasks import Job, idle_timer, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
+UPGRADED = "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
@@ -62,7 +63,7 @@ class BakeRunner:
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
-        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), rest.kept_awake():
+        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), idle_timer.kept_awake():
             forget_note(self._staging)  # of an earlier run
             self._run()
             forget_note(self._staging)
@@ -87,8 +88,7 @@ class BakeRunner:
         job, target, staging = self.job, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger knew
             return _size(target)
-        if not staging.exists():
-            self.ledger.forget_tasks(job.bake_id)
+        self._begin_with_one_code()
         status = self.ledger.bake(job.bake_id)
         shown = status.progress if self.ledger.finished_tasks(job.bake_id) else 0.0
         progress = Progress(status.plan, shown, self.expected)
@@ -104,6 +104,17 @@ class BakeRunner:
             shutil.rmtree(staging, ignore_errors=True)
             self.ledger.forget_tasks(job.bake_id)
             raise
+
+    def _begin_with_one_code(self) -> None:
+        """Keep what an earlier run has finished where the same code did it; else start from nothing, and say why."""
+        identity, staging = self.job.bake_id, self._staging
+        has_begun = staging.exists()
+        if has_begun and code_of(staging) == self.job.code:
+            return
+        if has_begun:
+            log.warning("bake %s: %s", identity, UPGRADED)
+            shutil.rmtree(staging)
+        self.ledger.begin_anew(identity, self.owner, self.job.code, UPGRADED if has_begun else None)
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
         job = self.job

@@ -6,8 +6,8 @@ import os
 import shutil
 from pathlib import Path
 
+from relume.bake import Plan
 from relume.errors import MemoryBudgetError
-from relume.transfer.base import Plan
 
 REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
@@ -39,10 +39,14 @@ def _system_available_bytes() -> int:
 
 
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
-    """Raise MemoryBudgetError where a plan needs more memory or disk than there is.
+    """Refuse a plan that needs more memory or disk than there is.
 
     Args:
+        plan: of the bake.
+        data_dir: on whose disk the store will stand.
         num_processes: worker processes on this machine at once; 0 where they run elsewhere.
+    Raises:
+        MemoryBudgetError: it does not fit; the message says what is needed, what there is, and what to do.
     """
     memory = int(available_bytes() * MEMORY_SHARE)
     if plan.peak_bytes * num_processes > memory:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from relume.transfer.base import Plan
+from relume.bake import Plan
 from worker.executor import is_tiny, num_cores
 
 
@@ -45,6 +45,9 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
     rate includes their own overhead, so a bake is judged by its like where there is one.
 
     Args:
+        plan: of the bake.
+        finished: bakes that were measured, of any scenes.
+        num_workers: tasks that run at once.
         crowded: how many will want each core while it runs.
     """
     alike = [each for each in finished if is_tiny(each.plan) == is_tiny(plan)] or finished

@@ -18,15 +18,15 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from multiprocessing import resource_tracker
 from typing import Any
 
+from relume.bake import Plan
 from relume.errors import PlanError
-from relume.memory import resident_bytes
-from relume.transfer.base import Plan
+from relume.resident import resident_bytes
 from worker.dask_executor import DaskExecutor
 
 log = logging.getLogger(__name__)
 
-# About four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
-TINY_BAKE_RAYS = 100_000_000
+# As planned: about four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
+TINY_BAKE_RAYS = 400_000_000
 CONNECT_S = 10
 
 # One Python thread per process, so one thread for every library below it.

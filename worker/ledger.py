@@ -19,8 +19,9 @@ from sqlalchemy import CursorResult, Engine, delete, func, or_, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
+from relume.bake import Plan, Recipe, Task
+from relume.code_version import bake_code
 from relume.errors import NotFoundError
-from relume.transfer.base import Plan, Recipe, Task
 from worker.estimate import Finished, crowding, load_of_machine
 from worker.executor import is_tiny
 from worker.lease import is_alive
@@ -40,7 +41,16 @@ class Ledger:
         self._engine.dispose()
 
     def submit(self, scene_id: str, recipe: Recipe, plan: Plan) -> str:
-        """Queue a bake and return its id. The same recipe is the same bake; a failed or cancelled one is resumed."""
+        """Queue a bake; the same recipe under the same code is the same bake, and a failed or cancelled one is resumed.
+
+        Args:
+            scene_id: of a scene that is kept. recipe: what to bake of it.
+            plan: what it will cost.
+        Returns:
+            The bake's id.
+        Raises:
+            NotFoundError: there is no such scene.
+        """
         identity, now = bake_id(scene_id, recipe), time.time()
         row = BakeRow(
             id=identity,
@@ -50,6 +60,7 @@ class Ledger:
             state="queued",
             created=now,
             queued=now,
+            code=bake_code(),
         )
         if self._get(identity) is None:
             try:
@@ -135,7 +146,14 @@ class Ledger:
     def finish(
         self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
     ) -> None:
-        """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled."""
+        """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled.
+
+        Args:
+            identity: of the bake. owner: who holds its lease; nothing changes where that is somebody else.
+            state: that it ends in.
+            problem: a sentence for people, where it has failed.
+            num_bytes: of the store, where it is ready.
+        """
         mine = BakeRow.owner == owner
         done = {"progress": 1.0, "crowding": crowding(load_of_machine())} if state == "ready" else {}
         ended = {"problem": problem, "bytes": num_bytes, "seconds_left": None, "phase": None, **done}
@@ -161,7 +179,13 @@ class Ledger:
             return {(row.stage, row.index): TaskCost(row.rays, row.trace_s, row.seconds) for row in rows}
 
     def finish_task(self, identity: str, task: Task, cost: TaskCost, attempts: int) -> None:
-        """Record that a task's shards are on disk; once more changes nothing."""
+        """Record that a task's shards are on disk; once more changes nothing.
+
+        Args:
+            identity: of the bake. task: that is done.
+            cost: seconds and rays of it.
+            attempts: how often it was begun, this time included.
+        """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
             session.merge(row)
@@ -170,6 +194,16 @@ class Ledger:
         """Start a bake from nothing: its unfinished store is gone or damaged."""
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
+
+    def begin_anew(self, identity: str, owner: str, code: str, why: str | None) -> None:
+        """Start a bake from nothing, under this code.
+
+        Args:
+            identity: of the bake. owner: the process that runs it. code: that will make all of it.
+            why: one sentence for people where it had been begun before.
+        """
+        self.forget_tasks(identity)
+        self._change(identity, ("running",), BakeRow.owner == owner, code=code, problem=why)
 
     def finished_bakes(self, limit: int) -> list[Finished]:
         """What the newest ready bakes took."""
@@ -189,6 +223,10 @@ class Ledger:
     def stage_seconds(self, scene_id: str, method: str, num_workers: int, limit: int) -> dict[int, float]:
         """What each stage took of the newest ready bakes of a method, of this scene where there are any.
 
+        Args:
+            scene_id: whose own bakes count before others. method: name of the transfer method.
+            num_workers: tasks that ran at once in bakes that are not tiny.
+            limit: number of bakes that are looked at.
         Returns:
             Wall seconds by stage, those of all bakes together; empty where there was none.
         """
@@ -245,4 +283,5 @@ def _status(row: BakeRow, ahead: Mapping[str, int]) -> BakeStatus:
         recipe=recipe_from_json(row.recipe),
         plan=_plan(row.plan),
         created=row.created,
+        code=row.code,
     )

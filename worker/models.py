@@ -29,6 +29,7 @@ class BakeRow(Base):
     """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970).
 
     Attributes:
+        code: names the code that makes or made it; None in rows of a relume that did not write that down.
         crowding: see `worker.estimate`; None where it is not ready, or was baked before that was measured.
     """
 
@@ -45,6 +46,7 @@ class BakeRow(Base):
     phase: Mapped[str | None] = mapped_column(default=None)
     phase_since: Mapped[float | None] = mapped_column(default=None)
     crowding: Mapped[float | None] = mapped_column(default=None)
+    code: Mapped[str | None] = mapped_column(default=None)
     rays_per_second: Mapped[float | None] = mapped_column(default=None)
     seconds_left: Mapped[float | None] = mapped_column(default=None)
     bytes: Mapped[int] = mapped_column(default=0)

@@ -6,13 +6,15 @@ sees; whoever runs the bake reads it at each heartbeat.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
 from numba.core import event
+
+from relume.errors import RelumeError
+from relume.replacing import replacing
 
 Note = Literal["reading", "building", "compiling", "working"]
 
@@ -52,10 +54,8 @@ class Notebook:
         self._write(what)
 
     def _write(self, what: Note) -> None:
-        partial = self._path.with_name(f"{self._path.name}.{os.getpid()}")
-        with suppress(OSError):
-            partial.write_text(what)
-            partial.replace(self._path)
+        with suppress(RelumeError), replacing(self._path) as unfinished:
+            unfinished.write_text(what)
 
     @contextmanager
     def watching_compiler(self) -> Iterator[None]:

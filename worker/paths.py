@@ -22,12 +22,12 @@ def scene_path(data_dir: Path, scene_id: str) -> Path:
 
 
 def materials_path(data_dir: Path) -> Path:
-    """Folder of the measured materials; `relume.measured.shelf` names what is in it."""
+    """Folder of the measured materials; `relume.measured.asset_store` names what is in it."""
     return data_dir / "materials"
 
 
 def environments_path(data_dir: Path) -> Path:
-    """Folder of the imported environments; `relume.environments.shelf` names what is in it."""
+    """Folder of the imported environments; `relume.environments.asset_store` names what is in it."""
     return data_dir / "environments"
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from relume.transfer.base import Plan, Task
+from relume.bake import Plan, Task
 from worker.status import TaskCost
 
 # Between two finished tasks the bar moves on at the rate so far, but never past this part of the next task.
@@ -90,7 +90,12 @@ class Progress:
         self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
 
     def add(self, task: Task, cost: TaskCost, here: bool) -> None:
-        """Count a finished task; `here`: in this run, not one before an interruption."""
+        """Count a finished task.
+
+        Args:
+            task: that is done. cost: seconds and rays of it.
+            here: it was done in this run, not in one before an interruption.
+        """
         before = self._done
         self._rays += cost.rays
         if self._is_measurable:

@@ -13,9 +13,9 @@ from sqlalchemy import select
 from sqlalchemy.exc import IntegrityError
 
 from relume.errors import NotFoundError
+from relume.remarks import Remark, remark_of
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
-from relume.scene.remarks import Remark, remark_of
 from worker.ledger import Ledger
 from worker.models import SceneRow
 from worker.paths import bake_path, scene_path, staging_path
@@ -45,7 +45,14 @@ class SceneRecord:
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
-    """Keep a scene and return its id; the same content twice is the same scene, its newest name and warnings win."""
+    """Keep a scene; the same content twice is the same scene, its newest name and warnings win.
+
+    Args:
+        data_dir: where scenes are kept. ledger: where they are listed.
+        scene: as an importer has made it.
+    Returns:
+        The scene's id.
+    """
     save_scene(scene, scene_path(data_dir, scene.id))
     summary = {
         "views": [camera.name for camera in scene.cameras],
@@ -85,7 +92,14 @@ def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
 
 
 def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
-    """Delete a scene with its bakes and their stores: they are of no use without it. Raises NotFoundError."""
+    """Delete a scene with its bakes and their stores: they are of no use without it.
+
+    Args:
+        data_dir: where scenes and stores are kept. ledger: where they are listed.
+        scene_id: of the scene; its bakes that run are cancelled.
+    Raises:
+        NotFoundError: there is no such scene.
+    """
     get_scene(ledger, scene_id)
     for status in ledger.bakes(scene_id):
         ledger.cancel(status.id)

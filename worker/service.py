@@ -10,22 +10,24 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+from relume.bake import BakeMethod, Plan, Recipe
+from relume.code_version import bake_code
 from relume.errors import NotFoundError, ParameterError
-from relume.transfer.base import Plan, Recipe, TransferMethod
+from relume.store import code_of
 from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
 from worker.estimate import crowding, load_of_machine, seconds_for
 from worker.executor import Executors, is_tiny
+from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger
 from worker.notes import forget_note
 from worker.paths import bake_path
 from worker.progress import Expected
-from worker.rest import idle_seconds
 from worker.status import BakeStatus, bake_id
-from worker.tasks import Job, rest, scene_of
+from worker.tasks import Job, idle_timer, scene_of
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +45,7 @@ class BakeService:
         ledger_url: str | None = None,
         scheduler: str | None = None,
         num_workers: int | None = None,
-        methods: Mapping[str, TransferMethod] | None = None,
+        methods: Mapping[str, BakeMethod] | None = None,
     ) -> None:
         """
         Args:
@@ -53,6 +55,7 @@ class BakeService:
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
         """
+        bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(parents=True, exist_ok=True)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
@@ -80,7 +83,7 @@ class BakeService:
         for thread in self._threads:
             thread.join(CLOSE_S)
         self._executors.close()
-        rest.end()
+        idle_timer.end()
         self._board.close()
         self.ledger.close()
 
@@ -100,7 +103,7 @@ class BakeService:
             ParameterError: there is no such method.
         """
         identity = self._known_scene(scene_id)
-        with rest.kept_awake():
+        with idle_timer.kept_awake():
             plan = self._method(recipe.method).plan(scene_of(self.data_dir, identity), recipe)
         processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
         check_budget(plan, self.data_dir, processes)
@@ -109,8 +112,8 @@ class BakeService:
     def submit(self, scene_id: str, recipe: Recipe) -> str:
         """Queue a bake and return its id; raises what `plan` raises.
 
-        The same recipe is the same bake: one that is queued, running or ready stays as it is, one that failed or was
-        cancelled goes on where it stopped.
+        The same recipe under the same code is the same bake: one that is queued, running or ready stays as it is, one
+        that failed or was cancelled goes on where it stopped.
         """
         identity = bake_id(scene_id, recipe)
         if self._is_ready(identity):
@@ -165,9 +168,9 @@ class BakeService:
 
         return get_scene(self.ledger, scene_id).id
 
-    def _method(self, name: str) -> TransferMethod:
+    def _method(self, name: str) -> BakeMethod:
         if self._methods is None:
-            from relume.transfer.registry import METHODS
+            from relume.methods.registry import METHODS
 
             self._methods = METHODS
         if name not in self._methods:
@@ -232,7 +235,7 @@ class BakeService:
             return
         runner = BakeRunner(
             ledger=self.ledger,
-            job=Job(self.data_dir, status.id, status.scene, status.recipe, method),
+            job=Job(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
             owner=self._owner,
             executor=executor,
             window=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
@@ -250,10 +253,12 @@ class BakeService:
             self._is_crowding.clear()
 
     def _remove_strays(self) -> None:
-        """Delete unfinished stores that no bake in the ledger will finish."""
+        """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again."""
         staging = self.data_dir / "bakes" / "staging"
-        wanted = {status.id for status in self.ledger.bakes() if status.state != "ready"}
+        states = {status.id: status.state for status in self.ledger.bakes()}
         for folder in staging.glob("*.zarr"):
-            if folder.name.removesuffix(".zarr") not in wanted:
+            state = states.get(folder.name.removesuffix(".zarr"), "ready")
+            is_stopped = state in ("failed", "cancelled")
+            if state == "ready" or (is_stopped and code_of(folder) != bake_code()):
                 shutil.rmtree(folder, ignore_errors=True)
                 forget_note(folder)

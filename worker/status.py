@@ -7,8 +7,9 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from relume.bake import Plan, Recipe
+from relume.code_version import bake_code
 from relume.store.schema import SCHEMA_VERSION
-from relume.transfer.base import Plan, Recipe
 
 BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
 Phase = Literal["starting", "loading", "reading", "building", "compiling", "sampling", "tracing", "publishing"]
@@ -35,7 +36,8 @@ class BakeStatus:
         ahead: bakes that will run before it, where it is queued.
         rays_per_second, seconds_left: None where nothing was measured yet.
         bytes: size of the published store, 0 before.
-        problem: one sentence with what to do about it, None where all is well.
+        problem: one sentence with what to do about it, or why it has started again; None where all is well.
+        code: names the code that makes or made it; None where that was not written down yet.
         created: seconds since 1970.
     """
 
@@ -53,6 +55,17 @@ class BakeStatus:
     recipe: Recipe
     plan: Plan
     created: float
+    code: str | None
+
+    @property
+    def is_current(self) -> bool:
+        """Whether baking it anew would give the same: no other code has made it."""
+        return self.code == bake_code()
+
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """Sorts a scene's bakes: the finest is the best, of equally fine ones one that this code has made."""
+        return self.detail, self.is_current
 
     @property
     def detail(self) -> int:
@@ -98,6 +111,6 @@ def recipe_from_json(text: str) -> Recipe:
 
 
 def bake_id(scene_id: str, recipe: Recipe) -> str:
-    """Name of a bake: the first 16 hexadecimal digits of SHA-256 over scene, recipe and schema version."""
-    text = json.dumps([scene_id, recipe_json(recipe), SCHEMA_VERSION])
+    """Name of a bake: the first 16 hexadecimal digits of SHA-256 over scene, recipe, schema version and code."""
+    text = json.dumps([scene_id, recipe_json(recipe), SCHEMA_VERSION, bake_code()])
     return hashlib.sha256(text.encode()).hexdigest()[:16]

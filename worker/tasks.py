@@ -8,15 +8,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from relume.memory import give_back, held_bytes
+from relume.bake import BakeMethod, Recipe, Task
+from relume.code_version import bake_code
+from relume.errors import StoreError
+from relume.resident import give_back, held_bytes
 from relume.scene.archive import load_scene
 from relume.scene.model import Scene
 from relume.store import fill
-from relume.transfer.base import Recipe, Task, TransferMethod
+from worker.idle import IdleTimer, idle_seconds
 from worker.notes import Notebook
 from worker.paths import scene_path, staging_path
-from worker.rest import Rest, idle_seconds
 from worker.status import TaskCost
+
+OTHER_CODE = "a worker process runs another version of relume than the server; start both again, then bake again"
 
 
 @dataclass(frozen=True)
@@ -25,13 +29,15 @@ class Job:
 
     Attributes:
         data_dir: the data directory, at the same path on every machine of a cluster.
+        code: names the code of the process that hands the tasks out.
     """
 
     data_dir: Path
     bake_id: str
     scene_id: str
     recipe: Recipe
-    method: TransferMethod
+    method: BakeMethod
+    code: str
 
 
 @lru_cache(maxsize=2)
@@ -40,10 +46,10 @@ def scene_of(data_dir: Path, scene_id: str) -> Scene:
     return load_scene(scene_path(data_dir, scene_id))
 
 
-_methods: dict[bytes, TransferMethod] = {}
+_methods: dict[bytes, BakeMethod] = {}
 
 
-def _resident(method: TransferMethod) -> TransferMethod:
+def _resident(method: BakeMethod) -> BakeMethod:
     """This process's own copy of a method, which keeps what it built for a scene: each task brings a fresh one."""
     return _methods.setdefault(pickle.dumps(method), method)
 
@@ -56,7 +62,7 @@ def _forget() -> None:
     give_back()
 
 
-rest = Rest(idle_seconds, _forget)
+idle_timer = IdleTimer(idle_seconds, _forget)
 """Of this process: what it keeps between tasks goes when no task has come for a while."""
 
 
@@ -66,11 +72,17 @@ def kept_bytes() -> int:
 
 
 def run_task(job: Job, task: Task) -> TaskCost:
-    """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes."""
+    """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes.
+
+    Raises:
+        StoreError: this process runs other code than the one that hands the tasks out; a store has one code's alone.
+    """
+    if job.code != bake_code():
+        raise StoreError(OTHER_CODE)
     began = time.perf_counter()
     staging = staging_path(job.data_dir, job.bake_id)
     notes = Notebook(staging)
-    with rest.kept_awake(), notes.watching_compiler():
+    with idle_timer.kept_awake(), notes.watching_compiler():
         notes.note("reading")
         scene, method = scene_of(job.data_dir, job.scene_id), _resident(job.method)
         notes.note("building")

@@ -10,17 +10,17 @@ F64 = NDArray[np.float64]
 
 
 def analysis(bands: F64) -> F64:
-    """(..., J) -> the same, copied."""
+    """A copy: values of bands are their own coefficients. (..., J) -> (..., J)"""
     return np.array(bands)
 
 
 def synthesis(coefficients: F64) -> F64:
-    """(..., J) -> the same, copied."""
+    """A copy: values of bands are their own coefficients. (..., J) -> (..., J)"""
     return np.array(coefficients)
 
 
 def matrix(num_bands: int) -> F32:
-    """(J, J) float32 identity."""
+    """The unit matrix, whose rows are the basis functions. (J, J) float32"""
     return np.eye(num_bands, dtype=np.float32)
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Components:
     """A mean and orthonormal vectors, the most important first.
@@ -32,7 +33,7 @@ class Components:
     vectors: F64
 
     def first(self, num: int) -> Components:
-        """With fewer vectors."""
+        """The same basis with only its first, most important vectors."""
         return Components(self.mean, self.vectors[:num])
 
     def analysis(self, curves: F64) -> F64:

@@ -17,6 +17,9 @@ F64 = NDArray[np.float64]
 
 TEXTURES = ("diffuse", "specular")
 
+Reflectances = tuple[tuple[float, ...], ...]
+"""Of each material, from `reflectances_of`."""
+
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 
 

@@ -76,7 +76,13 @@ def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """γ of one pair of directions; `kind` is an `Angle`, wo is multiplied by `Curve.axes` already."""
+    """γ of one pair of directions, in radians.
+
+    Args:
+        kind: an `Angle`, as its integer.
+        ix, iy, iz: light direction wi, local frame, unit. float32
+        ox, oy, oz: view direction wo, already multiplied by `Curve.axes`. float32
+    """
     if kind == THETA_I:
         return acos_clamped(iz)
     if kind == THETA_O:

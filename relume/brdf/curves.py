@@ -136,6 +136,8 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     """The displayed curve at exact angles instead of band averages; a curve given as bands is constant in each.
 
     Args:
+        term_document: a term of a complete look; its parameters and its drawn curves say what is displayed.
+        curve: which of the term's curves.
         gamma: radians in [0, π/2]. (...)
     Returns:
         (3, ...) float64, not negative

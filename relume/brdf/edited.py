@@ -43,7 +43,10 @@ def at_angles(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
     """Numbers of bands at exact angles: those of the band, so that averages hold; `smooth`, linear between middles.
 
     Args:
-        rows: (3, J). gamma: radians in [0, max_angle]. (...)
+        rows: a number for each band and channel. (3, J)
+        gamma: radians in [0, max_angle]. (...)
+        max_angle: where the last band ends, radians.
+        smooth: whether to go linearly from one band's middle to the next one's, instead of in steps.
     Returns:
         (3, ...) float64
     """

@@ -26,6 +26,7 @@ def angles_numpy(angle: Angle, wi: F64, wo: F64, axes: tuple[float, float, float
     `TILT_Y`: tan γ = tan θh |cos φh|, tan θh |sin φh|; `LOBE`: cos γ = Σ axes · wi · wo, axis by axis.
 
     Args:
+        angle: which of them.
         wi, wo: local frame, unit, z = normal. (..., 3)
         axes: of the curve, see `Curve.axes`.
     Returns:

@@ -21,6 +21,9 @@ ZERO, ONE, TWO, HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0
 def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
     """cos θh = n·h and cos θd = wo·h = |wi + wo| / 2, of unit directions above the horizon.
 
+    Args:
+        wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
+        wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
     Returns:
         (cos_theta_h, cos_theta_d); the latter at least MIN_COSINE, since opposite directions have no half vector.
     """
@@ -40,7 +43,7 @@ class LateUfunc:
         self.__doc__ = function.__doc__
 
     def __call__(self, *args: Any) -> Any:
-        """As the ufunc does."""
+        """Apply the ufunc, which the first call compiles or loads."""
         return (self._ufunc or self._made())(*args)
 
     def _made(self) -> Callable[..., Any]:
@@ -66,7 +69,12 @@ quotient_ufunc = quotient_ufunc_with(0)
 
 @quotient_ufunc
 def one_above(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
-    """One above the horizon: the quotient where the curves say it all."""
+    """One above the horizon: the quotient where the curves say it all.
+
+    Args:
+        wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
+        wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
+    """
     if wi_z <= ZERO or wo_z <= ZERO:
         return ZERO
     return ONE

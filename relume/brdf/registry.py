@@ -5,21 +5,21 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from relume.brdf.ashikhmin_shirley import ASHIKHMIN_SHIRLEY
-from relume.brdf.beard_maxwell import BEARD_MAXWELL
-from relume.brdf.blinn_phong import BLINN_PHONG
-from relume.brdf.cook_torrance import COOK_TORRANCE
-from relume.brdf.ggx import GGX
-from relume.brdf.lafortune import LAFORTUNE
-from relume.brdf.lambert import LAMBERT
-from relume.brdf.measured import MEASURED_HD, MEASURED_HF, MEASURED_LV
-from relume.brdf.oren_nayar import OREN_NAYAR
-from relume.brdf.phong import PHONG
-from relume.brdf.schlick import SCHLICK
 from relume.brdf.term import Curve, Term
-from relume.brdf.ward import WARD
-from relume.brdf.ward_anisotropic import WARD_ANISOTROPIC
-from relume.brdf.ward_duer import WARD_DUER
+from relume.brdf.terms.ashikhmin_shirley import ASHIKHMIN_SHIRLEY
+from relume.brdf.terms.beard_maxwell import BEARD_MAXWELL
+from relume.brdf.terms.blinn_phong import BLINN_PHONG
+from relume.brdf.terms.cook_torrance import COOK_TORRANCE
+from relume.brdf.terms.ggx import GGX
+from relume.brdf.terms.lafortune import LAFORTUNE
+from relume.brdf.terms.lambert import LAMBERT
+from relume.brdf.terms.measured import MEASURED_HD, MEASURED_HF, MEASURED_LV
+from relume.brdf.terms.oren_nayar import OREN_NAYAR
+from relume.brdf.terms.phong import PHONG
+from relume.brdf.terms.schlick import SCHLICK
+from relume.brdf.terms.ward import WARD
+from relume.brdf.terms.ward_anisotropic import WARD_ANISOTROPIC
+from relume.brdf.terms.ward_duer import WARD_DUER
 
 _ALL = (
     LAMBERT, OREN_NAYAR,

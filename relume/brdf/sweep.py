@@ -18,7 +18,15 @@ def moved_curves(term: Term, parameter: str) -> tuple[Curve, ...]:
 
 
 def slider_values(parameter: Parameter, num: int, *, between: bool = False) -> F64:
-    """Values at even steps of the slider, ends included; `between`, those in the middle of such steps. (num,)"""
+    """Values at even steps of a parameter's slider.
+
+    Args:
+        parameter: whose slider, with its range and scale.
+        num: how many values.
+        between: whether to take the middles of `num` steps instead of the ends of `num` − 1 steps.
+    Returns:
+        (num,) float64
+    """
     at = (np.arange(num) + 0.5) / num if between else np.linspace(0, 1, num)
     low, high = parameter.minimum, parameter.maximum
     if parameter.scale == "log":
@@ -27,7 +35,15 @@ def slider_values(parameter: Parameter, num: int, *, between: bool = False) -> F
 
 
 def bands_at(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
-    """Band averages of one curve, what `params` leaves out at its default. (J,)"""
+    """Band averages of one curve for given parameters.
+
+    Args:
+        term: whose curve, with the defaults of its parameters.
+        curve: one of `term.curves`.
+        params: values by the parameters' names; what is left out is at its default.
+    Returns:
+        (J,) float64
+    """
     settings = {name: params.get(name, term.parameter(name).default) for name in curve.parameters}
     about_pole = curve.angle.has_highlights
     return np.maximum(

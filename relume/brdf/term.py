@@ -102,7 +102,7 @@ class Term:
         settle: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
             defaults.
         num_channels: of the quotient, 1 or 3.
-        is_even: whether the quotient is one value above the horizon.
+        is_lambertian: whether the quotient is one value above the horizon.
         needs_data: whether documents must name a measured material, as `data`; it is fixed at freeze too.
     """
 
@@ -117,7 +117,7 @@ class Term:
     fixed: tuple[str, ...] = ()
     settle: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     num_channels: int = 1
-    is_even: bool = False
+    is_lambertian: bool = False
     needs_data: bool = False
 
     def fixed_values(self, document: Mapping[str, Any]) -> tuple[tuple[str, float | str], ...]:

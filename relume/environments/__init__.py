@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from relume.environments.asset_store import STORE, imported
 from relume.environments.built_in import BUILT_IN, built_in
-from relume.environments.shelf import SHELF, imported
-from relume.scene.model import Environment
+from relume.environments.model import Environment
 
 
 def is_known(name: str) -> bool:
     """Whether a look's `map` names an environment that is here."""
-    return name in BUILT_IN or SHELF.is_known(name)
+    return name in BUILT_IN or STORE.is_known(name)
 
 
 def known_names() -> list[str]:
-    """All that `map` may be."""
-    return [*BUILT_IN, *SHELF.known_names()]
+    """The names that a look's `map` may have."""
+    return [*BUILT_IN, *STORE.known_names()]
 
 
 def find(name: str) -> Environment:
-    """What a look's `map` names.
+    """The environment that a look's `map` names.
 
     Raises:
         NotFoundError: it is not here. SceneError: its files are damaged.

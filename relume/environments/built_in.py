@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
+from relume.environments.model import Environment
 from relume.environments.skies import clear_sky, overcast, sunset
 from relume.environments.studio import studio
-from relume.scene.model import Environment
 
 BUILT_IN: dict[str, tuple[str, Callable[[], Environment]]] = {
     "studio": ("Studio", studio),
@@ -19,7 +19,7 @@ BUILT_IN: dict[str, tuple[str, Callable[[], Environment]]] = {
 
 @lru_cache(maxsize=len(BUILT_IN))
 def built_in(name: str) -> Environment:
-    """One of them, made once."""
+    """The environment of that name in `BUILT_IN`, made once in a process. Raises KeyError for another name."""
     environment = BUILT_IN[name][1]()
     environment.radiance.flags.writeable = False
     return environment

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.environment import texel_directions, texel_solid_angles
-from relume.scene.model import Environment
+from relume.environments.equirect import texel_directions, texel_solid_angles
+from relume.environments.model import Environment
 
 F64 = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def overcast() -> Environment:
 
 
 def _sky(name: str, elevation: float, zenith: F64, horizon: F64, sun: tuple[float, ...], share: float) -> Environment:
-    """A clear sky.
+    """A clear sky: the law of Kittler, its colours, a sun and a ground.
 
     Args:
         elevation: of the sun, degrees. zenith, horizon: colours. (3,) each

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.environment import texel_directions
-from relume.scene.model import Environment
+from relume.environments.equirect import texel_directions
+from relume.environments.model import Environment
 
 F64 = NDArray[np.float64]
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.color import luminance
-from relume.imageio import png_bytes, to_bytes, tone_map
-from relume.replacing import Replacing
-from relume.shrink import shrink
+from relume.imageio import png_bytes, shrink, to_bytes, tone_map
+from relume.replacing import replacing
 
 WIDTH, HEIGHT = 192, 96
 _GREY = 0.18  # what the geometric mean becomes: a sun does not darken the rest
@@ -32,6 +31,6 @@ def thumbnail(radiance: NDArray[np.float32]) -> bytes:
 
 
 def write_thumbnail(path: Path, radiance: NDArray[np.float32]) -> None:
-    """The same as a file."""
-    with Replacing(path) as file:
-        file.write(thumbnail(radiance))
+    """Write the thumbnail as a PNG file, which appears whole or not at all."""
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(thumbnail(radiance))

@@ -24,7 +24,12 @@ _REC_709 = np.array([0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290])  # x a
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a picture comes from. scene, bake: ids."""
+    """Where a picture comes from.
+
+    Attributes:
+        scene, bake: ids.
+        scene_name: that people read.
+    """
 
     scene: str
     scene_name: str
@@ -37,7 +42,11 @@ def attributes_of(
     """Attributes of an OpenEXR file; those with a colon are ours, and but for plain text they hold JSON.
 
     Args:
+        origin: scene and bake that the picture was made from.
+        camera: of the view that is shown.
         size: width and height, in pixels.
+        look: that is shown, whole.
+        layers: of the file, besides the picture itself; what each holds is listed by its name.
     """
     environment = look.environment.map
     seen_from = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
@@ -70,9 +79,7 @@ def world_to_ndc(camera: Camera, size: tuple[int, int]) -> F64:
     """
     half_height = np.tan(camera.yfov / 2)
     half_width = half_height * size[0] / size[1]
-    project = np.array(
-        [[0.5 / half_width, 0, 0.5, 0], [0, -0.5 / half_height, 0.5, 0], [0, 0, 1.0, 0], [0, 0, 1.0, 0]]
-    )
+    project = np.array([[0.5 / half_width, 0, 0.5, 0], [0, -0.5 / half_height, 0.5, 0], [0, 0, 1.0, 0], [0, 0, 1.0, 0]])
     return np.asarray(world_to_camera(camera) @ project.T)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.exr.layers import Layer
-from relume.exr.writer import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
+from relume.imageio.exr import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
 from relume.look import Look
 
 Progress = Callable[[float], object]
@@ -30,7 +30,12 @@ def export_exr(
     """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
 
     Args:
-        progress: called with the share done.
+        path: of the file, which appears whole or not at all; parts are kept beside it until then.
+        render: makes the picture of a look, (height, width, 3 or 4), and is told whom to tell its progress.
+        look: of the picture itself. layers: named looks, whose pictures are layers of the file.
+        attributes: of the file, as `attributes_of` makes them.
+        precision: of the values.
+        progress: called with the share done, in [0, 1].
     Raises:
         RelumeError: the file cannot be written. What `render` raises; then there is no file.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.environment import lookup, texel_directions, texel_solid_angles
+from relume.environments.equirect import lookup, texel_directions, texel_solid_angles
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -23,7 +23,7 @@ _TEXELS_A_STEP = 1 << 20
 
 
 def blurred(radiance: F32, degrees: float) -> F32:
-    """An equirectangular map blurred, in as few texels as hold it; time and size are bounded by the map's.
+    """Blur an equirectangular map, into as few texels as hold the result; time and size are bounded by the map's.
 
     Args:
         radiance: from `reduced`. degrees: σ.
@@ -45,19 +45,19 @@ def blurred(radiance: F32, degrees: float) -> F32:
 
 
 def reduced(radiance: F32) -> F32:
-    """A map of at most `MOST_ROWS` rows: means over the solid angle of its texels."""
+    """Bring a map to at most `MOST_ROWS` rows, by means over solid angle. (height, width, 3) float32"""
     return np.asarray(_averaged(radiance, MOST_ROWS) if len(radiance) > MOST_ROWS else radiance, np.float32)
 
 
 def _weights(here: float, there: F64, width: int, sigma: float) -> F64:
-    """Of texels of rows at elevations `there`, by their azimuth from one at `here`. (rows, width)"""
+    """Weigh the texels of rows at elevations `there`, by their azimuth from one at `here`. (rows, width)"""
     azimuth = 2 * np.pi * np.arange(width) / width
     level = np.cos(here) * np.cos(there)[:, None] * np.cos(azimuth)
     return np.asarray(np.exp((np.sin(here) * np.sin(there)[:, None] + level - 1) / sigma**2))
 
 
 def _resampled(radiance: F32, rows: int) -> F64:
-    """The map in other texels: means where those are larger, else what is in their middle."""
+    """Sample a map at other texels: their means where they are larger, else what is in their middle."""
     if len(radiance) > rows:
         return _averaged(radiance, rows)
     at = texel_directions(rows, 2 * rows).reshape(-1, 3)
@@ -75,7 +75,7 @@ def _averaged(radiance: F32, rows: int) -> F64:
 
 
 def _means(values: NDArray[np.floating], measure: F64, new_measure: F64, *, axis: int) -> F64:
-    """Means of cells over fewer ones that cover the same. measure, new_measure: of each, along the axis"""
+    """Average cells over fewer ones that cover the same. measure, new_measure: length of each, along the axis"""
     tail = [1] * (values.ndim - 1)
     edges, new_edges = (np.concatenate([[0.0], np.cumsum(each)]) for each in (measure, new_measure))
     cells = np.moveaxis(values, axis, 0) * measure.reshape(-1, *tail)

@@ -20,8 +20,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.light.gather_rays import Pattern, make_pattern
 from relume.look import LightGeometry
-from relume.trace.gather_rays import Pattern, make_pattern
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -63,24 +63,24 @@ class LocalLight(NamedTuple):
 
 
 class Triangles(NamedTuple):
-    """Those of the surfaces that shine. corners: (T, 3, 3) float32. is_two_sided: to both sides."""
+    """Triangles that shine. corners: (T, 3, 3) float32. is_two_sided: whether they do to both sides."""
 
     corners: F32
     is_two_sided: bool
 
 
 def num_samples(geometry: LightGeometry, of_rectangle: int) -> int:
-    """How many samples a light has where a rectangle has so many."""
+    """Tell how many samples a light has where a rectangle has `of_rectangle`."""
     return _SHARES.get(geometry.kind, 0) * of_rectangle or 1
 
 
 def pattern_of(geometry: LightGeometry, of_rectangle: int) -> Pattern:
-    """The samples of a light."""
+    """Make the samples of a light. of_rectangle: how many a rectangle has"""
     return make_pattern(num_samples(geometry, of_rectangle), 0, _SEED)
 
 
 def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> LocalLight:
-    """A light of a look. triangles: of one of kind "mesh"; a surface without area gives no light."""
+    """Make a light of a look. triangles: those of a light of kind "mesh"; a surface without area gives no light."""
     is_rectangle = geometry.kind == "rectangle"
     corner, edges = _outline(geometry, triangles)
     across = np.cross(edges[:, 0], edges[:, 1])
@@ -105,12 +105,12 @@ def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> L
 
 
 def shadow_geometry(geometry: LightGeometry) -> LightGeometry:
-    """What the shadows of a light depend on: a spot has those of a point."""
+    """Reduce a light to what its shadows depend on: a spot has those of a point."""
     return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
 
 
 def _outline(geometry: LightGeometry, triangles: Triangles | None) -> tuple[F64, F64]:
-    """A corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
+    """Find a corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
     if geometry.kind == "rectangle":
         corner, edges = rectangle(geometry)
         return corner[None], edges[None]
@@ -119,7 +119,7 @@ def _outline(geometry: LightGeometry, triangles: Triangles | None) -> tuple[F64,
 
 
 def rectangle(geometry: LightGeometry) -> tuple[F64, F64]:
-    """A corner (3,) and the edges (2, 3), width and height, whose cross product points the way the rectangle faces."""
+    """Place a rectangle: a corner (3,) and its edges (2, 3), whose cross product points the way it faces; metres."""
     facing = _unit(geometry.direction)
     above = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _EDGE_ON else np.array([0.0, 0.0, 1.0])
     up = above - (above @ facing) * facing
@@ -143,7 +143,7 @@ def _unit(direction: tuple[float, float, float]) -> F64:
 
 
 def _cone(inner: float, outer: float) -> tuple[float, float]:
-    """Scale and offset of the falloff between two half-angles, degrees."""
+    """Compute scale and offset of the falloff between two half-angles, degrees."""
     cos_outer = math.cos(math.radians(outer))
     scale = 1 / max(_SHARPEST_CONE, math.cos(math.radians(inner)) - cos_outer)
     return scale, -cos_outer * scale
@@ -152,8 +152,11 @@ def _cone(inner: float, outer: float) -> tuple[float, float]:
 # inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
 @nb.njit(nogil=True, cache=True, inline="always")
 def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
-    """A sample of a light as a point sees it.
+    """Find a sample of a light as a point sees it.
 
+    Args:
+        light: a `LocalLight`. pattern: its samples, from `pattern_of`. sample: which of them.
+        shift_u, shift_v: the point's shift of the pattern, from `shift_of`. px, py, pz: the point, metres.
     Returns:
         Unit direction towards it (three), distance, w, and the normal of its surface on the point's side (three; zeros
         where it has none).

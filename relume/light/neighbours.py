@@ -12,7 +12,7 @@ _FEW = 8  # up to here all are neighbours of all
 
 
 class Neighbours(NamedTuple):
-    """Neighbours of light m: `beside[first[m]:first[m + 1]]`, ascending, never m itself.
+    """The neighbours of light m are `beside[first[m]:first[m + 1]]`, ascending, never m itself.
 
     Attributes:
         first: (num_lights + 1,) int32. beside: (sum of all their numbers,) int32
@@ -23,7 +23,7 @@ class Neighbours(NamedTuple):
 
 
 def neighbours_of(directions: NDArray[np.float32]) -> Neighbours:
-    """Neighbours in the Delaunay triangulation of the sphere, which is the convex hull of the directions.
+    """Find neighbours in the Delaunay triangulation of the sphere, which is the convex hull of the directions.
 
     A direction that coincides with another is the neighbour of that one alone.
 

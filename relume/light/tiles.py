@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
+from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.errors import PlanError
-from relume.light.environment import texel_directions, texel_solid_angles
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -40,7 +40,7 @@ _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 
 
 def unit(v: F64) -> F64:
-    """Vectors of length one, along the last axis."""
+    """Scale vectors to length one, along the last axis."""
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
 
 
@@ -55,7 +55,7 @@ class Tiles:
     codes: NDArray[np.uint64]
 
     def is_whole(self) -> bool:
-        """Whether they are leaves of a hierarchy, and cover the sphere once."""
+        """Tell whether they are leaves of a hierarchy, and cover the sphere once."""
         codes = set(map(int, self.codes))
         bits = [code.bit_length() for code in codes]
         if len(codes) != len(self.codes) or any(n % 2 or not 4 <= n <= 4 + 2 * MAX_DEPTH for n in bits):
@@ -65,16 +65,16 @@ class Tiles:
 
     @cached_property
     def corners(self) -> F64:
-        """Unit corners of each, counter-clockwise seen from outside. (M, 3, 3)"""
+        """The unit corners of each tile, counter-clockwise seen from outside. (M, 3, 3)"""
         return _corners(self.codes)
 
     @cached_property
     def centroids(self) -> F64:
-        """Unit direction to the middle of each. (M, 3)"""
+        """The unit direction to the middle of each tile. (M, 3)"""
         return unit(self.corners.mean(axis=1))
 
     def locate(self, directions: F64) -> NDArray[np.int32]:
-        """The tile that each direction (n, 3) lies in; one on an edge has exactly one. (n,)"""
+        """Find the tile that each direction (n, 3) lies in; a direction on an edge has exactly one. (n,) int32"""
         edges, children = self._tree
         found = np.empty(len(directions), np.int32)
         for_shares(lambda start, stop: _locate(directions, edges, children, start, stop, found), len(directions))
@@ -82,7 +82,7 @@ class Tiles:
 
     @cached_property
     def _tree(self) -> tuple[F64, NDArray[np.int32]]:
-        """Of each inner node: the normals of its middle child's edges (N, 3, 3), and its children (N, 4).
+        """The normals of the edges of each inner node's middle child (N, 3, 3), and its children (N, 4).
 
         The first eight nodes are the octants. A child below zero is tile −1 − child.
         """
@@ -101,7 +101,7 @@ class Tiles:
 
 
 def _corners(codes: NDArray[np.uint64]) -> F64:
-    """Corners of n nodes of the hierarchy. (n, 3, 3)"""
+    """Find the corners of n nodes of the hierarchy. (n, 3, 3)"""
     levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, codes)], np.uint64)
     corners = np.asarray(_OCTAHEDRON[_OCTANTS[(codes >> 2 * levels) - 8]], np.float64)
     for level in range(int(levels.max(initial=0))):
@@ -112,25 +112,25 @@ def _corners(codes: NDArray[np.uint64]) -> F64:
 
 
 def _children(corners: F64) -> F64:
-    """Corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
+    """Find the corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
     six = np.concatenate([corners, _middles(corners)], axis=1)
     return np.asarray(six[:, _CHILDREN], np.float64)
 
 
 def _middles(corners: F64) -> F64:
-    """Directions to the middles of the edges ab, bc, ca of triangles (n, 3, 3). (n, 3, 3)"""
+    """Find the directions to the middles of the edges ab, bc, ca of triangles (n, 3, 3). (n, 3, 3)"""
     return unit(corners + corners[:, (1, 2, 0)])
 
 
 def _middle_edges(corners: F64) -> F64:
-    """Normals of the edges of triangles' middle children, each towards the corner that it cuts off. (n, 3, 3)"""
+    """Find the normals of the edges of middle children, each towards the corner that it cuts off. (n, 3, 3)"""
     middles = _middles(corners)
     return np.cross(middles, middles[:, (2, 0, 1)])
 
 
 @nb.njit(nogil=True, cache=True)
 def _child(d, edges):  # type: ignore[no-untyped-def]
-    """Which of four children a direction lies in: 0, 1, 2 at the corners, 3 in the middle.
+    """Tell which of four children a direction lies in: 0, 1, 2 at the corners, 3 in the middle.
 
     The middle child's three edges decide: outside edge k means child k. Every direction gets exactly one child, also
     where rounding puts it on an edge.
@@ -199,6 +199,7 @@ def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> T
 
     Args:
         radiance: equirectangular, top row first. (height, width, 3) float32
+        num_lights: in [8, 65536].
         relightable: the environment will be turned or exchanged: divide rings about +Y evenly, by their mean light.
     Raises:
         PlanError: `num_lights` outside [8, 65536].

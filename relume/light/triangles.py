@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.environment import texel_directions, texel_solid_angles, turned
+from relume.environments.equirect import texel_directions, texel_solid_angles, turned
 from relume.light.tiles import Tiles, choose_tiles, unit
 
 F32 = NDArray[np.float32]
@@ -33,31 +33,31 @@ class TriangleLights:
     Attributes:
         nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32
         direction: mean direction of the light; shadow rays go there. (M, 3) float32
-        power: radiance integrated over the tile, per colour. (M, 3) float32
+        irradiance: ∫ L dω over the tile, what the light brings to a surface across its way; per channel. (M, 3) float32
     """
 
     nodes: F32
     direction: F32
-    power: F32
+    irradiance: F32
 
     @property
     def num_lights(self) -> int:
-        """M."""
+        """Their number M."""
         return int(self.nodes.shape[2])
 
     def none(self) -> TriangleLights:
-        """None of them: no light comes from the environment itself."""
-        return TriangleLights(self.nodes[:, :, :0], self.direction[:0], self.power[:0])
+        """Keep none of them, as where no light comes from the environment itself."""
+        return TriangleLights(self.nodes[:, :, :0], self.direction[:0], self.irradiance[:0])
 
     @cached_property
     def radius(self) -> F32:
-        """Angle within which of its direction all of a light lies: that to its farthest corner, radians. (M,)"""
+        """The angle from each light's direction to its farthest corner, within which all of it lies; radians. (M,)"""
         chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
 
 
 def _sums(place: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
-    """Sums of the values (n,) that have the same place (n,), in [0, num). (num,)"""
+    """Sum the values (n,) that have the same place (n,), in [0, num). (num,)"""
     return np.asarray(np.bincount(place, values, num), np.float64)
 
 
@@ -76,32 +76,32 @@ class _Texels:
     solid_angles: F64
 
     def sums(self, values: F64, num_tiles: int) -> F64:
-        """Sums of values (n,) over the texels of each tile. (M,)"""
+        """Sum values (n,) over the texels of each tile. (M,)"""
         return _sums(self.tile, values, num_tiles)
 
 
 def _tangent_frames(normals: F64) -> F64:
-    """For each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
+    """Find for each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
     aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     first = unit(np.cross(normals, aside))
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
 def _on_tangent_plane(directions: F64, normals: F64, frames: F64) -> F64:
-    """Gnomonic projection of directions (n, 3), each onto the plane that touches the sphere at its normal. (n, 2)"""
+    """Project directions (n, 3) gnomonically, each onto the plane that touches the sphere at its normal. (n, 2)"""
     height = np.einsum("ni,ni->n", directions, normals)
     return np.asarray(np.einsum("ni,nki->nk", directions, frames) / height[:, None])
 
 
 def _power_of(moments: F64, exponent: float) -> F64:
-    """Symmetric positive 2 × 2 matrices (M, 2, 2) to a power; a vanishing extent is held above rounding."""
+    """Raise symmetric positive matrices (M, 2, 2) to a power; a vanishing extent is held above rounding."""
     values, vectors = np.linalg.eigh(moments)
     powers = np.maximum(values, 1e-14) ** exponent
     return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
 
 
 def _matched(corners: F64, texels: _Texels) -> tuple[F64, F64]:
-    """The triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
+    """Find the triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
 
     Args:
         corners: of the tiles. (M, 3, 3)
@@ -125,7 +125,7 @@ def _matched(corners: F64, texels: _Texels) -> tuple[F64, F64]:
 
 
 def _moments(texels: _Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
-    """First (F, 2) and second central (F, 2, 2) moments of the light of some tiles in the planes that touch at `mean`.
+    """Compute first (F, 2) and second central (F, 2, 2) moments of tiles' light in the planes that touch at `mean`.
 
     Args:
         total: luminous light of all tiles. (M,) mean: its directions. (M, 3) fitted: the tiles in question. (F,)
@@ -148,15 +148,16 @@ def _moments(texels: _Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -
 
 
 def nodes_of(corners: F64) -> F32:
-    """Corners (M, 3, 3) and the midpoints of their edges as kernels read them. (3 axes, 6, M) float32"""
+    """Lay out corners (M, 3, 3) and the midpoints of their edges as kernels read them. (3 axes, 6, M) float32"""
     nodes = np.concatenate([corners, unit(corners + np.roll(corners, -1, axis=1))], axis=1)
     return np.ascontiguousarray(nodes.transpose(2, 1, 0), np.float32)
 
 
 def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
-    """The light of an environment in each tile; the environment need not be the one the tiles were chosen for.
+    """Weigh the light of an environment in each tile; it need not be the one that the tiles were chosen for.
 
     Args:
+        tiles: M tiles of the sphere.
         radiance: equirectangular, top row first. (height, width, 3) float32
         rotation: of the environment about +Y, degrees, counter-clockwise seen from above.
     Cost: O(texels · depth) time.
@@ -167,9 +168,9 @@ def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
     light = radiance.reshape(-1, 3).astype(np.float64) * solid_angles[:, None]
     luminous = luminance(light.astype(np.float32)).astype(np.float64)
     texels = _Texels(tiles.locate(directions), luminous, directions, solid_angles)
-    power = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
+    irradiance = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
     corners, mean = _matched(tiles.corners, texels)
-    return TriangleLights(nodes_of(corners), mean.astype(np.float32), power.astype(np.float32))
+    return TriangleLights(nodes_of(corners), mean.astype(np.float32), irradiance.astype(np.float32))
 
 
 def subdivide(radiance: F32, num_lights: int) -> TriangleLights:

@@ -6,21 +6,28 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 from relume import environments
+from relume.brdf.document import complete_term
+from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.errors import ParameterError
-from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.look.lights import MAX_SCALE, complete_lights, default_lights
 from relume.look.model import Backdrop, Look, Show, ToneMap
-from relume.look.terms import complete_term
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
-MAX_EXPOSURE = 20.0
 MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
-SHARPEST_BLUR, STRONGEST_BLUR = 2.0, 60.0  # degrees
+RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number of a field; degrees, stops
+    "environment": {"scale": (0.0, MAX_SCALE), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
+    "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
+    "transport": {"bounces": (0, MAX_BOUNCES)},
+    "display": {"exposure": (-20.0, 20.0)},
+}
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "environment": {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+    "background": {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0},
+    "transport": {"show": "all", "bounces": MAX_BOUNCES},
+    "display": {"exposure": 0.0, "tone_map": "agx"},
+}
 _SECTIONS = tuple(Look.model_fields)
-_DEFAULT_ENVIRONMENT: dict[str, Any] = {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
-_DEFAULT_BACKGROUND: dict[str, Any] = {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0}
-_DEFAULT_TRANSPORT: dict[str, Any] = {"show": "all", "bounces": MAX_BOUNCES}
 
 
 def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Light] = ()) -> dict[str, Any]:
@@ -37,11 +44,11 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
             }
             for material in scene_materials
         },
-        "environment": dict(_DEFAULT_ENVIRONMENT),
-        "background": dict(_DEFAULT_BACKGROUND),
+        "environment": dict(DEFAULTS["environment"]),
+        "background": dict(DEFAULTS["background"]),
         "lights": default_lights(scene_lights, [material.name for material in scene_materials]),
-        "transport": dict(_DEFAULT_TRANSPORT),
-        "display": {"exposure": 0.0, "tone_map": "agx"},
+        "transport": dict(DEFAULTS["transport"]),
+        "display": dict(DEFAULTS["display"]),
     }
 
 
@@ -62,10 +69,16 @@ def validate(document: Mapping[str, Any], default: Mapping[str, Any]) -> Look:
 
 
 def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
-    """`complete`, checking only what is not, as an object, part of the `known` valid document: an edit changes little.
+    """`complete`, checking only what an edit changed, which is little.
 
+    Args:
+        partial: the look after an edit; anything.
+        default: the complete look of the scene that nobody has edited.
+        known: a valid document; what is part of it, as an object, is not checked again.
     Returns:
         A document that shares with `known` all that did not change.
+    Raises:
+        ParameterError: as `complete` does.
     """
     check_object((), partial, _SECTIONS)
     return {
@@ -106,12 +119,13 @@ def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[
 
 
 def _complete_environment(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
-    merged = _merged(("environment",), given, {**_DEFAULT_ENVIRONMENT, **default})  # older stores name no map
+    merged = _merged(("environment",), given, {**DEFAULTS["environment"], **default})  # older stores name no map
     if merged["map"] != known.get("map"):
         _check_map(("environment", "map"), merged["map"])
-    check_number(("environment", "scale"), merged["scale"], 0.0, MAX_SCALE)
-    check_triple(("environment", "color"), merged["color"], 0.0, MAX_COLOR)
-    check_number(("environment", "rotation"), merged["rotation"], -360.0, 360.0)
+    ranges = RANGES["environment"]
+    check_number(("environment", "scale"), merged["scale"], *ranges["scale"])
+    check_triple(("environment", "color"), merged["color"], *ranges["color"])
+    check_number(("environment", "rotation"), merged["rotation"], *ranges["rotation"])
     return merged
 
 
@@ -123,17 +137,17 @@ def _check_map(pointer: Pointer, name: Any) -> None:
 
 def _complete_background(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("background",)
-    merged = _merged(pointer, given, {**_DEFAULT_BACKGROUND, **default})  # older stores know of no background
+    merged = _merged(pointer, given, {**DEFAULTS["background"], **default})  # older stores know of no background
     if merged["kind"] not in get_args(Backdrop):
         raise fail((*pointer, "kind"), merged["kind"], f"one of {names_text(get_args(Backdrop))}")
-    check_triple((*pointer, "color"), merged["color"], 0.0, MAX_COLOR)
-    check_number((*pointer, "blur"), merged["blur"], SHARPEST_BLUR, STRONGEST_BLUR)
+    check_triple((*pointer, "color"), merged["color"], *RANGES["background"]["color"])
+    check_number((*pointer, "blur"), merged["blur"], *RANGES["background"]["blur"])
     return merged
 
 
 def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("transport",)
-    merged = _merged(pointer, given, {**_DEFAULT_TRANSPORT, **default})  # older stores know of no transport
+    merged = _merged(pointer, given, {**DEFAULTS["transport"], **default})  # older stores know of no transport
     if merged["show"] not in get_args(Show):
         raise fail((*pointer, "show"), merged["show"], f"one of {names_text(get_args(Show))}")
     bounces = merged["bounces"]
@@ -144,7 +158,7 @@ def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any
 
 def _complete_display(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     merged = _merged(("display",), given, default)
-    check_number(("display", "exposure"), merged["exposure"], -MAX_EXPOSURE, MAX_EXPOSURE)
+    check_number(("display", "exposure"), merged["exposure"], *RANGES["display"]["exposure"])
     if merged["tone_map"] not in get_args(ToneMap):
         raise fail(("display", "tone_map"), merged["tone_map"], f"one of {names_text(get_args(ToneMap))}")
     return merged

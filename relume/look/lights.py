@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
-from relume.look.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
+from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.look.model import LightKind
-from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
+from relume.scene.checks import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METRES
 from relume.scene.model import Light
 
 MAX_SCALE = 1e4
-MAX_EMISSION = 1e6
-MAX_METRES = 1e6
 SHORTEST_DIRECTION = 1e-6  # of its longest component
-SMALLEST_SIZE, LARGEST_SIZE = 1e-4, 1e4  # metres
+LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number of a field; metres, degrees
+    "scale": (0.0, MAX_SCALE),
+    "color": (0.0, MAX_COLOR),
+    "emission": (0.0, MAX_EMISSION),
+    "position": (-MAX_METRES, MAX_METRES),
+    "direction": (-MAX_METRES, MAX_METRES),
+    "rotation": (-360.0, 360.0),
+    "size": (1e-4, 1e4),
+    "cone": (0.0, 90.0),
+}
 
 _WHITE = (1.0, 1.0, 1.0)
 _OF_ALL: dict[str, Any] = {"scale": 1.0, "color": list(_WHITE), "on": True, "emission": list(_WHITE)}
@@ -38,7 +45,7 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
         kind = light.fields.get("kind")
         if not isinstance(kind, str) or kind not in _OF_KIND:
             raise fail((*pointer, "kind"), kind, f"one of {names_text(_OF_KIND)}")
-        completed[light.name] = _merged(pointer, light.fields, _fresh(kind))
+        completed[light.name] = _merged(pointer, light.fields, default_light(kind))
         if kind == "mesh" and completed[light.name]["material"] not in material_names:
             raise fail((*pointer, "material"), completed[light.name]["material"], names_text(material_names))
     return completed
@@ -80,10 +87,11 @@ def _start(pointer: Pointer, given: Mapping[str, Any], default: Mapping[str, Any
         raise fail((*pointer, "kind"), kind, "'mesh': these surfaces shine; add a light of another name")
     if kind not in _ADDABLE:
         raise fail((*pointer, "kind"), kind, f"one of {names_text(_ADDABLE)}")
-    return _fresh(kind)
+    return default_light(kind)
 
 
-def _fresh(kind: str) -> dict[str, Any]:
+def default_light(kind: str) -> dict[str, Any]:
+    """A light of a kind with all that nobody has said of it, complete."""
     return {"kind": kind, **_OF_ALL, **_OF_KIND[kind]}
 
 
@@ -97,27 +105,21 @@ def _merged(pointer: Pointer, given: Mapping[str, Any], start: Mapping[str, Any]
 
 def _check_field(pointer: Pointer, field: str, value: Any, start: Mapping[str, Any]) -> None:
     match field:
-        case "scale":
-            check_number(pointer, value, 0.0, MAX_SCALE)
-        case "color":
-            check_triple(pointer, value, 0.0, MAX_COLOR)
-        case "emission":
-            check_triple(pointer, value, 0.0, MAX_EMISSION)
+        case "scale" | "rotation":
+            check_number(pointer, value, *LIGHT_RANGES[field])
+        case "color" | "emission" | "position":
+            check_triple(pointer, value, *LIGHT_RANGES[field])
         case "on":
             if not isinstance(value, bool):
                 raise fail(pointer, value, "true or false")
-        case "position":
-            check_triple(pointer, value, -MAX_METRES, MAX_METRES)
         case "direction":
-            check_triple(pointer, value, -MAX_METRES, MAX_METRES)
+            check_triple(pointer, value, *LIGHT_RANGES[field])
             if max(map(abs, value)) < SHORTEST_DIRECTION:
                 raise fail(pointer, list(value), "three numbers that are not all zero")
-        case "rotation":
-            check_number(pointer, value, -360.0, 360.0)
         case "size":
-            _check_pair(pointer, value, SMALLEST_SIZE, LARGEST_SIZE)
+            _check_pair(pointer, value, *LIGHT_RANGES[field])
         case "cone":
-            _check_pair(pointer, value, 0.0, 90.0)
+            _check_pair(pointer, value, *LIGHT_RANGES[field])
             if not (value[0] <= value[1] and value[1] > 0):
                 raise fail(pointer, f"{value[0]:g} and {value[1]:g}", "inner ≤ outer, and outer above 0")
         case "material":

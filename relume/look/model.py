@@ -81,7 +81,7 @@ class EnvironmentLook(_Frozen):
 
     @property
     def key(self) -> EnvironmentKey:
-        """Which light it is."""
+        """The part that tells which environment it is, whatever its brightness."""
         return EnvironmentKey(self.map, self.rotation % 360)
 
     @property
@@ -121,7 +121,7 @@ class _LightLook(_Frozen):
 
     @property
     def geometry(self) -> LightGeometry:
-        """All the rest."""
+        """Everything but brightness and colour: where it is, which way it shines, and its shape."""
         return LightGeometry(**{name: value for name, value in vars(self).items() if name in LightGeometry._fields})
 
 
@@ -173,10 +173,10 @@ LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | M
 
 
 class Paths(NamedTuple):
-    """Which light paths a picture shows: light reaches a surface straight from a light, or by way of other surfaces.
+    """Which light paths a picture shows: light reaches a surface directly from a light, or by way of other surfaces.
 
     Attributes:
-        direct: whether straight ones count.
+        direct: whether direct ones count.
         first, last: how many surfaces the others have on their way; none of them counts where last < first.
     """
 
@@ -190,11 +190,11 @@ class Paths(NamedTuple):
         return self.last >= self.first
 
     def without_reflections(self) -> Paths:
-        """The straight ones of them."""
+        """Only those of these paths that reach a surface straight from a light."""
         return Paths(self.direct, 1, 0)
 
-    def without_straight(self) -> Paths:
-        """The others."""
+    def without_direct(self) -> Paths:
+        """Only those of these paths that go by way of other surfaces."""
         return self._replace(direct=False)
 
 
@@ -207,7 +207,7 @@ class TransportLook(_Frozen):
 
     @property
     def paths(self) -> Paths:
-        """The same as numbers; equal wherever the picture is."""
+        """The paths as numbers, which are equal wherever the pictures are."""
         first = 2 if self.show == "further_bounces" else 1
         most = {"direct": 0, "first_bounce": 1}.get(self.show, self.bounces)
         paths = Paths(self.show in ("all", "direct"), first, min(most, self.bounces))

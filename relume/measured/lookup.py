@@ -121,16 +121,18 @@ def _quotients(part, table, curves, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z, out):  #
 
 
 def quotients(part: Part, table: F32, curves: F64, *directions: NDArray[np.floating]) -> NDArray[np.floating]:
-    """What is left of a measured BRDF.
+    """What is left of a measured BRDF when a product of curves is divided out.
 
     With M the measured value, G = g(θi) g'(θo), and the curves' rows being θi, θh, θd, θo: `WHOLE` M; `DIFFUSE`
     min(M, G)/G; `SPECULAR` (M − min(M, G))/(f(θh) f'(θd)); `HOMOMORPHIC` M/(G f(θh)).
 
     Args:
-        table: of `table_of`. curves: at their knots, above zero. (4, 3, 90)
+        part: which of these.
+        table: the material, as `table_of` returns it. (90, 90, 180, 3)
+        curves: at their knots, above zero. (4, 3, 90)
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
-        (3, ...) of the directions' type; zero at and below the horizon.
+        1/sr, no cosine. (3, ...) of the directions' type; zero at and below the horizon.
     """
     spread = np.broadcast_arrays(*directions)
     ix, iy, iz, ox, oy, oz = (np.ascontiguousarray(axis).ravel() for axis in spread)
@@ -143,6 +145,7 @@ def measured_brdf(table: F32, wi: F64, wo: F64) -> F64:
     """The measured BRDF, 1/sr, no cosine.
 
     Args:
+        table: the material, as `table_of` returns it. (90, 90, 180, 3)
         wi, wo: local frame, unit, z = normal; they broadcast. (..., 3)
     Returns:
         (..., 3) float64; zero at and below the horizon.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import MaterialError
-from relume.replacing import Replacing
+from relume.replacing import replacing
 
 F64 = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def read_merl(path: Path) -> F64:
 
 def write_merl(path: Path, planes: F64) -> None:
     """Write what `read_merl` reads, bit for bit; the file takes its name when it is complete."""
-    with Replacing(path) as file:
+    with replacing(path) as unfinished, unfinished.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))
         file.write(np.ascontiguousarray(planes, "<f8").data)
 

@@ -10,26 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume import environments
+from relume.bake import Recipe
+from relume.environments.equirect import lookup, turned
+from relume.environments.model import Environment
 from relume.errors import CancelledError
-from relume.light.environment import lookup, turned
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
+from relume.methods.direct import DirectMethod
 from relume.reference.indirect import reference_indirect
 from relume.reference.local import LocalLamp, emission_of, lamps_of
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels, texels_of
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, ViewSamples, sample_view
-from relume.transfer.base import Recipe
-from relume.transfer.direct import DirectMethod
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _SPP_A_PATH = 16  # texels drawn for every place on a path
 _POINTS_A_BLOCK = 4096
-_STRAIGHT_SHARE = 0.2  # of the time, where there are other paths
+_DIRECT_SHARE = 0.2  # of the time, where there are other paths
 
 
 def reference_image(
@@ -64,14 +65,14 @@ def reference_image(
     DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
     shot = _shoot(scene, view, look, size)
     paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
-    straight = _STRAIGHT_SHARE if paths.reflect else 1.0
+    direct = _DIRECT_SHARE if paths.reflect else 1.0
     draw = _Draw(spp, pass_index, cancelled)
     radiance = np.zeros((len(shot.samples.pixel), 3))
     if paths.direct:
-        _add_straight(radiance, shot, draw, lambda share: progress(straight * share))
+        _add_direct(radiance, shot, draw, lambda share: progress(direct * share))
         _add_background(radiance, shot)
     if paths.reflect:
-        _add_reflected(radiance, shot, paths, draw, lambda share: progress(straight + (1 - straight) * share))
+        _add_reflected(radiance, shot, paths, draw, lambda share: progress(direct + (1 - direct) * share))
     return _resolve(shot.samples, radiance, size)
 
 
@@ -126,8 +127,8 @@ def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
     )  # fmt: skip
 
 
-def _add_straight(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[float], object]) -> None:
-    """Add light that comes straight from lights, and that of surfaces which shine themselves."""
+def _add_direct(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[float], object]) -> None:
+    """Add light that comes directly from lights, and that of surfaces which shine themselves."""
     num_samples = max(1, shot.on_surface.stop)
     for number, material in enumerate(shot.scene.materials):
         rows = shot.rows(number)
@@ -148,7 +149,7 @@ def _add_straight(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[f
 def _add_background(radiance: F64, shot: _Shot) -> None:
     """Add the environment where there is no surface."""
     environment, outside = shot.look.environment, shot.samples.material == BACKGROUND
-    towards = turned(shot.samples.surface.position[outside].astype(np.float64), -environment.rotation)
+    towards = turned(shot.samples.surface.points.position[outside].astype(np.float64), -environment.rotation)
     radiance[outside] += np.array(environment.gain) * lookup(shot.light.radiance, towards.astype(np.float32))
 
 
@@ -170,11 +171,11 @@ def _add_reflected(radiance: F64, shot: _Shot, paths: Paths, draw: _Draw, progre
 
 def points_of(samples: ViewSamples, eye: F64) -> Points:
     """View samples as points; those of the background have no surface and are not meant."""
-    surface = samples.surface
-    towards = eye - surface.position
+    surface, points = samples.surface, samples.surface.points
+    towards = eye - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    return Points(surface.position, surface.normal, surface.tangent, wo, textures)
+    return Points(points.position, points.normal, points.tangent, wo, textures)
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:

@@ -51,9 +51,13 @@ def reference_indirect(
     """Radiance of points by light that surfaces have reflected onto them, `first_bounce` to `num_bounces` times.
 
     Args:
+        scene: its materials and lamps.
+        geometry: of the scene, that paths and shadow rays are traced in.
         texels: of the environment, its gain in the look included.
-        points: seen from one direction each. material: index into the scene's materials. (n,)
+        look: terms and lights as they are shown.
+        points: n of them, seen from one direction each. material: index into the scene's materials. (n,)
         num_paths: for each point. spp: texels drawn for each place that a path visits.
+        seed: of the paths; other seeds are independent of this one.
     Returns:
         The mean over paths and its variance. (2, n, 3) float64
     Cost: O(n · num_paths · num_bounces · spp) shadow rays.
@@ -107,7 +111,7 @@ def _places(
     some = Hits(hits.face[hit], hits.uv[hit], hits.distance[hit])
     surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    points = Points(surface.position, surface.normal, surface.tangent, -directions[hit], textures)
+    points = Points(*surface.points[:3], -directions[hit], textures)
     return points, geometry.face_material[some.face]
 
 

@@ -92,6 +92,9 @@ def add_lights(kinds, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy,
         tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
         is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
         is_gray: the curve is the same in all channels. (C,) bool
+        light: rows of `power` of the first `num` lights that are listed. (≥ num,) int64
+        wi: directions towards these lights, local frame, unit. (3, ≥ num) float64
+        ox, oy, oz: the direction towards the viewer, local frame, unit.
         shading: quotient · cos θi, one for all channels or three. (1 or 3, ≥ num) float64. power: (m, 3) float64
     """
     blue_row = shading.shape[0] - 1

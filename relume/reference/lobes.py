@@ -38,7 +38,15 @@ class Lobe:
     density: F64
 
     def draw(self, wo: F64, num: int, rng: np.random.Generator) -> F64:
-        """`num` directions for each wo (n, 3), some of them below the horizon. (n, num, 3)"""
+        """Directions about a lobe, some of them below the horizon.
+
+        Args:
+            wo: towards the viewer, local frame, unit. (n, 3) float64
+            num: directions for each `wo`, stratified over the lobe.
+            rng: where they are drawn from.
+        Returns:
+            Towards the light, local frame, unit. (n, num, 3) float64
+        """
         strata = (np.arange(num) + rng.random((len(wo), num))) / num
         step = np.minimum(np.searchsorted(self.share, strata, side="right") - 1, len(self.density) - 1)
         low, high = (np.cos(edge * 0.5 * np.pi / len(self.density)) for edge in (step, step + 1))
@@ -78,9 +86,10 @@ def cosine_lobe(steps: int = 1024) -> Lobe:
 
 
 def lobe_of(angle: Angle, axes: tuple[float, float, float], values: F64) -> Lobe | None:
-    """That of a curve; None where it turns with no direction that has a lobe, or is nothing.
+    """The lobe of a curve; None where it turns with no direction that has a lobe, or is nothing.
 
     Args:
+        angle: that the curve is a function of.
         axes: of the curve. values: at equal steps over [0, π/2], the mean of the channels. (steps + 1,)
     """
     between = 0.5 * (values[1:] + values[:-1])

@@ -42,7 +42,14 @@ class LocalLamp:
     is_two_sided: bool
 
     def arriving(self, geometry: Geometry, position: F64, num: int, rng: np.random.Generator) -> Arriving:
-        """Its light at points (n, 3), by `num` places of its surface for each, or by the one place that it has."""
+        """Light that arrives at points from places of the lamp's surface, or from the one place that it has.
+
+        Args:
+            geometry: in which shadow rays are traced.
+            position: of the points, metres. (n, 3) float64
+            num: places that are drawn for each point.
+            rng: where they are drawn from.
+        """
         away, factor = self._towards(position, num, rng)
         distance = np.linalg.norm(away, axis=2)
         direction = away / distance[..., None]
@@ -96,7 +103,15 @@ def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
 
 
 def free_distance(geometry: Geometry, start: F32, direction: F32) -> F32:
-    """How far rays from points fly, infinite where nothing is hit. start, direction: (n, 3). Returns: (n,) float32"""
+    """How far rays fly until they hit anything.
+
+    Args:
+        geometry: that is traced.
+        start: origins, metres. (n, 3) float32
+        direction: unit vectors. (n, 3) float32
+    Returns:
+        Metres, infinite where nothing is hit. (n,) float32
+    """
     some = (slice(k, k + _RAYS_AT_ONCE) for k in range(0, len(direction), _RAYS_AT_ONCE))
     return np.concatenate([trace_from(geometry.embree, start[rows], direction[rows]).distance for rows in some])
 

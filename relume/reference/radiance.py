@@ -114,10 +114,16 @@ def reference_radiance(
     """Radiance of all points under several materials, which share their shadow rays.
 
     Args:
+        geometry: in which shadow rays are traced.
+        texels: of the environment, with their radiance and solid angles.
+        points: n of them, seen from one direction each.
         materials: of each its terms, as they stand in a complete look.
         spp: texels drawn by power for each point, with some directions more by how the materials reflect, and places
             drawn of each lamp that has an extent; 0, or as many as there are, for the middles of all texels.
+        progress: called with the share of the points that are done, in [0, 1].
+        cancelled: asked between packets of points.
         pass_index: passes with other indices draw independently.
+        lamps: local lights, which are added.
     Returns:
         (materials, n, 3) float64
     Raises:

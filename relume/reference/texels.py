@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.environment import direction_to_uv, texel_solid_angles, turned, uv_to_direction
-from relume.scene.model import Environment
+from relume.environments.equirect import direction_to_uv, texel_solid_angles, turned, uv_to_direction
+from relume.environments.model import Environment
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -115,13 +115,26 @@ def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
     return figures, differs
 
 
+def error_squared(frame: NDArray[np.floating], passes: F32) -> tuple[float, float]:
+    """The mean square of a frame's error, noise of the passes taken off, and its standard deviation.
+
+    Args:
+        frame: (height, width, 3). passes: independent noisy pictures of the truth. (passes, height, width, 3)
+    Returns:
+        Both in the frame's unit squared; the first may be negative where there is more noise than error.
+    """
+    return _error_squared(_gram(frame, passes))
+
+
 def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8]:
     """Where the frame is too bright (orange) or too dark (blue), in full colour from a quarter of a stop on.
 
     Args:
-        differs: as `compare` has found it; all other pixels are grey.
+        frame: linear radiance. (height, width, 3)
+        estimate: of the truth, of the same size.
+        differs: pixels as `compare` has found them; all others are grey. (height, width)
     Returns:
-        (height, width, 3)
+        sRGB. (height, width, 3) uint8
     """
     mean = luminance(estimate.mean).astype(np.float64)
     floor = _DARK * max(float(mean.mean()), 1e-300)
@@ -131,7 +144,7 @@ def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8
     return np.asarray(_GREY + amount[..., None] * (colour - _GREY) + 0.5, np.uint8)
 
 
-def _gram(frame: F32, means: F32) -> F64:
+def _gram(frame: NDArray[np.floating], means: F32) -> F64:
     """Mean products of the batches' differences from the frame, over pixels and channels. (batches, batches)"""
     differences = (frame[None] - means).reshape(len(means), -1)
     step, total = 1 << 20, np.zeros((len(means), len(means)))
@@ -166,8 +179,7 @@ def _different(frame: F32, means: F32) -> Mask:
 
 
 def _block_means(values: F32, of: F64, size: int) -> F64:
-    """Means over blocks of size × size, weighted by `of`; 0 where that is. values, of: (h, w). Returns: (rows, columns)
-    """
+    """Means over blocks of size × size, weighted by `of`; 0 where that is. values, of: (h, w). Returns: (rows, cols)"""
     rows, columns = (np.arange(0, length, size) for length in values.shape)
     sums, weights = (
         np.add.reduceat(np.add.reduceat(each, rows, axis=0), columns, axis=1) for each in (values * of, of)

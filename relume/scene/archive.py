@@ -15,11 +15,12 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
-from relume.replacing import Replacing
+from relume.remarks import Remark, remark_of
+from relume.replacing import replacing
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
-from relume.scene.remarks import Remark, remark_of
+from relume.scene.model import Camera, Light, Material, Mesh, Scene, Texture
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -42,6 +43,13 @@ def make_scene(
 ) -> Scene:
     """Checks the parts and joins them to a scene that knows its id.
 
+    Args:
+        name: what people call the scene.
+        meshes, materials, cameras: at least one of each; a mesh's `material` counts in `materials`.
+        environment: the distant light.
+        warnings: what the importer did not understand, one sentence each.
+        variants: partial looks by name.
+        lights: local lights, each of a name of its own.
     Raises:
         SceneError: the parts do not make a scene (see `relume.scene.checks`).
     """
@@ -70,10 +78,10 @@ def save_scene(scene: Scene, folder: str | Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     document, arrays = _describe(scene)
     document["id"] = scene.id
-    with Replacing(folder / "arrays.npz") as arrays_file:
-        np.savez(arrays_file, allow_pickle=False, **arrays)
-    with Replacing(folder / "scene.json") as json_file:
-        json_file.write(json.dumps(document, indent=1, allow_nan=False).encode())
+    with replacing(folder / "arrays.npz") as unfinished:
+        np.savez(unfinished, allow_pickle=False, **arrays)
+    with replacing(folder / "scene.json") as unfinished:
+        unfinished.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
 
 
 def load_scene(folder: str | Path) -> Scene:

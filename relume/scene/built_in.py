@@ -61,7 +61,7 @@ BUILT_IN: dict[str, BuiltIn] = {
 
 
 def built_in(name: str) -> Scene:
-    """One of them. Raises ParameterError for any other name."""
+    """The scene of that name in `BUILT_IN`. Raises ParameterError for any other name."""
     if name not in BUILT_IN:
         raise ParameterError("--built-in", name, ", ".join(BUILT_IN))
     return BUILT_IN[name].make()

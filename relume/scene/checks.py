@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
-from relume.scene.model import Camera, Environment, Light, Material, Mesh
+from relume.scene.model import Camera, Light, Material, Mesh
 
 MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
 MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
+MAX_EMISSION, MAX_METRES = 1e6, 1e6  # of lights, in a scene and in a look
 
 
 def check_mesh(mesh: Mesh, num_materials: int) -> None:
@@ -68,7 +70,17 @@ def check_scene(
     environment: Environment,
     lights: Sequence[Light],
 ) -> None:
-    """Raises SceneError with what to do where the parts do not make a scene."""
+    """Refuses parts that do not make a scene.
+
+    Args:
+        meshes: their shapes, indices and values are checked, and that they have at most `MAX_TRIANGLES` together.
+        materials: checked to have names of their own.
+        cameras: checked to be rigid and to have names of their own.
+        environment: its size and values are checked.
+        lights: their number and names are checked; their fields are the look's to check.
+    Raises:
+        SceneError: something does not fit; it says what to do.
+    """
     if not meshes:
         raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
     if not cameras:

@@ -88,7 +88,7 @@ class Listed(Generic[Entry]):
         self._folder, self._read = folder, read
 
     def read(self, name: str, what: str) -> bytes | None:
-        """As `Companions.read`; upper and lower case are the same."""
+        """Read a file as `Companions.read` does; upper and lower case are the same."""
         for spelling in dict.fromkeys((unquote(name), name)):
             plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
             entry = self._entries.get(inside(plain, what).lower())

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.environment import texel_directions
+from relume.environments.equirect import texel_directions
+from relume.environments.model import Environment
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import Surface, merged, turn_y
-from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene
+from relume.scene.model import Camera, Light, Material, Mesh, Scene
 
 F64 = NDArray[np.float64]
 
@@ -94,7 +95,12 @@ def sunny_sky(sun: F64 = SUN, rows: int = 256) -> Environment:
 
 
 def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> Surface:
-    """corner + [0, 1] u + [0, 1] v, facing u × v."""
+    """The rectangle corner + [0, 1] u + [0, 1] v, which faces u × v.
+
+    Args:
+        corner: one of its corners, metres. (3,)
+        u, v: its sides from there, metres. (3,)
+    """
     start, along, up = (np.asarray(a, np.float64) for a in (corner, u, v))
     normal = np.cross(along, up)
     return Surface(
@@ -120,7 +126,13 @@ def _roof() -> Surface:
 
 
 def block(half_width: float, height: float, half_depth: float) -> Surface:
-    """A block on y = 0 without its underside, which nothing sees."""
+    """A block on y = 0 about the y axis, without its underside, which nothing sees.
+
+    Args:
+        half_width: half of its extent along x, metres.
+        height: its extent along y, metres.
+        half_depth: half of its extent along z, metres.
+    """
     x, z = half_width, half_depth
     corners = [(-x, z), (x, z), (x, -z), (-x, -z)]
     sides = [

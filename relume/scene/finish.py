@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from relume.environments.model import Environment
+from relume.remarks import EFFECTS, Remark
 from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene
-from relume.scene.remarks import EFFECTS, Remark
+from relume.scene.model import Camera, Light, Material, Mesh, Scene
 
 MAX_WARNINGS = 200
 
@@ -22,7 +23,18 @@ def finished_scene(
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
-    """As `make_scene`, the warnings that weigh most first and no more than `MAX_WARNINGS`. Raises SceneError."""
+    """The scene of an imported file: as `make_scene`, the warnings that weigh most first and at most `MAX_WARNINGS`.
+
+    Args:
+        name: what people call the scene.
+        meshes, materials, cameras: at least one of each; a mesh's `material` counts in `materials`.
+        environment: the distant light.
+        warnings: what the importer did not understand, one sentence each.
+        variants: partial looks by name.
+        lights: local lights, each of a name of its own.
+    Raises:
+        SceneError: the parts do not make a scene (see `relume.scene.checks`).
+    """
     found = [*environment.warnings, *warnings]
     listed = sorted(found, key=lambda remark: EFFECTS.index(remark.effect))[:MAX_WARNINGS]
     if len(found) > len(listed):

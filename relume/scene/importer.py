@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.companions import Alone, Companions, Folder
 from relume.scene.gltf import import_gltf
 from relume.scene.mesh_files import import_obj, import_ply
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 from relume.scene.zipped import open_zip
 
 MAX_FILE_BYTES = 512 << 20

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
-from relume.look.lights import MAX_EMISSION
-from relume.scene.checks import MAX_LIGHTS
+from relume.remarks import Remark, simplified, unused
+from relume.scene.checks import MAX_EMISSION, MAX_LIGHTS
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import Light, Material, Mesh
-from relume.scene.remarks import Remark, simplified, unused
 
 F64 = NDArray[np.float64]
 
@@ -31,8 +30,12 @@ class LightCollector:
         return unique_name(wanted, self._names)
 
     def add(self, name: str, fields: Mapping[str, Any], emission: F64) -> None:
-        """A light with some emission in the unit of its kind, held to what a look may have.
+        """A light of the file, its emission held to what a look may have.
 
+        Args:
+            name: from `name`, so that no other light has it.
+            fields: `kind` and what else is not that kind's default, without the emission.
+            emission: linear RGB in the unit of its kind. (3,)
         Raises:
             SceneError: there are more than a look may have.
         """
@@ -50,9 +53,9 @@ class LightCollector:
         surface under an environment of 1 has, not a candela per square metre.
 
         Args:
+            materials: those of the scene.
             emissions: of each material. (3,)
             meshes: those of the scene; a material without any is no light.
-
         Raises:
             SceneError: there are more lights than a look may have.
         """

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.remarks import Remark
+from relume.environments.model import Environment
+from relume.remarks import Remark
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -87,22 +88,6 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class Environment:
-    """Distant light: equirectangular linear radiance, top row first.
-
-    The direction of texel (u, v), v from the top: u = atan2(z, x)/2π + ½, v = ½ − asin(y)/π.
-
-    Attributes:
-        radiance: finite, not negative. (height, width, 3) float32
-        warnings: what had to be repaired when it was read, one sentence each.
-    """
-
-    name: str
-    radiance: F32
-    warnings: tuple[Remark, ...] = ()
-
-
-@dataclass(frozen=True)
 class Light:
     """A named local light.
 
@@ -116,7 +101,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything a bake needs.
+    """Everything that a bake needs to know of what is seen.
 
     Attributes:
         id: hash of the content, hexadecimal; the same content has the same id.

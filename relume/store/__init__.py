@@ -2,7 +2,7 @@
 
 from relume.store.fill import bake_here
 from relume.store.publish import publish
-from relume.store.reader import Reader, open_staging, open_store
+from relume.store.reader import Reader, code_of, open_staging, open_store
 from relume.store.schema import SCHEMA_VERSION
 from relume.store.writer import StoreWriter, create_store
 
@@ -11,6 +11,7 @@ __all__ = [
     "Reader",
     "StoreWriter",
     "bake_here",
+    "code_of",
     "create_store",
     "open_staging",
     "open_store",

@@ -8,21 +8,35 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
+from relume.bake import BakeMethod, Recipe, Task, Written
+from relume.code_version import bake_code
 from relume.errors import StoreError
 from relume.scene.model import Scene
 from relume.store.publish import publish
 from relume.store.reader import Reader, open_staging
 from relume.store.writer import StoreWriter, create_store
-from relume.transfer.base import Recipe, Task, TransferMethod, Written
 
 
-def begin(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
-    """Create the store of a bake, or keep the unfinished one that is there."""
-    create_store(staging, method.attributes(scene, recipe))
+def begin(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
+    """Create the store of a bake, or keep the unfinished one that is there, which this code must have made.
+
+    Args:
+        method: whose root attributes of this scene and recipe the store gets.
+        scene: that is baked. recipe: how.
+        staging: folder of the unfinished store; made where it is missing.
+    """
+    create_store(staging, {**method.attributes(scene, recipe), "code": bake_code()})
 
 
-def begin_stage(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
-    """Create the arrays that a stage announces and return its tasks. The stages before it are complete."""
+def begin_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
+    """Create the arrays that a stage announces and return its tasks.
+
+    Args:
+        method: whose stages the bake has.
+        scene: that is baked. recipe: how.
+        staging: folder of the unfinished store, in which the stages before this one are complete.
+        stage: index into the stages of `method`.
+    """
     reader, writer = open_staging(staging), StoreWriter(staging)
     for spec in method.arrays(stage, scene, recipe, reader):
         writer.create_array(spec)
@@ -31,12 +45,27 @@ def begin_stage(method: TransferMethod, scene: Scene, recipe: Recipe, staging: P
 
 @lru_cache(maxsize=4)
 def reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
-    """One for all tasks of a stage that a process does: what they read is complete, and so read only once."""
+    """One reader for all tasks of a stage that a process does: what they read is complete, and so read only once.
+
+    Args:
+        staging: folder of the unfinished store.
+        stage, scene_id, recipe: tell this reader from those that were kept before.
+    """
     return open_staging(staging)
 
 
-def run_task(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
-    """Compute a task and write its rows; doing it twice leaves the same bytes."""
+def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
+    """Compute a task and write its rows; doing it twice leaves the same bytes.
+
+    Args:
+        method: that computes. scene: that is baked. recipe: how.
+        staging: folder of the unfinished store, whose stage has begun.
+        task: one of those that `begin_stage` returned.
+    Returns:
+        What was computed, and what it cost.
+    Raises:
+        StoreError: the method has computed another number of rows than the task owns.
+    """
     reader = reader_of(staging, task.stage, scene.id, recipe)
     written = method.compute(scene, recipe, task, reader)
     announced = {spec.path for spec in method.arrays(task.stage, scene, recipe, reader)}
@@ -52,13 +81,21 @@ def run_task(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path
 
 
 def bake_here(
-    method: TransferMethod,
+    method: BakeMethod,
     scene: Scene,
     recipe: Recipe,
     target: Path,
     progress: Callable[[Task, Written], None] = lambda task, written: None,
 ) -> Path:
-    """Bake in this process and thread, and publish at `target`. Returns `target`."""
+    """Bake in this process and thread, and publish.
+
+    Args:
+        method: that bakes. scene: what. recipe: how.
+        target: folder of the finished store; an unfinished one beside it is removed before.
+        progress: called with each task that is done and what it has written.
+    Returns:
+        `target`.
+    """
     staging = target.with_name(f"{target.name}.staging")
     shutil.rmtree(staging, ignore_errors=True)
     begin(method, scene, recipe, staging)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import warnings
 from pathlib import Path
@@ -13,6 +12,7 @@ import zarr
 from zarr.storage import LocalStore
 
 from relume.errors import ChunkDamagedError
+from relume.replacing import UNFINISHED, replacing
 from relume.store.files import read_json
 from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
@@ -32,7 +32,7 @@ def publish(staging: Path, target: Path) -> int:
     Raises:
         ChunkDamagedError: a chunk is missing or damaged.
     """
-    for leftover in [*staging.rglob("*.partial"), staging / MANIFEST_NAME]:
+    for leftover in [*staging.rglob("*.partial"), *staging.glob(UNFINISHED), staging / MANIFEST_NAME]:
         leftover.unlink(missing_ok=True)
     reader = open_staging(staging)
     for path in array_paths(staging):
@@ -69,10 +69,8 @@ def _write_manifest(staging: Path) -> int:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
         files.append({"path": file.relative_to(staging).as_posix(), "bytes": file.stat().st_size, "sha256": digest})
     text = json.dumps({"schema_version": SCHEMA_VERSION, "files": files}, indent=1)
-    with (staging / MANIFEST_NAME).open("w") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
+    with replacing(staging / MANIFEST_NAME) as unfinished:
+        unfinished.write_text(text)
     return sum(int(str(entry["bytes"])) for entry in files) + len(text)
 
 

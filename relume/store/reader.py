@@ -16,6 +16,7 @@ import zarr
 from numpy.typing import NDArray
 from zarr.storage import LocalStore
 
+from relume.bake import ArraySpec
 from relume.errors import ChunkDamagedError, StoreError, StoreNotFoundError
 from relume.store.files import read_json
 from relume.store.schema import (
@@ -25,7 +26,6 @@ from relume.store.schema import (
     num_shards,
     spec_from_metadata,
 )
-from relume.transfer.base import ArraySpec
 
 # Zarr decodes on one event loop and a pool of threads that all readers share; the defaults (10 and 32) only make the
 # threads of a small machine wait for each other. They take effect when zarr first reads.
@@ -33,7 +33,7 @@ zarr.config.set({"async.concurrency": 4, "threading.max_workers": 4})
 
 
 class Reader:
-    """A store open for reading; implements `relume.transfer.base.StoreReader`. Safe to use from several threads."""
+    """A store open for reading; implements `relume.bake.StoreReader`. Safe to use from several threads."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         self.path = path
@@ -57,6 +57,8 @@ class Reader:
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """Rows [start, stop) of an array.
 
+        Args:
+            path: of the array inside the store. start, stop: rows; all without them.
         Raises:
             ChunkDamagedError: a shard is missing or cut, or a checksum fails.
             StoreError: there is no such array, or the rows lie outside it.
@@ -104,6 +106,15 @@ def open_staging(path: Path) -> Reader:
         raise StoreError(f"{path.name} has no attributes; bake the scene again")
     check_version(attributes)
     return Reader(path, attributes)
+
+
+def code_of(path: Path) -> str | None:
+    """Names the code that makes or made a store, see `relume.code_version.bake_code`; None where that is not known."""
+    try:
+        code = open_staging(path).attributes.get("code")
+    except StoreError:
+        return None
+    return code if isinstance(code, str) else None
 
 
 def open_store(path: Path) -> Reader:

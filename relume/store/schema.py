@@ -15,8 +15,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from relume.bake import ArraySpec
 from relume.errors import SchemaVersionError, StoreError
-from relume.transfer.base import ArraySpec
 
 SCHEMA_VERSION = 7
 MANIFEST_NAME = "manifest.json"
@@ -103,7 +103,14 @@ def check_version(attributes: Mapping[str, Any]) -> None:
 
 
 def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: int) -> ArraySpec:
-    """The layout of an array that its task writes whole: chunks of about half a megabyte, one shard."""
+    """The layout of an array that its task writes whole: chunks of about half a megabyte, one shard.
+
+    Args:
+        path: of the array inside the store. shape: of at least one dimension.
+        dtype: NumPy's name of its type. item_bytes: of one element.
+    Raises:
+        StoreError: the array has no dimensions.
+    """
     if not shape:
         raise StoreError(f"array {path} has no dimensions; a store holds rows")
     row_bytes = max(1, math.prod(shape[1:]) * item_bytes)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.storage import LocalStore
 
+from relume.bake import ArraySpec
 from relume.errors import StoreError
 from relume.store.files import read_json
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
-from relume.transfer.base import ArraySpec
 
 # Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
 ZSTD_LEVEL = 1
@@ -71,8 +71,12 @@ class StoreWriter:
     def write(self, path: str, rows: NDArray[Any], start: int = 0) -> None:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
 
+        Args:
+            path: of the array, which was created before.
+            rows: of the array's type and shape, but for their number.
+            start: row of the array that the first of them becomes.
         Raises:
-            StoreError: the rows do not fit the array or cut a shard in two.
+            StoreError: there is no such array, or the rows do not fit it or cut a shard in two.
         """
         spec = self._spec(path)
         if spec is None:

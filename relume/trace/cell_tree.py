@@ -40,9 +40,10 @@ class CellTree(NamedTuple):
 
 @nb.njit(nogil=True, cache=True)
 def locate16(tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """The cells of 16 points on surfaces; all go down the tree together, so that none waits for memory alone.
+    """Locate the cells of 16 points on surfaces; all go down the tree together, so that none waits for memory alone.
 
     Args:
+        tree: a `CellTree`.
         keys: position and normal of each. (6, 16) float32
         nodes: the tree's root on each one's side; becomes its cell, `NO_CELL` where there is none. (16,) int32
     """
@@ -61,7 +62,7 @@ def locate16(tree, keys, nodes):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _gap(along):  # type: ignore[no-untyped-def]
-    """The number of sorted values below a gap that is as near as possible to their middle.
+    """Count the sorted values below a gap that is as near as possible to their middle.
 
     Points of one plane differ by rounding, and their light comes from beside it: a plane between points that lie
     together would put hits on the wrong side of it, so that gaps are no smaller than a quarter of the mean one.
@@ -143,7 +144,8 @@ def grow_tree(keys: F32, side: I32, num_sides: int, num_cells: int) -> tuple[Cel
     """Divide points into cells of about the same number of them.
 
     Args:
-        keys: position and unit normal. (n, 6) float32. side: of each. (n,) int32
+        keys: position and unit normal. (n, 6) float32. side: number of each point's, in [0, num_sides). (n,) int32
+        num_sides: twice the number of meshes.
         num_cells: at most `MAX_CELLS`; somewhat fewer where points coincide, or more so that each side has one.
     Returns:
         The tree, and the points of each cell.

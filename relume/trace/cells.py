@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.points import Points
 from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
 from relume.trace.geometry import Geometry
 from relume.trace.photons import shoot_photons
 from relume.trace.primary import Hits
-from relume.trace.surface import surface_at
+from relume.trace.surface import any_tangent, surface_at
 
 F32 = NDArray[np.float32]
 
@@ -47,12 +48,29 @@ class Cells:
 
     @property
     def num_cells(self) -> int:
-        """C."""
+        """Their number C."""
         return len(self.material)
+
+    @property
+    def gather_samples(self) -> Points:
+        """The points that stand for all cells, those of a cell one after another."""
+        return gather_samples_of(self.position, self.normal)
+
+
+def gather_samples_of(position: F32, normal: F32, first_cell: int = 0) -> Points:
+    """Make the points that stand for cells, where direct light arrives at them; any tangent does.
+
+    Args:
+        position, normal: as in `Cells`. (cells, `POINTS_A_CELL`, 3) float32
+        first_cell: number of the first of these cells among all.
+    """
+    position, normal = position.reshape(-1, 3), normal.reshape(-1, 3)
+    first = POINTS_A_CELL * first_cell
+    return Points(position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32))
 
 
 def face_normals(geometry: Geometry) -> F32:
-    """Unit normals of the triangles, their corners counter-clockwise. (faces, 3) float32"""
+    """Compute unit normals of the triangles, their corners counter-clockwise. (faces, 3) float32"""
     a, b, c = geometry.positions[geometry.faces].astype(np.float64).transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
@@ -64,7 +82,9 @@ def choose_cells(
     """Place about `num_cells` cells where gather rays of these views go; nothing but the scene seeds it.
 
     Args:
-        size: of the pictures, pixels. num_cells: at most `MAX_CELLS` less two for each mesh.
+        scene: what is seen. geometry: its triangles.
+        views: names of the cameras. size: width and height of their pictures, pixels.
+        num_cells: about so many; held to `MAX_CELLS` less two for each mesh.
     """
     most = min(num_cells, MAX_CELLS - 2 * len(scene.meshes))
     photons = shoot_photons(scene, geometry, views, size, _PHOTONS_A_CELL * most)
@@ -72,7 +92,7 @@ def choose_cells(
     normal = face_normals(geometry)[hits.face]
     is_behind = np.einsum("nc,nc->n", normal, directions) > 0
     normal[is_behind] *= -1
-    place = surface_at(geometry, hits, directions).position
+    place = surface_at(geometry, hits, directions).points.position
     side = 2 * geometry.face_mesh[hits.face] + is_behind.astype(np.int32)
     tree, members = grow_tree(
         np.concatenate([place, normal], axis=1), side.astype(np.int32), 2 * len(scene.meshes), most
@@ -85,8 +105,8 @@ def choose_cells(
     shape = (len(members), POINTS_A_CELL, 3)
     return Cells(
         tree,
-        surface.position.reshape(shape),
-        surface.normal.reshape(shape),
+        surface.points.position.reshape(shape),
+        surface.points.normal.reshape(shape),
         surface.diffuse.reshape(shape).mean(axis=1),
         surface.specular.reshape(shape).mean(axis=1),
         geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),

@@ -43,17 +43,17 @@ class RayCounts:
 
     @property
     def wrong_share(self) -> float:
-        """Estimate of the wrong bits among all: the wrong share of the checked, times the share that is predicted."""
+        """The wrong share of checked bits times the share of predicted ones: an estimate of all wrong bits."""
         return self.wrong / max(1, self.checked) * (1 - self.traced / max(1, self.full))
 
 
 @dataclass(frozen=True)
 class Coherent:
-    """Visibility of n view samples.
+    """What n view samples see, and what it cost to find out.
 
     Attributes:
         visible: light m of a sample in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
-        trace_s: wall time of the tracing and predicting alone.
+        rays: what prediction saved. trace_s: wall time of the tracing and predicting alone.
     """
 
     visible: NDArray[np.uint8]
@@ -76,13 +76,13 @@ class Targets(NamedTuple):
     is_strong: NDArray[np.bool_]
 
 
-def targets_of(directions: F32, power: F32) -> Targets:
-    """Lights as `trace_coherent` wants them.
+def targets_of(directions: F32, irradiance: F32) -> Targets:
+    """Make lights what `trace_coherent` wants.
 
     Args:
-        directions: unit. (m, 3) float32. power: what each light gives, per colour. (m, 3) float32
+        directions: unit, towards the lights. (m, 3) float32. irradiance: of each light, per channel. (m, 3) float32
     """
-    luminous = luminance(power)
+    luminous = luminance(irradiance)
     return Targets(directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
 
 
@@ -90,8 +90,10 @@ def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targ
     """Find what samples see, tracing where it changes and predicting where it does not.
 
     Args:
+        scene: the triangles that may be in the way.
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
+        targets: the lights, from `targets_of`.
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)

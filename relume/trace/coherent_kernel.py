@@ -19,35 +19,18 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
-from relume.trace.embree import aligned
+from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
 
 U64 = NDArray[np.uint64]
 
 BLOCK = 64
+_BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
 # predictions: what a region's untraced samples are held to see of a light
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
-# rows of RTCRay16, 16 floats each
-_NEAR, _DIRECTION, _FAR, _MASK = 3, 4, 8, 9
 # of the predicted bits, one in this many is traced all the same; a power of two from the size of a quarter up
 _CHECK_EVERY = 128
 _HASH = 2_654_435_761  # Knuth's multiplicative hash: 2^32 divided by the golden ratio
-
-
-class _Packet(NamedTuple):
-    """Sixteen rays that wait to be traced.
-
-    Attributes:
-        ray, valid: Embree's memory. sample, light: whose ray lies in each lane. (16,)
-        scene, arguments: addresses that Embree is called with.
-    """
-
-    ray: NDArray[np.float32]
-    valid: NDArray[np.int32]
-    sample: NDArray[np.int64]
-    light: NDArray[np.int64]
-    scene: int
-    arguments: int
 
 
 class _Block(NamedTuple):
@@ -79,15 +62,8 @@ class _Level(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True)
-def _new_packet(scene, arguments):  # type: ignore[no-untyped-def]
-    ray = aligned(12 * 16)
-    ray.view(np.uint32)[_MASK * 16 : (_MASK + 1) * 16] = 0xFFFFFFFF
-    valid = aligned(16).view(np.int32)
-    return _Packet(ray, valid, np.zeros(16, np.int64), np.zeros(16, np.int64), scene, arguments)
-
-
-@nb.njit(nogil=True, cache=True)
 def _new_level(num_lights):  # type: ignore[no-untyped-def]
+    """Make room for a level that knows nothing."""
     return _Level(
         np.zeros(num_lights, np.uint8),
         np.zeros(num_lights, np.bool_),
@@ -99,24 +75,20 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
-    """Trace the rays of the first lanes."""
+    """Trace the rays of the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
     if waiting == 0:
         return
-    for k in range(16):
-        packet.valid[k] = -1 if k < waiting else 0
-        packet.ray[_NEAR * 16 + k] = 0
-        packet.ray[_FAR * 16 + k] = np.float32(1e30)
-    occluded(np.int64(packet.valid.ctypes.data), packet.scene, np.int64(packet.ray.ctypes.data), packet.arguments)
-    for k in range(waiting):
-        # Embree sets tfar to minus infinity where something is in the way
-        if packet.ray[_FAR * 16 + k] > 0:
-            block.seen[packet.light[k]] |= np.uint64(1) << np.uint64(packet.sample[k])
+    ask_first(packet, waiting)
+    trace_shadows(occluded, packet)
+    for lane in range(waiting):
+        if is_free(packet, lane):
+            owner = packet.owner[lane]
+            block.seen[owner >> _BLOCK_BITS] |= np.uint64(1) << np.uint64(owner & (BLOCK - 1))
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
-    ray, sample, light_of = packet.ray, packet.sample, packet.light
     facing, known = block.facing, block.known
     rays = 0
     for at in range(lights.shape[0]):
@@ -127,23 +99,20 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
         while wanted:
             k = trailing_zeros(wanted)  # type: ignore[call-arg, var-annotated]
             wanted &= wanted - np.uint64(1)
-            lane = rays & 15
-            sample[lane], light_of[lane] = k, light
-            for axis in range(3):
-                ray[axis * 16 + lane] = origins[k, axis]
-            ray[_DIRECTION * 16 + lane] = x
-            ray[(_DIRECTION + 1) * 16 + lane] = y
-            ray[(_DIRECTION + 2) * 16 + lane] = z
+            lane = rays & (LANES - 1)
+            packet.owner[lane] = light << _BLOCK_BITS | k
+            set_origin(packet, lane, origins[k, 0], origins[k, 1], origins[k, 2])
+            aim(packet, lane, x, y, z, FAR)
             rays += 1
-            if lane == 15:
-                _flush(occluded, packet, block, 16)
-    _flush(occluded, packet, block, rays & 15)
+            if lane == LANES - 1:
+                _flush(occluded, packet, block, LANES)
+    _flush(occluded, packet, block, rays & (LANES - 1))
     return rays
 
 
 @nb.njit(nogil=True, cache=True)
 def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
-    """Lights above each sample's horizon. Returns the number of pairs."""
+    """Find the lights above each sample's horizon. Returns the number of pairs."""
     count = 0
     for light in range(directions.shape[0]):
         x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
@@ -159,7 +128,7 @@ def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
-    """The sample of [start, stop) that is farthest from a point."""
+    """Find the sample of [start, stop) that is farthest from a point."""
     best, at = np.float32(-1), start
     for k in range(start, stop):
         squared = (origins[k, 0] - x) ** 2 + (origins[k, 1] - y) ** 2 + (origins[k, 2] - z) ** 2
@@ -170,7 +139,7 @@ def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _centre(origins, start, stop):  # type: ignore[no-untyped-def]
-    """Mean of the positions [start, stop)."""
+    """Average the positions [start, stop)."""
     x, y, z = np.float32(0), np.float32(0), np.float32(0)
     for k in range(start, stop):
         x += origins[k, 0]
@@ -182,7 +151,7 @@ def _centre(origins, start, stop):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _ends(origins, start, stop):  # type: ignore[no-untyped-def]
-    """Two samples of [start, stop) far apart, as a mask."""
+    """Choose two samples of [start, stop) far apart, as a mask."""
     x, y, z = _centre(origins, start, stop)
     one = _farthest(origins, start, stop, x, y, z)
     other = _farthest(origins, start, stop, origins[one, 0], origins[one, 1], origins[one, 2])
@@ -191,7 +160,7 @@ def _ends(origins, start, stop):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _mask(start, stop):  # type: ignore[no-untyped-def]
-    """Bits [start, stop) of a word."""
+    """Set bits [start, stop) of a word."""
     mask = np.uint64(0)
     for k in range(start, stop):
         mask |= np.uint64(1) << np.uint64(k)
@@ -200,7 +169,7 @@ def _mask(start, stop):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _predict(facing, known, seen):  # type: ignore[no-untyped-def]
-    """What the traced samples of a region agree on."""
+    """Predict what the traced samples of a region agree on."""
     traced = facing & known
     if not facing:
         return _BELOW
@@ -211,7 +180,7 @@ def _predict(facing, known, seen):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _contradicted(traced, seen, prediction):  # type: ignore[no-untyped-def]
-    """Whether a traced sample sees what was not predicted."""
+    """Tell whether a traced sample sees what was not predicted."""
     return (prediction == _LIT and ~seen & traced != 0) or (prediction == _HIDDEN and seen & traced != 0)
 
 
@@ -310,7 +279,7 @@ def _keep(block, region, level):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _write(block, bits):  # type: ignore[no-untyped-def]
-    """Words of samples, one a light → bytes of lights, a row a sample."""
+    """Turn words of samples, one for each light, into bytes of lights, one row for each sample."""
     num_lights = block.seen.shape[0]
     for byte in range(bits.shape[1]):
         for light in range(8 * byte, min(8 * byte + 8, num_lights)):
@@ -321,7 +290,7 @@ def _write(block, bits):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _trace_quarter(occluded, packet, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
-    """Samples `span` of a block: two of them, then all of them where it needs be; then the check."""
+    """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
     whole, quarter, each = levels
     start, stop = span
     region = _mask(start, stop)
@@ -342,15 +311,18 @@ def _trace_quarter(occluded, packet, block, points, lights, span, salt, levels, 
 
 @nb.njit(nogil=True, cache=True)
 def trace_blocks(occluded, scene, arguments, origins, normals, lights, start, stop, bits, counts):  # type: ignore[no-untyped-def]
-    """Samples [start, stop) into `bits`, block by block; `start` is a multiple of `BLOCK`.
+    """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
     Args:
+        occluded: `occluded16`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
+        origins: off the surface. normals: shading normals. (n, 3) float32
         lights: directions, the two arrays of `relume.light.neighbours.Neighbours`, and which are always traced.
+        start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
         counts: rays traced, rays that a full trace would take, predicted bits checked, found wrong: added to. (4,)
     """
     directions = lights[0]
     n = directions.shape[0]
-    packet = _new_packet(scene, arguments)
+    packet = new_packet(scene, arguments)
     block = _Block(np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64))
     nothing, whole = _new_level(n), _new_level(n)
     levels = (whole, _new_level(n), _new_level(n))

@@ -15,8 +15,7 @@ from typing import Any
 
 import embreex
 import embreex.rtcore
-import numba as nb
-import numba.experimental.function_type
+import numba.experimental.function_type  # noqa: F401  (registers functions that are known by their addresses)
 import numpy as np
 from numba.core import types
 from numpy.typing import NDArray
@@ -85,20 +84,12 @@ intersect16 = _ByAddress("rtcIntersect16")
 
 
 def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
-    """RTCOccludedArguments / RTCIntersectArguments: flags, feature mask, and three empty pointers."""
+    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three empty pointers. (5,) uint64"""
     words = np.zeros(5, np.uint64)
     halves = words.view(np.uint32)
     halves[0] = _COHERENT if coherent else 0
     halves[1] = _FEATURE_TRIANGLE
     return words
-
-
-@nb.njit(nogil=True, cache=True)
-def aligned(num_floats):  # type: ignore[no-untyped-def]
-    """Zeroed float32 memory on a 64-byte boundary, as Embree's 16-wide packets need it. (num_floats,)"""
-    raw = np.zeros(num_floats + 16, np.float32)
-    skip = (64 - raw.ctypes.data % 64) // 4 % 16
-    return raw[skip : skip + num_floats]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Geometry:
-    """Merged meshes.
+    """All meshes of a scene, merged.
 
     Attributes:
         positions, normals: (num_vertices, 3) float32. tangents: (num_vertices, 4). uvs: (num_vertices, 2).
@@ -38,12 +38,12 @@ class Geometry:
     epsilon: float
 
     def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
-        """Which points on surfaces (n, 3) are seen from a place (3,) on their outer side."""
+        """Tell which points on surfaces (n, 3) are seen from a place (3,) on their outer side."""
         return is_front(self.embree, self.positions, self.faces, eye, points)
 
 
 def off_surface(positions: F32) -> float:
-    """How far ray origins are moved off surfaces with these corners (n, 3), metres."""
+    """Choose how far ray origins are moved off surfaces with these corners (n, 3), metres."""
     # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
 
@@ -51,7 +51,14 @@ def off_surface(positions: F32) -> float:
 def is_front(
     embree: EmbreeScene, positions: F32, faces: NDArray[np.uint32], eye: F32, points: F32
 ) -> NDArray[np.bool_]:
-    """Which points (n, 3) on these triangles are seen from a place (3,) on their outer side."""
+    """Tell which points on triangles are seen on their outer side.
+
+    Args:
+        embree: the triangles. positions: their vertices. (num_vertices, 3) float32. faces: (num_faces, 3) uint32
+        eye: where they are seen from. (3,) float32. points: on the triangles. (n, 3) float32
+    Returns:
+        (n,)
+    """
     directions = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
     face = trace_from(embree, eye, directions.astype(np.float32)).face
     a, b, c = positions[faces[np.maximum(face, 0)]].transpose(1, 0, 2)

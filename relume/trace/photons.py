@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import is_diffuse
+from relume.points import Points
 from relume.scene.model import Camera, Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, camera_directions, trace_from
-from relume.trace.surface import Surface, any_tangent, surface_at
+from relume.trace.surface import any_tangent, surface_at
 
 F32 = NDArray[np.float32]
 
@@ -50,7 +51,7 @@ class Photons:
     directions: F32
 
     def rows(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
-        """Some of them."""
+        """Choose some of them."""
         hits = self.hits
         return Photons(Hits(hits.face[which], hits.uv[which], hits.distance[which]), self.directions[which])
 
@@ -66,10 +67,12 @@ class _Found(NamedTuple):
 def shoot_photons(
     scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_photons: int
 ) -> Photons:
-    """`num_photons` photons, fewer where paths leave the scene too soon; seeded by the scene's id.
+    """Shoot photons; they are seeded by the scene's id.
 
     Args:
-        views: names of the cameras that paths start from. size: of the pictures, pixels.
+        scene: what is seen. geometry: its triangles.
+        views: names of the cameras that paths start from. size: width and height of their pictures, pixels.
+        num_photons: how many are wanted; there are fewer where paths leave the scene too soon.
     """
     rng = np.random.default_rng(int(scene.id, 16))
     cameras = [camera for camera in scene.cameras if camera.name in views]
@@ -88,13 +91,14 @@ def shoot_photons(
 
 
 def _joined(parts: Sequence[Photons]) -> Photons:
+    """Join photons in their order."""
     columns = zip(*((p.hits.face, p.hits.uv, p.hits.distance, p.directions) for p in parts), strict=True)
     face, uv, distance, directions = (np.concatenate(column) for column in columns)
     return Photons(Hits(face, uv, distance), directions)
 
 
 def _some(parts: Sequence[Photons], count: int, rng: np.random.Generator) -> Photons:
-    """A random subset, its order kept."""
+    """Choose a random subset of so many, its order kept."""
     all_of_them = _joined(parts)
     return all_of_them.rows(np.sort(rng.permutation(len(all_of_them.directions))[:count]))
 
@@ -108,43 +112,42 @@ def _walk(
     rng: np.random.Generator,
     found: _Found,
 ) -> None:
-    """Paths through random positions of a picture: adds what they hit after each bounce. shines: of each material"""
+    """Follow paths through random positions of a picture; add what they hit. shines: whether each material does"""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
     hits, directions = _hits(geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y))
     surface = surface_at(geometry, hits, directions)
     pixel = np.float32(2 * math.tan(camera.yfov / 2) / height)
     reach = _CONTACT_PIXELS * pixel * hits.distance
-    found.at_contacts.extend(_split(geometry, surface, reach, rng))
+    found.at_contacts.extend(_split(geometry, surface.points, reach, rng))
     is_mirror = shines[geometry.face_material[hits.face]]
-    found.in_mirrors.append(
-        _mirrored(geometry, surface.position[is_mirror], surface.normal[is_mirror], directions[is_mirror], rng)
-    )
+    found.in_mirrors.append(_mirrored(geometry, surface.points.rows(is_mirror), directions[is_mirror], rng))
     for _ in range(_BOUNCES):
-        hits, directions = _hits(geometry, surface.position, lobe_directions(surface.normal, 1.0, rng))
+        hits, directions = _hits(geometry, surface.points.position, lobe_directions(surface.points.normal, 1.0, rng))
         found.anywhere.append(Photons(hits, directions))
         surface = surface_at(geometry, hits, directions)
 
 
 def _hits(geometry: Geometry, origin: F32, directions: F32) -> tuple[Hits, F32]:
-    """Hits of the rays that hit anything, and these rays' directions."""
+    """Find the hits of the rays that hit anything, and these rays' directions."""
     photons = Photons(trace_from(geometry.embree, origin, directions), directions)
     photons = photons.rows(photons.hits.face >= 0)
     return photons.hits, photons.directions
 
 
-def _mirrored(geometry: Geometry, position: F32, normal: F32, directions: F32, rng: np.random.Generator) -> Photons:
-    """What points seen along directions reflect, about the mirror direction: eq. (16), Nguyen 2010."""
-    position, normal, directions = (np.repeat(a, _MIRRORED, axis=0) for a in (position, normal, directions))
+def _mirrored(geometry: Geometry, points: Points, directions: F32, rng: np.random.Generator) -> Photons:
+    """Find what points seen along directions reflect, about the mirror direction: eq. (16), Nguyen 2010."""
+    position, normal = (np.repeat(a, _MIRRORED, axis=0) for a in (points.position, points.normal))
+    directions = np.repeat(directions, _MIRRORED, axis=0)
     mirrored = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
     leaving = lobe_directions(mirrored, _LOBE, rng)
     is_above = np.einsum("nc,nc->n", leaving, normal) > 0
     return Photons(*_hits(geometry, position[is_above], leaving[is_above]))
 
 
-def _split(geometry: Geometry, surface: Surface, reach: F32, rng: np.random.Generator) -> list[Photons]:
-    """Photons of short flights from points, many from those that have any. reach: of the shortest, metres. (n,)"""
-    position, normal, found = surface.position, surface.normal, []
+def _split(geometry: Geometry, points: Points, reach: F32, rng: np.random.Generator) -> list[Photons]:
+    """Shoot photons of short flights from points, many from those that have any. reach: what is short, metres. (n,)"""
+    position, normal, found = points.position, points.normal, []
     for split in range(_SPLITS + 1):
         directions = lobe_directions(normal, 1.0, rng)
         hits = trace_from(geometry.embree, position, directions)
@@ -158,7 +161,13 @@ def _split(geometry: Geometry, surface: Surface, reach: F32, rng: np.random.Gene
 
 
 def lobe_directions(axis: F32, exponent: float, rng: np.random.Generator) -> F32:
-    """A random direction about each axis (n, 3), unit, density ∝ cos^exponent; 1 is the cosine's. (n, 3) float32"""
+    """Draw a random direction about each axis, with density ∝ cos^exponent.
+
+    Args:
+        axis: unit. (n, 3) float32. exponent: at least 0; 1 is the cosine's. rng: where randomness comes from.
+    Returns:
+        Unit directions. (n, 3) float32
+    """
     z, phi = (1 - rng.random(len(axis))) ** (1 / (exponent + 1)), 2 * np.pi * rng.random(len(axis))
     across = np.sqrt(1 - z * z)
     tangent = any_tangent(axis)

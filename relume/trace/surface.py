@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
+from relume.points import Points
 from relume.scene.model import Material
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
@@ -22,29 +23,26 @@ _OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; 
 
 @dataclass(frozen=True)
 class Surface:
-    """n points with their shading frames; turned to the viewer.
+    """What n rays see: points of surfaces, and the textures there.
 
     Attributes:
-        position: (n, 3) float32, moved off the surface by the scene's epsilon.
-        normal: shading normal, in the hemisphere of the viewer. (n, 3) float32
-        tangent: unit, across `normal`. (n, 3) float32
+        points: turned to the viewer, moved off the surface by the scene's epsilon; their seeds are their numbers.
         diffuse, specular: texture channels, 1 where the material has none. (n, 3) float32
     """
 
-    position: F32
-    normal: F32
-    tangent: F32
+    points: Points
     diffuse: F32
     specular: F32
 
 
 def _unit(v: F32, otherwise: F32) -> F32:
+    """Scale vectors (n, 3) to length one; where they have none, take another."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.where(length > 1e-12, v / np.maximum(length, 1e-12), otherwise).astype(np.float32)
 
 
 def any_tangent(normal: F32) -> F32:
-    """A unit vector across each normal (Duff 2017)."""
+    """Find a unit vector across each normal (n, 3) (Duff 2017). (n, 3) float32"""
     x, y, z = normal.T
     sign = np.where(z >= 0, 1.0, -1.0)
     a = -1.0 / (sign + z)
@@ -52,7 +50,7 @@ def any_tangent(normal: F32) -> F32:
 
 
 def _across(vector: F32, normal: F32) -> F32:
-    """The part of `vector` across `normal`, unit; any direction across it where there is none."""
+    """Take the part of `vector` across `normal`, unit; any direction across it where there is none."""
     across = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
     return _unit(across, any_tangent(normal))
 
@@ -68,21 +66,24 @@ def surface_at(
     """Interpolate the surface at ray hits.
 
     Args:
+        geometry: the triangles. hits: the first hits of n rays.
         directions: unit, of the rays. (n, 3) float32
         materials: where given, textures and normal maps are evaluated, filtered over the pixel.
         pixel_angle: angle that a pixel spans, radians. origin: of the rays. (3,) float32
     Returns:
         Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
     """
-    parts: dict[int, Surface] = {}
+    parts: dict[int, tuple[F32, ...]] = {}
 
     def interpolate(start: int, stop: int) -> None:
         some = Hits(hits.face[start:stop], hits.uv[start:stop], hits.distance[start:stop])
         parts[start] = _surface_at(geometry, some, directions[start:stop], materials, pixel_angle, origin)
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
-    ordered = [vars(parts[start]) for start in sorted(parts)]
-    return Surface(**{name: np.concatenate([part[name] for part in ordered]) for name in ordered[0]})
+    columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
+    position, normal, tangent, diffuse, specular = map(np.concatenate, columns)
+    seed = np.arange(len(directions), dtype=np.uint32)
+    return Surface(Points(position, normal, tangent, seed), diffuse, specular)
 
 
 def _surface_at(
@@ -92,7 +93,8 @@ def _surface_at(
     materials: Sequence[Material],
     pixel_angle: float,
     origin: F32 | None,
-) -> Surface:
+) -> tuple[F32, ...]:
+    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular. (n, 3) float32 each"""
     hit = hits.face >= 0
     corners = geometry.faces[np.maximum(hits.face, 0)]
     p = geometry.positions[corners]
@@ -125,7 +127,7 @@ def _surface_at(
                 mapped = MipMap.of(m.normal_map).sample(uv[rows], footprint[rows])
                 normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
     normal = _towards(normal, directions)
-    return Surface(
+    return (
         np.where(hit[:, None], position, directions).astype(np.float32),
         np.where(hit[:, None], normal, -directions).astype(np.float32),
         _across(tangents[:, :3], normal),

@@ -23,7 +23,7 @@ class MipMap:
 
     @staticmethod
     def of(texture: Texture) -> MipMap:
-        """The pyramid of a texture, kept for as long as the texture is."""
+        """Find or make the pyramid of a texture, kept for as long as the texture is."""
         key = id(texture)
         if key not in _pyramids:
             _pyramids[key] = MipMap(texture)
@@ -31,7 +31,7 @@ class MipMap:
         return _pyramids[key]
 
     def sample(self, uv: F32, footprint: F32) -> F32:
-        """Filtered values.
+        """Look filtered values up.
 
         Args:
             uv: v from the top. (n, 2) float32. footprint: side of the filter in uv. (n,) float32
@@ -77,7 +77,7 @@ def _halve(image: F32) -> F32:
 
 
 def _wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int64]:
-    """Texel indices inside the image. Indices far outside stay exact: they are reduced in float64."""
+    """Wrap texel indices into the image. Indices far outside stay exact: they are reduced in float64."""
     if wrap == "clamp":
         return np.clip(index, 0, size - 1).astype(np.int64)
     if wrap == "mirror":

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.environment import lookup
+from relume.environments.equirect import lookup
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, camera_directions, trace_from
@@ -24,6 +24,7 @@ BACKGROUND = 65_535
 
 # eight positions that no row or column shares (a rook pattern), pixel units
 _POSITIONS = (np.array([(0, 5), (1, 2), (2, 7), (3, 0), (4, 4), (5, 1), (6, 6), (7, 3)]) + 0.5) / 8
+POSITIONS_A_PIXEL = len(_POSITIONS)
 _COS_EDGE = np.cos(np.radians(20.0))  # a crease
 _COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
 _DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
@@ -38,8 +39,9 @@ class ViewSamples:
         pixel: row-major index. (n,) uint32
         weight: share of the pixel; the shares of a pixel sum to one. (n,) float32
         material: index into the scene's materials, `BACKGROUND` where the ray left the scene. (n,) uint16
-        surface: position, normals, tangent, textures; for background samples the position is the ray's direction and
-            `diffuse` the environment's radiance in it.
+        surface: points and textures; for background samples the position is the ray's direction and `diffuse` the
+            environment's radiance in it.
+        num_rays: how many were traced to find them.
     """
 
     pixel: NDArray[np.uint32]
@@ -50,7 +52,7 @@ class ViewSamples:
 
 
 def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) -> tuple[NDArray[np.bool_], F32]:
-    """Pixels that differ from a neighbour, and the least cosine between the normals of each and of its neighbours.
+    """Find pixels that differ from a neighbour, and the least cosine between the normals of each and its neighbours.
 
     Args:
         key: what is hit. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
@@ -75,7 +77,7 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
 
 
 def _is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F32, other: F32) -> NDArray[np.bool_]:
-    """Whether what another ray of the same eye hits is off the plane of a hit by more than a small share of the way."""
+    """Tell whether what another ray of an eye hits is off the plane of a hit by more than a small share of the way."""
     with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
         slope = np.sum(direction * normal, axis=-1) / np.sum(other * normal, axis=-1)
         nearer = np.minimum(distance, other_distance)
@@ -83,7 +85,7 @@ def _is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F3
 
 
 def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Pixels that are no edges, but whose normals turn enough for sharp reflections to alias. (height, width)"""
+    """Find pixels that are no edges, but whose normals turn enough for reflections to alias. (height, width)"""
     turning = ~edge & (cosine < _COS_TURN) & (key >= 0)
     most = int(_MOST_TURNING * edge.size)
     if np.count_nonzero(turning) > most:
@@ -92,7 +94,7 @@ def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> ND
 
 
 def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
-    """Interleaved bits of x and y: the order of a Z-curve."""
+    """Interleave the bits of x and y: the order of a Z-curve. (n,) uint64"""
     code = np.zeros(len(pixel), np.uint64)
     x, y = (pixel % width).astype(np.uint64), (pixel // width).astype(np.uint64)
     for bit in range(14):
@@ -110,14 +112,13 @@ def _merge(
     Returns:
         Index of the ray that stands for each group, the pixel (of the edge pixels) it belongs to, and its weight.
     """
-    positions_a_pixel = len(_POSITIONS)
     mesh = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
-    mesh = mesh.reshape(num_pixels, positions_a_pixel)
-    normal = surface_at(geometry, hits, directions).normal.reshape(num_pixels, positions_a_pixel, 3)
-    distance = hits.distance.reshape(num_pixels, positions_a_pixel)
-    rays = directions.reshape(num_pixels, positions_a_pixel, 3)
-    group = np.full((num_pixels, positions_a_pixel), -1)
-    for candidate in range(positions_a_pixel):
+    mesh = mesh.reshape(num_pixels, POSITIONS_A_PIXEL)
+    normal = surface_at(geometry, hits, directions).points.normal.reshape(num_pixels, POSITIONS_A_PIXEL, 3)
+    distance = hits.distance.reshape(num_pixels, POSITIONS_A_PIXEL)
+    rays = directions.reshape(num_pixels, POSITIONS_A_PIXEL, 3)
+    group = np.full((num_pixels, POSITIONS_A_PIXEL), -1)
+    for candidate in range(POSITIONS_A_PIXEL):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
         one = slice(candidate, candidate + 1)
         cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
@@ -125,18 +126,18 @@ def _merge(
         same = (group < 0) & (mesh == mesh[:, one]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
         same &= (group[:, candidate] < 0)[:, None]
         group[same] = candidate
-    pixel, first = np.nonzero(group == np.arange(positions_a_pixel))
+    pixel, first = np.nonzero(group == np.arange(POSITIONS_A_PIXEL))
     is_in = group[pixel] == first[:, None]
     size = is_in.sum(axis=1)
     return (
-        pixel * positions_a_pixel + _most_central(is_in, size),
+        pixel * POSITIONS_A_PIXEL + _most_central(is_in, size),
         pixel,
-        (size / positions_a_pixel).astype(np.float32),
+        (size / POSITIONS_A_PIXEL).astype(np.float32),
     )
 
 
 def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Of each group the position next to their mean: any other would shift what the group shows to one side.
+    """Choose of each group the position next to their mean: any other would shift what it shows to one side.
 
     Args:
         is_in: which positions are of a group. (groups, 8). size: how many those are. (groups,)
@@ -150,7 +151,8 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     """Find the view samples of one camera.
 
     Args:
-        size: width and height in pixels.
+        scene: what is seen. geometry: its triangles.
+        view: name of the camera. size: width and height in pixels.
     """
     width, height = size
     camera = next(camera for camera in scene.cameras if camera.name == view)
@@ -163,7 +165,7 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     shape = (height, width)
     seen = key.reshape(shape)
     differs, cosine = _edges(
-        seen, surface.normal.reshape(*shape, 3), hits.distance.reshape(shape), directions.reshape(*shape, 3)
+        seen, surface.points.normal.reshape(*shape, 3), hits.distance.reshape(shape), directions.reshape(*shape, 3)
     )
     edge = (differs | _turning(differs, cosine, seen)).ravel()
 

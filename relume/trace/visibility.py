@@ -10,62 +10,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
-from relume.trace.embree import EmbreeScene, aligned, occluded16, packet_arguments
+from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
 
 F32 = NDArray[np.float32]
 
-# rows of RTCRay16, 16 floats each
-_ORIGIN, _NEAR, _DIRECTION, _FAR, _MASK = 0, 3, 4, 8, 9
 _POINTS_A_RANGE = 512
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(occluded, scene, arguments, origins, normals, directions, start, stop, bits):  # type: ignore[no-untyped-def]
     """Trace points [start, stop) against all lights; returns the number of rays. start is a multiple of 16."""
-    ray = aligned(12 * 16)
-    words = ray.view(np.uint32)
-    words[_MASK * 16 : (_MASK + 1) * 16] = 0xFFFFFFFF
-    valid = aligned(16).view(np.int32)
-    facing = np.empty(16, np.bool_)
+    packet = new_packet(scene, arguments)
+    facing = np.empty(LANES, np.bool_)
     num_lights = directions.shape[0]
     num_rays = 0
-    far = np.float32(1e30)
-    for first in range(start, stop, 16):
-        width = min(16, stop - first)
-        for k in range(16):
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        for k in range(LANES):
             p = first + min(k, width - 1)
-            for axis in range(3):
-                ray[(_ORIGIN + axis) * 16 + k] = origins[p, axis]
+            set_origin(packet, k, origins[p, 0], origins[p, 1], origins[p, 2])
         for light in range(num_lights):
             x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
             active = 0
-            for k in range(16):
+            for k in range(LANES):
                 p = first + min(k, width - 1)
                 above = normals[p, 0] * x + normals[p, 1] * y + normals[p, 2] * z > 0
                 facing[k] = above and k < width
-                valid[k] = -1 if facing[k] else 0
+                ask(packet, k, facing[k])
                 active += 1 if facing[k] else 0
             if active == 0:
                 continue
             num_rays += active
-            for k in range(16):
-                ray[_NEAR * 16 + k] = 0
-                ray[_DIRECTION * 16 + k] = x
-                ray[(_DIRECTION + 1) * 16 + k] = y
-                ray[(_DIRECTION + 2) * 16 + k] = z
-                ray[_FAR * 16 + k] = far
-            occluded(np.int64(valid.ctypes.data), scene, np.int64(ray.ctypes.data), arguments)
+            for k in range(LANES):
+                aim(packet, k, x, y, z, FAR)
+            trace_shadows(occluded, packet)
             byte, bit = light >> 3, np.uint8(1 << (light & 7))
             for k in range(width):
-                # Embree sets tfar to minus infinity where something is in the way
-                if facing[k] and ray[_FAR * 16 + k] > 0:
+                if facing[k] and is_free(packet, k):
                     bits[first + k, byte] |= bit
     return num_rays
 
 
 @dataclass(frozen=True)
 class Traced:
-    """Visibility of n points.
+    """What n points see, and what it cost to find out.
 
     Attributes:
         visible: light m of a point in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
@@ -81,6 +70,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
     """Trace every point against every light above its horizon.
 
     Args:
+        scene: the triangles that may be in the way.
         origins: off the surface already. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         directions: unit, towards the lights. (m, 3) float32

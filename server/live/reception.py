@@ -10,10 +10,10 @@ from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import ParameterError, ProtocolError, RelumeError
-from server import protocol
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
-from server.live.parts import Parts
-from server.live.pointers import check_held, find_curve
+from server.live.state.pointers import check_held, find_curve
+from server.live.state.session_state import SessionState
+from server.wire import protocol
 
 MAX_BAD_MESSAGES = 50
 
@@ -21,10 +21,10 @@ MAX_BAD_MESSAGES = 50
 class Reception:
     """Runs until the client goes or breaks the rules too often."""
 
-    def __init__(self, websocket: WebSocket, parts: Parts) -> None:
-        self._websocket, self._wire, self._wishes, self._shown = websocket, parts.wire, parts.wishes, parts.shown
-        self._window, self._desk, self._transfer = parts.window, parts.desk, parts.transfer
-        self._metrics = parts.metrics
+    def __init__(self, websocket: WebSocket, state: SessionState) -> None:
+        self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
+        self._window, self._look, self._transfer = state.window, state.look, state.transfer
+        self._metrics = state.metrics
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -50,15 +50,15 @@ class Reception:
                 self._take(message, received_s)
             except RelumeError as error:
                 revision = message.revision if isinstance(message, protocol.EditMessage) else None
-                await self._wire.refuse(error, revision)
-            self._wishes.news.set()
+                await self._socket.refuse(error, revision)
+            self._pending.news.set()
 
     async def _bad(self, problem: Exception | protocol.Problem) -> None:
         """A message that no client of ours sends: said each time, forgiven a number of times."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
             raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
-        await self._wire.refuse(problem)
+        await self._socket.refuse(problem)
 
     def _take(self, message: protocol.ClientMessage, received_s: float) -> None:
         match message:
@@ -67,43 +67,44 @@ class Reception:
             case protocol.AckMessage():
                 self._window.acknowledged(message.frame, received_s)
             case protocol.ViewMessage():
-                self._show([message.name])
+                self._show([message.name], message.size)
             case protocol.ViewsMessage():
-                self._show(message.names)
+                self._show(message.names, None)
             case protocol.FocusMessage():
                 self._shown.work_in(message.view)
             case protocol.StreamMessage():
-                self._wishes.form, self._wishes.quality = message.format, message.quality
+                self._pending.form, self._pending.quality = message.format, message.quality
             case protocol.ProbeMessage():
                 self._shown.check(message.view or self._shown.focus)
-                self._wishes.probe = message
+                self._pending.probe = message
             case protocol.BrushMessage():
-                find_curve(message.curve, self._desk.document)
-                self._wishes.brush = message
+                find_curve(message.curve, self._look.document)
+                self._pending.brush = message
             case protocol.TouchMessage():
                 self._touch(message)
 
     def _touch(self, message: protocol.TouchMessage) -> None:
         if message.curve is not None:
-            find_curve(message.curve, self._desk.document)
-            self._wishes.touch = message.curve
+            find_curve(message.curve, self._look.document)
+            self._pending.touch = message.curve
         elif message.parameter is not None:
-            check_held(message.parameter, self._desk.document)
-            self._wishes.hold = message.parameter
+            check_held(message.parameter, self._look.document)
+            self._pending.hold = message.parameter
 
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
-            self._wishes.target = self._desk.apply(message, received_s)
+            self._pending.target = self._look.apply(message, received_s)
         except RelumeError:
             self._metrics.edits.labels("refused").inc()
             raise
         self._metrics.edits.labels("applied").inc()
 
-    def _show(self, names: Sequence[str]) -> None:
+    def _show(self, names: Sequence[str], space: tuple[int, int] | None) -> None:
         for name in names:
             if name not in self._transfer.views:
                 raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
         self._shown.show(names)
+        self._pending.space = space
 
 
 def _text_of(message: Any) -> str | None:

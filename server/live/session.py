@@ -8,32 +8,36 @@ import secrets
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import RelumeError
+from relume.picture.transfer import Transfer
 from server.errors import close_code_of, problem_of
-from server.live.bake_news import BakeNews
-from server.live.edits import LookDesk
-from server.live.frame_loop import FrameLoop
-from server.live.parts import Parts
-from server.live.ports import Library, Transfer, View
+from server.library.ports import Library
+from server.library.threads import Threads
 from server.live.reception import Reception
-from server.live.resume import ResumeStore
-from server.live.shown import Shown
-from server.live.threads import Threads
-from server.live.window import Window
-from server.live.wire import Wire
-from server.live.wishes import Wishes
+from server.live.sending.bake_news import BakeNews
+from server.live.sending.frame_loop import FrameLoop
+from server.live.state.client_socket import ClientSocket
+from server.live.state.frame_window import FrameWindow
+from server.live.state.look_state import LookState
+from server.live.state.pending_requests import PendingRequests
+from server.live.state.resume import ResumeStore
+from server.live.state.session_state import SessionState
+from server.live.state.shown_views import ShownViews
 from server.metrics import Metrics
-from server.protocol import CameraInfo, HelloMessage, ViewInfo
+from server.wire.protocol import CameraInfo, HelloMessage, ViewInfo
+
+if TYPE_CHECKING:
+    from relume.views.view import View
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class House:
+class SessionServices:
     """What all sessions share."""
 
     library: Library
@@ -44,42 +48,48 @@ class House:
     ack_seconds: float
 
 
-async def serve(house: House, websocket: WebSocket, bake: str, transfer: Transfer, resume: str | None) -> None:
+async def serve(
+    services: SessionServices, websocket: WebSocket, bake: str, transfer: Transfer, resume: str | None
+) -> None:
     """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
-    kept = house.resumes.take(resume, bake, time.monotonic()) if resume else None
+    kept = services.resumes.take(resume, bake, time.monotonic()) if resume else None
     default: dict[str, Any] = transfer.default_look
-    desk = LookDesk(default, kept.document if kept else default, kept.revision if kept else 0)
+    look = LookState(default, kept.document, kept.revision, kept.solo) if kept else LookState(default, default, 0)
     first = next(iter(transfer.views))
-    shown = Shown(kept.views, kept.focus) if kept else Shown([first], first)
-    wire = Wire(websocket, house.ack_seconds)
-    window = Window(house.ack_seconds)
-    parts = Parts(wire, Wishes(desk.target()), shown, window, desk, transfer, house.metrics)
-    token = house.resumes.open(bake, desk, shown)
-    house.metrics.sessions.inc()
+    shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
+    socket = ClientSocket(websocket, services.ack_seconds)
+    window = FrameWindow(services.ack_seconds)
+    state = SessionState(socket, PendingRequests(look.target()), shown, window, look, transfer, services.metrics)
+    token = services.resumes.open(bake, look, shown)
+    services.metrics.sessions.inc()
     try:
-        await wire.send(_hello(bake, transfer, desk, shown, token, kept is not None))
-        await _run(house, websocket, bake, parts)
+        await socket.send(_hello(bake, transfer, look, shown, token, kept is not None))
+        await _run(services, websocket, bake, state)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
     except RelumeError as error:
-        await wire.close(close_code_of(error), problem_of(error).detail)
+        await socket.close(close_code_of(error), problem_of(error).detail)
     except Exception as error:
         log.exception("session of bake %s ends by a defect", bake)
-        await wire.close(close_code_of(error), problem_of(error).detail)
+        await socket.close(close_code_of(error), problem_of(error).detail)
     finally:
-        house.metrics.sessions.dec()
-        house.resumes.close(token, time.monotonic())
+        services.metrics.sessions.dec()
+        services.resumes.close(token, time.monotonic())
 
 
-def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: str, resumed: bool) -> HelloMessage:
-    views = [_view_info(view) for view in transfer.views.values()]
+def _hello(
+    bake: str, transfer: Transfer, look: LookState, shown: ShownViews, token: str, resumed: bool
+) -> HelloMessage:
+    views = [_view_info(view, transfer.eyes.value) for view in transfer.views.values()]
     return HelloMessage(
         session=secrets.token_hex(8),
         bake=bake,
         method=transfer.method,
+        axes=sorted(axis.value for axis in transfer.axes),
         scene=transfer.scene_id,
-        look=desk.document,
-        revision=desk.revision,
+        look=look.document,
+        solo=None if look.solo is None else sorted(look.solo),
+        revision=look.revision,
         resumed=resumed,
         view=shown.focus,
         shown=list(shown.names),
@@ -89,17 +99,17 @@ def _hello(bake: str, transfer: Transfer, desk: LookDesk, shown: Shown, token: s
     )
 
 
-def _view_info(view: View) -> ViewInfo:
+def _view_info(view: View, eye: Any) -> ViewInfo:
     camera = CameraInfo(to_world=view.camera.to_world.ravel().tolist(), yfov=view.camera.yfov)
-    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera)
+    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera, eye=eye)
 
 
-async def _run(house: House, websocket: WebSocket, bake: str, parts: Parts) -> None:
+async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:
     """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
     tasks = [
-        asyncio.create_task(Reception(websocket, parts).run()),
-        asyncio.create_task(FrameLoop(parts, house.library, house.threads).run()),
-        asyncio.create_task(house.bake_news.tell(parts.wire, bake, parts.transfer.scene_id)),
+        asyncio.create_task(Reception(websocket, state).run()),
+        asyncio.create_task(FrameLoop(state, services.library, services.threads).run()),
+        asyncio.create_task(services.bake_news.tell(state.socket, bake, state.transfer.scene_id)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

@@ -12,14 +12,14 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
+from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, ParameterError
 from relume.imageio import png_bytes
-from relume.transfer.base import Plan, Recipe
-from server.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
 from server.errors import NotReadyError
-from server.png import FOREVER, PngResponse
+from server.files.png import FOREVER, PngResponse
 from server.services import Services, Shared
+from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
 from worker.presets import PRESETS
 from worker.scenes import get_scene
 from worker.status import BakeStatus, bake_id

@@ -9,10 +9,10 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.scene.built_in import BUILT_IN
-from server.bodies import BuiltInBody, SceneBody
-from server.importing import Order, import_in_process
+from server.files.importing import ImportRequest, import_in_process
 from server.routes.scenes import get_one
 from server.services import Shared
+from server.wire.bodies import BuiltInBody, SceneBody
 
 router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
 
@@ -21,9 +21,7 @@ router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
 def get_all() -> list[BuiltInBody]:
     """All of them, in the order in which they are shown."""
     return [
-        BuiltInBody(
-            name=name, label=each.label, description=each.description, size=each.size, method=each.method
-        )
+        BuiltInBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
         for name, each in BUILT_IN.items()
     ]
 
@@ -33,7 +31,7 @@ async def take_one(name: Annotated[str, Path(max_length=256)], services: Shared,
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
-    order = Order.of(services.settings, "built_in", None, name)
+    order = ImportRequest.of(services.settings, "built_in", None, name)
     async with services.import_slots:
         identity = await run_in_threadpool(import_in_process, order)
     response.headers["Location"] = f"/api/scenes/{identity}"

@@ -11,15 +11,15 @@ from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi import Path as PathPart
 from fastapi.concurrency import run_in_threadpool
 
+from relume.asset_store import check_name
+from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
-from relume.environments.shelf import SHELF, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.thumbnail import thumbnail
-from relume.shelf import check_name
-from server.bodies import EnvironmentBody, Id, moment
-from server.importing import UPLOAD_PREFIX, Order, import_in_process
-from server.png import A_DAY, PngResponse
+from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_process
+from server.files.png import A_DAY, PngResponse
+from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.uploads import keep_upload, plain_stem
+from server.wire.bodies import EnvironmentBody, Id, moment
 from worker.paths import environments_path
 
 router = APIRouter(prefix="/api/environments", tags=["environments"])
@@ -44,7 +44,7 @@ def _import(environment: UploadFile, name: str, services: Services) -> str:
     name = check_name(name or plain_stem(environment.filename) or "Environment")
     with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
         return import_in_process(
-            Order.of(settings, "environment", keep_upload(environment, Path(folder) / "environment"), name)
+            ImportRequest.of(settings, "environment", keep_upload(environment, Path(folder) / "environment"), name)
         )
 
 
@@ -76,7 +76,7 @@ def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
 @router.delete("/{environment}", status_code=204)
 def delete_environment(environment: Id, services: Shared) -> Response:
     """Delete an imported environment; looks that name it are refused from then on."""
-    SHELF.remove(environments_path(services.settings.data), environment)
+    STORE.remove(environments_path(services.settings.data), environment)
     return Response(status_code=204)
 
 

@@ -10,8 +10,8 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.look.library import navigation_map, presets
-from server.bodies import MapPoint, MaterialBody, MaterialMapBody
-from server.png import A_DAY, PngResponse
+from server.files.png import A_DAY, PngResponse
+from server.wire.bodies import MapPoint, MaterialBody, MaterialMapBody
 
 router = APIRouter(prefix="/api/materials", tags=["materials"])
 Part = Annotated[str, Path(max_length=100)]
@@ -52,7 +52,7 @@ async def thumbnail(table: Part, material: Part) -> PngResponse:
 
 
 def _thumbnail(identity: str) -> bytes:
-    from relume.transfer.balls import library_ball  # loads compiled kernels
+    from relume.balls.library import library_ball  # loads compiled kernels
 
     png = library_ball(identity)
     if png is None:

@@ -8,9 +8,9 @@ from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
-from server.bodies import LookEntry, moment
-from server.looks import SavedLook, check_name, parse_document
+from server.records.looks import SavedLook, check_name, parse_document
 from server.services import Shared
+from server.wire.bodies import LookEntry, moment
 
 router = APIRouter(prefix="/api/looks", tags=["looks"])
 Etags = Annotated[str | None, Header(max_length=4096)]

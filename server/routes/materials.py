@@ -10,14 +10,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.look.terms import complete_term
-from relume.measured.shelf import SHELF, MaterialRecord, get_record, keep, records
-from relume.shelf import check_name
-from server.bodies import Id, MeasuredBody, moment
-from server.importing import UPLOAD_PREFIX
-from server.png import A_DAY, PngResponse
+from relume.asset_store import check_name
+from relume.brdf.document import complete_term
+from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
+from server.files.importing import UPLOAD_PREFIX
+from server.files.png import A_DAY, PngResponse
+from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.uploads import keep_upload, plain_stem
+from server.wire.bodies import Id, MeasuredBody, moment
 from worker.paths import materials_path
 
 router = APIRouter(prefix="/api/materials/measured", tags=["materials"])
@@ -65,7 +65,7 @@ async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
 
 @lru_cache(maxsize=256)
 def _thumbnail(record: MaterialRecord) -> bytes:
-    from relume.transfer.ball import ball_png  # loads compiled kernels
+    from relume.balls.ball import ball_png  # loads compiled kernels
 
     return ball_png(_terms(record))
 
@@ -73,7 +73,7 @@ def _thumbnail(record: MaterialRecord) -> bytes:
 @router.delete("/{material}", status_code=204)
 def delete_measured(material: Id, services: Shared) -> Response:
     """Delete a measured material; looks that name it are refused from then on."""
-    SHELF.remove(materials_path(services.settings.data), material)
+    STORE.remove(materials_path(services.settings.data), material)
     return Response(status_code=204)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from relume.brdf import registry
-from server.bodies import ModelBody
+from server.wire.bodies import ModelBody
 
 router = APIRouter(prefix="/api", tags=["models"])
 

@@ -10,12 +10,12 @@ from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import MAX_LOOKS, MAX_NAME, Id, RenderBody, RenderRequest
+from relume.picture.transfer import Transfer
 from server.errors import NotReadyError
-from server.live.ports import Transfer
-from server.renders import RenderStatus
+from server.queues.renders import Render
 from server.routes.bakes import ready_bake
 from server.services import Shared
+from server.wire.bodies import MAX_LOOKS, MAX_NAME, Id, RenderBody, RenderRequest
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
@@ -78,37 +78,30 @@ def delete_render(render: Id, services: Shared) -> Response:
 @router.get("/{render}/frames/{index}", response_class=FileResponse)
 def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_LOOKS)], services: Shared) -> FileResponse:
     """One finished picture, counted from 0."""
-    status = services.renders.get(render)
-    if index >= len(status.request.looks):
-        raise NotFoundError(f"this batch has {len(status.request.looks)} frames, counted from 0")
-    path = services.renders.frame_path(status, index)
+    found = services.renders.get(render)
+    if index >= found.total:
+        raise NotFoundError(f"this batch has {found.total} frames, counted from 0")
+    path = services.renders.frame_path(found, index)
     if not path.exists():
-        raise NotReadyError(f"frame {index} is not finished; {_state(status)}")
-    name = services.renders.download_name(status, index)
-    return FileResponse(path, media_type=MEDIA_TYPES[status.request.format], filename=name)
+        raise NotReadyError(f"frame {index} is not finished; {_state(found)}")
+    name = services.renders.download_name(found, index)
+    return FileResponse(path, media_type=MEDIA_TYPES[found.request.format], filename=name)
 
 
 @router.get("/{render}/archive.zip", response_class=FileResponse)
 def get_archive(render: Id, services: Shared) -> FileResponse:
     """All pictures in one file, when all are finished."""
-    status = services.renders.get(render)
-    if status.state != "ready":
-        raise NotReadyError(f"the batch is not finished; {_state(status)}")
-    path = services.renders.archive_path(status)
-    return FileResponse(path, media_type="application/zip", filename=services.renders.archive_name(status))
+    found = services.renders.get(render)
+    if found.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(found)}")
+    path = services.renders.archive_path(found)
+    return FileResponse(path, media_type="application/zip", filename=services.renders.archive_name(found))
 
 
-def _state(status: RenderStatus) -> str:
-    return f"it failed: {status.problem}" if status.problem else f"it is {status.state}, wait a little"
+def _state(found: Render) -> str:
+    return f"it failed: {found.problem}" if found.problem else f"it is {found.state}, wait a little"
 
 
-def _body(status: RenderStatus) -> RenderBody:
-    request, total = status.request, len(status.request.looks)
-    return RenderBody.of(
-        status,
-        bake=request.bake,
-        view=request.view,
-        format=request.format,
-        size=request.size,
-        total=total,
-    )
+def _body(render: Render) -> RenderBody:
+    request = render.request
+    return RenderBody.of(render, bake=request.bake, view=request.view, format=request.format, size=request.size)

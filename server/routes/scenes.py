@@ -14,11 +14,11 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.bodies import Id, SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
-from server.importing import UPLOAD_PREFIX, Order, import_in_process
+from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_process
+from server.files.thumbnails import MAX_WIDTH
+from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.thumbnails import MAX_WIDTH, thumbnail
-from server.uploads import keep_upload, plain_stem
+from server.wire.bodies import Id, SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
 from worker.paths import scene_path
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
@@ -77,7 +77,7 @@ def _import(
             for number, each in enumerate(companions)
         }
         name = name.strip() or plain_stem(scene.filename) or "Scene"
-        order = Order.of(settings, "scene", file, name, lit_by, scene.filename or "", beside)
+        order = ImportRequest.of(settings, "scene", file, name, lit_by, scene.filename or "", beside)
         return import_in_process(replace(order, ground=ground))
 
 
@@ -86,7 +86,7 @@ async def add_ground(scene: Id, services: Shared, response: Response) -> SceneBo
     """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     settings = services.settings
-    order = Order.of(settings, "grounded", scene_path(settings.data, scene), f"{record.name[:185]} on a ground")
+    order = ImportRequest.of(settings, "grounded", scene_path(settings.data, scene), f"{record.name[:185]} on a ground")
     async with services.import_slots:
         identity = await run_in_threadpool(import_in_process, order)
     response.headers["Location"] = f"/api/scenes/{identity}"
@@ -122,14 +122,14 @@ async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> 
     pictured = _pictured([status for status in statuses if bake in (None, status.id)])
     if pictured is None:
         raise NotFoundError("there is no picture of this scene; bake it first")
-    path = await thumbnail(services, pictured)
+    path = await services.thumbnails.find(pictured, services.bakes.store_path(pictured))
     return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
 
 
 def _pictured(bakes: Sequence[BakeStatus]) -> str | None:
     """The bake that a scene's thumbnail shows: the coarsest of those that have its pixels, because it is painted
     soonest; where none has, the finest."""
-    ready = sorted((status for status in bakes if status.state == "ready"), key=lambda status: status.detail)
+    ready = sorted((status for status in bakes if status.state == "ready"), key=lambda status: status.rank)
     enough = [status for status in ready if status.recipe.size[0] >= MAX_WIDTH]
     return (enough or ready[-1:])[0].id if ready else None
 

@@ -9,10 +9,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from relume.errors import NotFoundError, RelumeError, VersionMismatchError
 from server.errors import CLOSE_PROTOCOL, BusyError, close_code_of, problem_of
 from server.live.session import serve
-from server.live.wire import Wire
-from server.protocol import SUBPROTOCOL
+from server.live.state.client_socket import ClientSocket
 from server.routes.bakes import ready_bake
 from server.services import Services
+from server.wire.protocol import SUBPROTOCOL
 
 router = APIRouter()
 
@@ -23,7 +23,7 @@ async def session(websocket: WebSocket, bake: str) -> None:
     services: Services = websocket.app.state.services
     is_ours = SUBPROTOCOL in websocket.scope["subprotocols"]
     await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
-    wire = Wire(websocket, services.settings.ack_seconds)
+    socket = ClientSocket(websocket, services.settings.ack_seconds)
     try:
         if not is_ours:
             raise VersionMismatchError(f"this server speaks {SUBPROTOCOL}; reload the page", CLOSE_PROTOCOL)
@@ -31,7 +31,7 @@ async def session(websocket: WebSocket, bake: str) -> None:
     except WebSocketDisconnect:
         return
     except (RelumeError, OSError) as error:
-        await wire.close(close_code_of(error), problem_of(error).detail)
+        await socket.close(close_code_of(error), problem_of(error).detail)
 
 
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
@@ -42,6 +42,6 @@ async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
         async with services.transfers.using(status.id, services.bakes.store_path(status.id)) as transfer:
             if not transfer.views:
                 raise NotFoundError("this bake has no views; bake again")
-            await serve(services.house, websocket, status.id, transfer, websocket.query_params.get("resume"))
+            await serve(services.live, websocket, status.id, transfer, websocket.query_params.get("resume"))
     finally:
         services.session_slots.release()

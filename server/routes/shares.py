@@ -10,13 +10,13 @@ from fastapi.concurrency import run_in_threadpool
 from relume import environments
 from relume import look as looks
 from relume.errors import NotFoundError
-from relume.measured.shelf import SHELF as MEASURED
-from server.bodies import ShareBody, ShareEntry, ShareRequest, moment
-from server.live.ports import Transfer
+from relume.measured.asset_store import STORE as MEASURED
+from relume.picture.transfer import Transfer
+from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
 from server.routes.renders import baked_view, check_look
 from server.services import Services, Shared
-from server.shares import MAX_ID_LENGTH
+from server.wire.bodies import ShareBody, ShareEntry, ShareRequest, moment
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/shares", tags=["shares"])

@@ -22,12 +22,14 @@ IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
     "bench.rays", "bench.bake", "bench.ray_saving", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms",
     "bench.pca", "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.gather", "bench.gather_rooms",
-    "bench.gather_lights", "bench.estimators", "bench.sharp_slider",
+    "bench.gather_lights", "bench.gather_follow", "bench.estimators", "bench.sharp_slider", "bench.mesh_files",
 ]  # fmt: skip
 WITH_PROCESSES = [
-    "bench.workers", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
+    "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
     "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights", "bench.memory",
 ]  # fmt: skip
+# of random points, or by a renderer that is noisy: they carry a standard error
+ESTIMATES = ("accuracy.", "paper.", "truth.", "gather.rmse_", "lights.rmse_", "estimators.", "peer.")
 
 
 def group_of(module: str) -> registry.Group:
@@ -45,6 +47,8 @@ def check(group: registry.Group) -> None:
             assert math.isfinite(figure.value)
             assert figure.value >= 0
             assert figure.unit
+            assert (figure.standard_error is not None) == figure.name.startswith(ESTIMATES), figure.name
+            assert figure.standard_error is None or figure.standard_error > 0
         assert figure.context
 
 
@@ -74,7 +78,8 @@ def test_stolen_share_is_a_share_of_what_was_wanted() -> None:
 def test_json_is_a_list_of_figures(capsys: pytest.CaptureFixture[str]) -> None:
     assert registry.run("frame.bandwidth", as_json=True, tiny=True) == 0
     (figure,) = json.loads(capsys.readouterr().out)
-    assert set(figure) == {"name", "value", "unit", "context"}
+    assert set(figure) == {"name", "value", "unit", "context", "standard_error"}
+    assert figure["standard_error"] is None
     assert figure["name"] == "frame.bandwidth_ratio"
     assert figure["context"]["threads"] >= 1
 
@@ -119,6 +124,23 @@ def test_documents_have_their_table(name: str) -> None:
     mine = [figure for figure in registry.names() if table.document_of(figure) == name]
     for figure in mine:
         assert figure.removesuffix(".p50").removesuffix(".p95") in text
+
+
+def test_estimate_is_shown_with_its_standard_error() -> None:
+    share = {"name": "gather.rmse_x", "value": 0.0112, "unit": "relative RMSE", "context": {}, "standard_error": 0.0034}
+    assert table.row(share) == "| `gather.rmse_x` | 1.12 ± 0.34 % |  |  |"
+    ratio = {"name": "peer.x", "value": 1.2e6, "unit": "ratio", "context": {}, "standard_error": 9.8e4}
+    assert "| 1.2e+06 ± 9.8e+04 × |" in table.row(ratio)
+
+
+@pytest.mark.parametrize("name", ["performance.md", "accuracy.md"])
+def test_rows_are_those_that_the_benchmarks_wrote(name: str) -> None:
+    text = (table.DOCS / name).read_text()
+    rows = text.partition(table.BEGIN)[2].partition(table.END)[0].splitlines()[3:]
+    told = {line.split("`")[1]: line for line in rows if line}
+    assert set(told) <= set(registry.names())
+    for figure, line in told.items():
+        assert "not measured" in line or re.search(r"; measured_on \d{4}-\d\d-\d\d, schema \d+ \|$", line), figure
 
 
 def test_figure_without_a_value_says_why() -> None:

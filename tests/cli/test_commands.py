@@ -16,9 +16,10 @@ import pytest
 
 from cli.interrupts import noted_interrupts
 from cli.main import main
+from relume.environments.model import Environment
 from relume.scene.archive import make_scene
 from relume.scene.built_in import BUILT_IN, built_in
-from relume.scene.model import Camera, Environment, Material, Mesh
+from relume.scene.model import Camera, Material, Mesh
 from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene

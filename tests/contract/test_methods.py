@@ -1,4 +1,4 @@
-"""What every transfer method promises: a new one inherits these tests by standing in the registry.
+"""What every transfer method's bakes promise: a new one inherits these tests by standing in the registry.
 
 Tasks tile what they fill, once; neither their order nor an interruption changes a byte; a store that is opened again
 gives the same arrays; a method that travels to another process computes the same there.
@@ -7,66 +7,19 @@ gives the same arrays; a method that travels to another process computes the sam
 import hashlib
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from relume.errors import PlanError, RelumeError
-from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.bake import Recipe, Task
+from relume.errors import PlanError
+from relume.methods.base import TransferMethod
+from relume.scene.model import Scene
 from relume.store import bake_here, fill, open_staging, open_store, publish
 from relume.store.publish import array_paths
-from relume.transfer.base import Recipe, Task, TransferMethod
-from relume.transfer.registry import METHODS
-
-SIZE, NUM_LIGHTS = (48, 36), 100
-
-
-def _quad(name: str, corners: list[list[float]], material: int) -> Mesh:
-    positions = np.array(corners, np.float32)
-    normal = np.cross(positions[1] - positions[0], positions[2] - positions[0])
-    normals = np.tile((normal / np.linalg.norm(normal)).astype(np.float32), (4, 1))
-    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
-    return Mesh(name, positions, normals, np.zeros((4, 4), np.float32), np.zeros((4, 2), np.float32), faces, material)
-
-
-@pytest.fixture(scope="module")
-def scene() -> Scene:
-    """A floor and a wall that shadows it, a name that is hard on file names, two views, light from one side."""
-    floor = _quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
-    wall = _quad("wall", [[-0.5, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]], 1)
-    glossy = {"model": "blinn_phong", "color": [0.4, 0.4, 0.4], "params": {"exponent": 20.0}}
-    materials = [
-        Material("Floor", ({"model": "lambert", "color": [0.6, 0.5, 0.4]},)),
-        Material("Wall", ({"model": "lambert", "color": [0.2, 0.3, 0.5]}, glossy)),
-    ]
-    cosine, sine = np.cos(-0.5), np.sin(-0.5)
-    front = np.eye(4)
-    front[:3, :3] = [[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]]
-    front[:3, 3] = [0, 1.8, 3]
-    side = front.copy()
-    side[0, 3] = 0.7
-    cameras = [Camera("front", front, 0.9), Camera("Seite nº 2: ../c", side, 0.9)]
-    radiance = np.random.default_rng(7).random((16, 32, 3), np.float32)
-    radiance[:6, 3:7] += 20
-    return make_scene("contract", [floor, wall], materials, cameras, Environment("side", radiance))
-
-
-@pytest.fixture(scope="module", params=sorted(METHODS))
-def method(request: pytest.FixtureRequest) -> TransferMethod:
-    return METHODS[request.param]
-
-
-@pytest.fixture(scope="module")
-def recipe(method: TransferMethod, scene: Scene) -> Recipe:
-    return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS)
-
-
-@pytest.fixture(scope="module")
-def baked(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An undisturbed bake."""
-    return bake_here(method, scene, recipe, tmp_path_factory.mktemp("contract") / "store.zarr")
 
 
 def tree_hash(folder: Path) -> str:
@@ -97,9 +50,8 @@ def test_plan_bounds_what_the_bake_takes(method: TransferMethod, scene: Scene, r
     bake_here(method, scene, recipe, tmp_path / "s.zarr", lambda _, written: rays.append(written.num_rays))
     reader = open_store(tmp_path / "s.zarr")
     stored = sum(reader.read(path).nbytes for path in array_paths(tmp_path / "s.zarr"))
-    assert 0 < sum(rays) <= plan.num_rays + 64 * plan.num_view_samples
-    assert 0 < stored <= 1.1 * plan.store_bytes + 1_000_000
-    assert plan.peak_bytes > 0
+    assert 0 < sum(rays) <= plan.num_rays
+    assert 0 < stored <= plan.store_bytes
 
 
 def test_plan_is_pure(method: TransferMethod, scene: Scene, recipe: Recipe) -> None:
@@ -111,11 +63,10 @@ def test_plan_is_pure(method: TransferMethod, scene: Scene, recipe: Recipe) -> N
     "changes", [{"views": ("nowhere",)}, {"views": ()}, {"num_lights": 10**9}, {"num_lights": 0}, {"size": (0, 0)}]
 )
 def test_recipe_that_does_not_fit_is_refused_by_the_plan(
-    method: TransferMethod, scene: Scene, changes: dict[str, object]
+    method: TransferMethod, scene: Scene, recipe: Recipe, changes: dict[str, Any]
 ) -> None:
-    fields = {"method": method.name, "views": ("front",), "size": SIZE, "num_lights": NUM_LIGHTS, **changes}
     with pytest.raises(PlanError):
-        method.plan(scene, Recipe(**fields))  # type: ignore[arg-type]
+        method.plan(scene, replace(recipe, **changes))
 
 
 def test_tasks_tile_every_announced_array_once(
@@ -181,5 +132,5 @@ def test_task_alone_computes_what_it_computed_in_the_bake(
 
 
 def test_unknown_task_does_not_pass_silently(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
-    with pytest.raises((RelumeError, LookupError, StopIteration, ValueError)):
+    with pytest.raises(ValueError, match="not in"):
         method.compute(scene, recipe, Task(len(method.stages) - 1, 0, "no such view", 0, 1), open_store(baked))

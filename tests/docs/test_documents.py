@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 
@@ -43,6 +44,43 @@ def test_links_lead_somewhere(document: Path) -> None:
         if anchor:
             headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
             assert anchor in {_anchor(heading) for heading in headings}, f"{target} has no such heading"
+
+
+PATH = re.compile(r"\b((?:relume|worker|server|cli|bench|tests|client_web|docker|docs)/[\w./-]*\w/?)")
+MODULE = re.compile(r"`((?:relume|worker|server|bench)(?:\.[a-z_]\w*)+)")
+NOT_MODULES = {"relume.v1", "relume.db"}
+EXAMPLES = {"relume/brdf/terms/your_term.py", "bench/.venv-peers", "bench/.venv-cycles", "client_web/dist"}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_modules_that_are_named_are_there(document: Path) -> None:
+    text = document.read_text(encoding="utf-8")
+    for path in set(PATH.findall(text)) - EXAMPLES:
+        assert (ROOT / path).exists(), f"{path} is not there"
+    for name in set(MODULE.findall(text)) - NOT_MODULES:
+        assert _is_module_or_of_one(name), f"{name} is not there"
+
+
+def _is_module_or_of_one(name: str) -> bool:
+    module, _, attribute = name.rpartition(".")
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError:
+        return hasattr(importlib.import_module(module), attribute)
+    return True
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_lists_of_files_name_what_is_there(document: Path) -> None:
+    """A name without a folder stands in that of the name before it."""
+    for listed in re.findall(r"^\*Files?:\*(.*?)\n\n", document.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        folder = None
+        for name in re.findall(r"`([^`]+)`", listed):
+            folder = Path(name).parent if "/" in name and not name.endswith("/") else folder
+            folder = Path(name) if name.endswith("/") else folder
+            assert folder is not None, f"{name} stands in no folder"
+            path = name if "/" in name else folder / name
+            assert (ROOT / path).exists(), f"{path} is not there"
 
 
 def test_folder_map_of_the_readme_matches_ls() -> None:

@@ -15,9 +15,9 @@ from playwright.sync_api import Locator, expect
 from relume import look as looks
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.transfer.cache import FrozenCache
-from relume.transfer.opened import open_transfer
-from relume.transfer.picture import Picture
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
 
 HALF_ANGLE = "half angle θh"
 NUDGE = 1e-3
@@ -103,8 +103,8 @@ class Painter:
 
     def __init__(self, server: Server) -> None:
         (bake,) = server.call("/api/bakes")
-        self._transfer = open_transfer(server.data / "bakes" / f"{bake['id']}.zarr")
-        self._picture = Picture(self._transfer, "front", FrozenCache(1 << 30))
+        self._transfer = open_transfer(server.data / "bakes" / f"{bake['id']}.zarr", Memory(1 << 30))
+        self._picture = Picture(self._transfer, "front", Memory(1 << 30))
 
     def paint(self, term: dict[str, Any]) -> NDArray[np.float64]:
         """With this highlight on the ball."""
@@ -112,7 +112,7 @@ class Painter:
         look = looks.validate({"materials": {"Ball": {"terms": terms}}}, self._transfer.default_look)
         self._picture.set_look(look)
         self._picture.touch("/materials/Ball/terms/1/curves/theta_h")
-        while not self._picture.advance(None).exact or self._picture.waiting() is not None:
+        while not self._picture.advance(None).exact or self._picture.next_job() is not None:
             self._picture.freeze(lambda share: None, lambda: False)
         return self._picture.image().astype(np.float64)
 

@@ -42,9 +42,11 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
     # a server that has much to do: what it says of the render goes on being half done
     page.route(
         "**/api/renders/*",
-        lambda route: route.fulfill(json={"id": "a", "state": "running", "progress": 0.5, "problem": None})
-        if route.request.method == "GET"
-        else route.fulfill(status=204),
+        lambda route: (
+            route.fulfill(json={"id": "a", "state": "running", "progress": 0.5, "problem": None})
+            if route.request.method == "GET"
+            else route.fulfill(status=204)
+        ),
     )
     exr.click()
     expect(bar).to_have_attribute("value", "0.5")

@@ -8,8 +8,8 @@ from editor_server import Server
 from merl_files import planes_of
 from playwright.sync_api import Locator, Page, expect
 
+from relume.measured.asset_store import keep
 from relume.measured.merl import write_merl
-from relume.measured.shelf import keep
 from worker.paths import materials_path
 
 

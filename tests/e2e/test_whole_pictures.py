@@ -64,7 +64,7 @@ def test_exchanged_light_comes_to_background_and_objects_at_once(editor: Editor,
         page.wait_for_function("(of) => window.draws.at(-1)?.[of] > 0.3", arg=name)
         editor.wait_until_exact()
     drawn = draws(page)
-    assert len(drawn) > 2
+    assert len(drawn) >= 2  # both are known already, and come back without a preview
     assert max(min(each["red"], each["blue"]) for each in drawn) < 0.01, "a picture of two lights"
     page.get_by_role("radio", name="Own").click()
     editor.wait_until_exact()

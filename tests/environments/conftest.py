@@ -3,7 +3,7 @@
 import pytest
 from environment_files import dusk, write_map
 
-from relume.environments.shelf import SHELF, keep
+from relume.environments.asset_store import STORE, keep
 
 
 @pytest.fixture(scope="session")
@@ -14,6 +14,6 @@ def dusk_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def shelf(dusk_file, tmp_path_factory):
     """A folder with one imported environment, in use."""
-    with SHELF.at(tmp_path_factory.mktemp("shelf") / "environments") as folder:
+    with STORE.at(tmp_path_factory.mktemp("shelf") / "environments") as folder:
         keep(folder, dusk_file, "Dusk")
         yield folder

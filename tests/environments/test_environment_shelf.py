@@ -11,12 +11,12 @@ from PIL import Image
 
 from relume import environments
 from relume.color import luminance
-from relume.environments import shelf as shelves
+from relume.environments import asset_store
+from relume.environments.asset_store import STORE, get_record, keep, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
-from relume.environments.shelf import SHELF, get_record, keep, records, thumbnail_path
+from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, SceneError
-from relume.light.environment import texel_directions, texel_solid_angles
 
 
 def test_an_import_is_listed_and_found_by_its_name(shelf):
@@ -47,10 +47,10 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
 
 
 def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):
-    monkeypatch.setattr(shelves, "MAX_WIDTH", 32)
+    monkeypatch.setattr(asset_store, "MAX_WIDTH", 32)
     pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
     path = write_map(tmp_path / "large.exr", pixels)
-    with SHELF.at(tmp_path / "shelf") as folder:
+    with STORE.at(tmp_path / "shelf") as folder:
         record = keep(folder, path, "Large")
         assert record.warnings == ("environment 'Large' is 96×48; it is kept as 32×16",)
         found = environments.find(record.map).radiance
@@ -76,7 +76,7 @@ def test_other_names_are_unknown(shelf, name):
 def test_damaged_files_are_named(shelf, tmp_path, file, content):
     shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / file).write_bytes(content)
-    with SHELF.at(tmp_path), pytest.raises(SceneError, match="import it again"):
+    with STORE.at(tmp_path), pytest.raises(SceneError, match="import it again"):
         environments.find("env:fedcba9876543210")
 
 
@@ -84,7 +84,7 @@ def test_arrays_of_other_shapes_are_damage(shelf, tmp_path):
     shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
     for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
         np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
-        with SHELF.at(tmp_path), pytest.raises(SceneError, match="damaged"):
+        with STORE.at(tmp_path), pytest.raises(SceneError, match="damaged"):
             environments.find("env:fedcba9876543210")
 
 

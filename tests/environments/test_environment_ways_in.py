@@ -12,8 +12,8 @@ from session_client import open_session
 from tiny_scenes import still_life
 
 from cli.main import main
-from relume.environments.shelf import records
-from relume.transfer.base import Recipe
+from relume.bake import Recipe
+from relume.environments.asset_store import records
 from server.app import create_app
 from server.settings import Settings
 from worker.scenes import register_scene

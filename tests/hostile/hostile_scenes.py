@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.gltf import import_gltf
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

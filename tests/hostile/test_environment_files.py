@@ -13,8 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from relume.environments.reading import read_environment
 from relume.errors import SceneError
-from relume.light.environment import read_environment
 
 
 def hdr(width: int, height: int, pixels: bytes = b"") -> bytes:

@@ -14,7 +14,7 @@ from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
 from server.live.reception import MAX_BAD_MESSAGES
-from server.protocol import MAX_MESSAGE_BYTES
+from server.wire.protocol import MAX_MESSAGE_BYTES
 
 IDS = "0123456789abcdef"
 

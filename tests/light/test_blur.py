@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from relume.environments.equirect import lookup, texel_directions, texel_solid_angles
 from relume.light.blur import MOST_ROWS, blurred, reduced
-from relume.light.environment import lookup, texel_directions, texel_solid_angles
 
 HEIGHT = 128
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.light.bounces import bounce, bounced, bounced_roughly, irradiance
 from relume.light.triangles import subdivide
+from relume.methods.bounces import bounce, bounced, irradiance, preview_bounced
 from relume.trace.cell_tree import NO_CELL
 
 
@@ -45,12 +45,12 @@ def test_even_light_in_a_closed_room_grows_as_a_geometric_series(num_bounces):
 def test_rough_bounces_are_those_that_settle_into_a_shape(num_bounces):
     links = some_links(400, 64, seed=8, lost=0.1)
     reflectance, direct = np.random.default_rng(9).random((2, 400, 3), np.float32)
-    found = bounced_roughly(links, links, 0.8 * reflectance, direct, num_bounces)
+    found = preview_bounced(links, links, 0.8 * reflectance, direct, num_bounces)
     expected = bounced(links, 0.8 * reflectance, direct, num_bounces)
     assert np.linalg.norm(found - expected) <= 1e-3 * np.linalg.norm(expected)
     if num_bounces <= 6:
         np.testing.assert_array_equal(found, expected)
-    assert not bounced_roughly(links, links, reflectance, 0 * direct, num_bounces).any()
+    assert not preview_bounced(links, links, reflectance, 0 * direct, num_bounces).any()
 
 
 def test_what_is_black_reflects_nothing_and_what_is_lost_gives_nothing():
@@ -77,7 +77,7 @@ def test_irradiance_is_its_twin():
     seen = rng.random((333, lights.num_lights)) < 0.5
     cosine = np.maximum(normal.astype(float) @ lights.direction.T, 0) * seen
     found = irradiance(normal, np.packbits(seen, axis=1, bitorder="little"), lights)
-    np.testing.assert_allclose(found, cosine @ lights.power, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(found, cosine @ lights.irradiance, rtol=1e-5, atol=1e-6)
 
 
 def test_open_sky_of_one_radiance_gives_pi():

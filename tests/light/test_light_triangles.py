@@ -7,8 +7,8 @@ import pytest
 from tiny_scenes import studio
 
 from relume.color import luminance
+from relume.environments.equirect import shrunk, texel_directions, texel_solid_angles
 from relume.errors import PlanError
-from relume.light.environment import shrunk, texel_directions, texel_solid_angles
 from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
 from relume.light.triangles import subdivide, weigh
 
@@ -83,7 +83,7 @@ def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
     compared = 0
     for m, (corners, inside) in enumerate(zip(corners_of(lights), texels, strict=True)):
         if len(inside) == 0:
-            assert not lights.power[m].any()
+            assert not lights.irradiance[m].any()
             continue
         mean = weight[inside] @ directions[inside]
         mean /= np.linalg.norm(mean)
@@ -115,8 +115,8 @@ def test_where_light_is_uniform_triangles_are_their_tiles():
 
 def test_power_is_the_environments(lights):
     expected = texel_power(studio()).sum(axis=0)
-    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), expected, rtol=1e-6)
-    assert (lights.power >= 0).all()
+    np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), expected, rtol=1e-6)
+    assert (lights.irradiance >= 0).all()
 
 
 @pytest.mark.parametrize("num_lights", [8, 100, 700])
@@ -131,9 +131,9 @@ def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
     np.add.at(inside, owner[~on_edge], power[~on_edge])
     touching = np.zeros(lights.num_lights, bool)
     touching[np.nonzero((depth[on_edge] > -1e-6).any(axis=0))[0]] = True
-    np.testing.assert_allclose(lights.power[~touching], inside[~touching], rtol=1e-5, atol=1e-9)
-    assert (lights.power - inside > -1e-6).all()
-    np.testing.assert_allclose((lights.power - inside).sum(axis=0), power[on_edge].sum(axis=0), atol=1e-5)
+    np.testing.assert_allclose(lights.irradiance[~touching], inside[~touching], rtol=1e-5, atol=1e-9)
+    assert (lights.irradiance - inside > -1e-6).all()
+    np.testing.assert_allclose((lights.irradiance - inside).sum(axis=0), power[on_edge].sum(axis=0), atol=1e-5)
 
 
 def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
@@ -142,14 +142,14 @@ def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
     assert (depth > -1e-6).all()
     radiance = studio()
     towards = (luminance(texel_power(radiance))[:, None] * texel_directions(32, 64).reshape(-1, 3)).sum(axis=0)
-    weighted = (luminance(lights.power.astype(float))[:, None] * lights.direction).sum(axis=0)
+    weighted = (luminance(lights.irradiance.astype(float))[:, None] * lights.direction).sum(axis=0)
     cosine = weighted @ towards / np.linalg.norm(weighted) / np.linalg.norm(towards)
     assert cosine > np.cos(np.radians(1.0))
 
 
 def test_same_environment_gives_the_same_triangles_bit_for_bit():
     one, two = subdivide(studio(), 300), subdivide(studio(), 300)
-    for name in ("nodes", "direction", "power"):
+    for name in ("nodes", "direction", "irradiance"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
@@ -167,7 +167,7 @@ def test_small_triangles_lie_on_bright_spots(spot):
     radiance[y - 2 : y + 3, x - 2 : x + 2] = 500.0
     lights = subdivide(radiance, 500)
     angles, mean = solid_angles(tiles_of(radiance, 500)[0]), 4 * np.pi / 500
-    bright = lights.power.sum(axis=1) / angles > 100
+    bright = lights.irradiance.sum(axis=1) / angles > 100
     assert bright.sum() >= 15  # of its twenty texels
     assert angles[bright].mean() < mean / 10
     assert angles.max() > mean  # where nothing happens they are large
@@ -181,7 +181,7 @@ def test_uniform_light_is_divided_evenly():
 def test_black_environment_has_black_lights_all_over_the_sphere():
     lights = subdivide(np.zeros((8, 16, 3), np.float32), 200)
     assert solid_angles(corners_of(lights)).sum() == pytest.approx(4 * np.pi, rel=1e-6)
-    assert not lights.power.any()
+    assert not lights.irradiance.any()
     np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
 
 
@@ -193,7 +193,7 @@ def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
     assert np.isfinite(lights.direction).all()
     assert np.isfinite(lights.nodes).all()
     assert solid_angles(tiles_of(radiance, 4000)[0]).sum() == pytest.approx(4 * np.pi, rel=1e-9)
-    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), texel_power(radiance).sum(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), texel_power(radiance).sum(axis=0), rtol=1e-6)
 
 
 @pytest.mark.parametrize("value", [1e-30, 1e6])
@@ -201,9 +201,9 @@ def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
     radiance = np.zeros((16, 32, 3), np.float32)
     radiance[4, 9] = [value, 0, value / 2]
     lights = subdivide(radiance, 1000)
-    lit = lights.power.any(axis=1)
+    lit = lights.irradiance.any(axis=1)
     assert lit.sum() == 1
-    np.testing.assert_allclose(lights.power[lit][0], texel_power(radiance).sum(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(lights.irradiance[lit][0], texel_power(radiance).sum(axis=0), rtol=1e-6)
     assert lights.direction[lit][0] @ texel_directions(16, 32)[4, 9] == pytest.approx(1, abs=1e-6)
 
 
@@ -220,17 +220,19 @@ def test_a_turned_environment_weighs_as_its_turned_image(columns):
     turned = weigh(tiles, radiance, 360 * columns / 64)
     rolled = weigh(tiles, np.roll(radiance, -columns, axis=1))
     # a texel's centre that rounding puts on the other side of an edge changes two tiles; most tiles have none there
-    same = np.isclose(turned.power, rolled.power, rtol=1e-5, atol=1e-9).all(axis=1)
+    same = np.isclose(turned.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
     np.testing.assert_allclose(turned.direction[same], rolled.direction[same], atol=1e-5)
-    np.testing.assert_allclose(turned.power.sum(axis=0, dtype=float), rolled.power.sum(axis=0, dtype=float), rtol=1e-5)
+    np.testing.assert_allclose(
+        turned.irradiance.sum(axis=0, dtype=float), rolled.irradiance.sum(axis=0, dtype=float), rtol=1e-5
+    )
 
 
 def test_another_environment_keeps_all_its_light_in_the_tiles_it_lies_in():
     tiles = choose_tiles(studio(), 300)
     other = np.random.default_rng(4).random((38, 76, 3), np.float32)
     lights = weigh(tiles, other)
-    np.testing.assert_allclose(lights.power.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
     depth = np.diagonal(depth_inside(tiles.corners, lights.direction.astype(float)))
     assert (depth > -1e-6).all()
 
@@ -284,4 +286,4 @@ def test_a_shrunk_map_weighs_as_much():
     np.testing.assert_allclose(small, studio(), rtol=1e-6)
     assert shrunk(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
     tiles = choose_tiles(studio(), 60)
-    np.testing.assert_allclose(weigh(tiles, small).power.sum(0), weigh(tiles, whole).power.sum(0), rtol=1e-2)
+    np.testing.assert_allclose(weigh(tiles, small).irradiance.sum(0), weigh(tiles, whole).irradiance.sum(0), rtol=1e-2)

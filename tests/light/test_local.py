@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tiny_scenes import points_at
 
+from relume.light.gather_rays import shift_of
 from relume.light.local import Triangles, light_sample, make_local, pattern_of, rectangle
 from relume.look import LightGeometry
-from relume.trace.gather_rays import shift_of
 from relume.trace.local_shadows import arriving
 
 RNG = np.random.default_rng(11)
@@ -98,7 +99,7 @@ def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
     normals = np.tile(np.array([0, 1, 0], np.float32), (200, 1))
     pattern = pattern_of(geometry, 64)
     seen = np.full((200, 8), 255, np.uint8)
-    found = arriving(make_local(geometry), pattern, points, normals, np.arange(200, dtype=np.uint32), seen)
+    found = arriving(make_local(geometry), pattern, points_at(points, normals), seen)
     expected = [
         polygon_irradiance(np.array([corner, corner + e, corner + e + f, corner + f]), p, np.array([0, 1, 0]))
         for p in points.astype(float)
@@ -126,12 +127,10 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
     triangles = np.array([[a, b, c], [a, c, d]], np.float32)
     points = RNG.uniform([-1, -0.5, -1], [1, 0.5, 1], (400, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (400, 1))
-    numbers, seen = np.arange(400, dtype=np.uint32), np.full((400, 8), 255, np.uint8)
+    at, seen = points_at(points, normals), np.full((400, 8), 255, np.uint8)
     pattern = pattern_of(geometry, 64)
-    as_one = arriving(make_local(geometry), pattern, points, normals, numbers, seen)
-    as_two = arriving(
-        make_local(GEOMETRIES["one-sided"], Triangles(triangles, False)), pattern, points, normals, numbers, seen
-    )
+    as_one = arriving(make_local(geometry), pattern, at, seen)
+    as_two = arriving(make_local(GEOMETRIES["one-sided"], Triangles(triangles, False)), pattern, at, seen)
     np.testing.assert_allclose(as_two, as_one, rtol=0.05)
     np.testing.assert_allclose(as_two.mean(), as_one.mean(), rtol=2e-3)
 
@@ -142,7 +141,7 @@ def test_emitter_without_area_gives_no_light(corners):
     pattern = pattern_of(GEOMETRIES["one-sided"], 64)
     up = np.array([[0, 1, 0]], np.float32)
     seen = np.full((1, 32), 255, np.uint8)
-    assert arriving(light, pattern, 0 * up, up, np.zeros(1, np.uint32), seen) == 0
+    assert arriving(light, pattern, points_at(0 * up, up), seen) == 0
 
 
 def test_light_that_touches_a_surface_is_finite():
@@ -150,5 +149,5 @@ def test_light_that_touches_a_surface_is_finite():
     for geometry in (LightGeometry("point"), LightGeometry("rectangle", (0, 0, 0), (0, 1, 0), size=(1e-4, 1e4))):
         pattern = pattern_of(geometry, 64)
         seen = np.full((1, 32), 255, np.uint8)
-        found = arriving(make_local(geometry), pattern, 0 * up, up, np.zeros(1, np.uint32), seen)
+        found = arriving(make_local(geometry), pattern, points_at(0 * up, up), seen)
         assert np.isfinite(found).all()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from relume.brdf.document import complete_term
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel, schlick
 from relume.brdf.registry import TERMS
@@ -17,7 +18,6 @@ from relume.errors import ParameterError
 from relume.look.library import navigation_map, presets
 from relume.look.library.fits import CONVERSIONS, GROUPS, conductor_of, convert_all
 from relume.look.library.materials import DATA, presets_of
-from relume.look.terms import complete_term
 
 # rows as the published tables have them, so that something is compared where the tables are not at hand
 EXAMPLES = {

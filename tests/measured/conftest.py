@@ -3,9 +3,9 @@
 import pytest
 from merl_files import planes_of
 
+from relume.measured.asset_store import STORE, keep, records
 from relume.measured.lookup import table_of
 from relume.measured.merl import write_merl
-from relume.measured.shelf import SHELF, keep, records
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +27,7 @@ def shelf(planes, tmp_path_factory):
     """A folder with one imported material, in use."""
     folder = tmp_path_factory.mktemp("measured")
     write_merl(folder / "plastic.binary", planes)
-    with SHELF.at(folder / "materials") as materials:
+    with STORE.at(folder / "materials") as materials:
         keep(materials, folder / "plastic.binary", "Plastic")
         yield materials
 

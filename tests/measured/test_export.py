@@ -7,12 +7,12 @@ from test_lookup import directions
 
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.merl_grid import sample_terms
 from relume.brdf.registry import TERMS
 from relume.errors import MaterialError
-from relume.measured.export import sample_terms
+from relume.measured.asset_store import STORE, keep
 from relume.measured.lookup import measured_brdf, table_of
 from relume.measured.merl import grid_directions, is_measured, read_merl, write_merl
-from relume.measured.shelf import SHELF, keep
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_an_edited_material_is_the_same_when_it_is_imported_again(shelf, edited,
         value = sum(eval_brdf(term, wi, wo) for term in again.terms())
         np.testing.assert_allclose(value, sum(eval_brdf(t, wi, wo) for t in edited), rtol=1e-6, atol=1e-8)
     finally:
-        SHELF.remove(shelf, again.id)
+        STORE.remove(shelf, again.id)
 
 
 def test_between_the_nodes_an_edited_export_is_near_the_edit(edited):

@@ -3,25 +3,27 @@
 import numpy as np
 import pytest
 from merl_files import PLASTIC, planes_of
+from oracle import exact_image
+from sessions import relative_rmse, settle
 from test_lookup import directions
 from tiny_scenes import still_life
 
+from relume.bake import Recipe
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.look import default_look, validate
+from relume.measured.asset_store import STORE, keep
 from relume.measured.lookup import measured_brdf
 from relume.measured.merl import write_merl
-from relume.measured.shelf import SHELF, keep
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
 from relume.reference import reference_image
+from relume.render.image import render_image
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import open_transfer
-from relume.transfer.picture import Picture
-from relume.transfer.render import render_image
-from server.live.pointers import find_curve
+from server.live.state.pointers import find_curve
 
 LOBES, HOMOMORPHIC = ("measured_lv", "measured_hd"), ("measured_hf",)
 
@@ -37,10 +39,6 @@ def total(documents, wi, wo):
 
 def settled_curve(document, name):
     return TERMS[document["model"]].settled(document).curve(name)
-
-
-def relative_rmse(a, b):
-    return np.sqrt(np.mean(np.square(np.subtract(a, b, dtype=float)))) / np.sqrt(np.mean(np.square(b, dtype=float)))
 
 
 @pytest.mark.parametrize("models", [LOBES, HOMOMORPHIC])
@@ -110,7 +108,9 @@ def scene():
 @pytest.fixture(scope="module")
 def transfer(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames")
-    return open_transfer(bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 4000), folder / "s"))
+    return open_transfer(
+        bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 4000), folder / "s"), Memory(1 << 30)
+    )
 
 
 def look_with(transfer, documents):
@@ -132,7 +132,7 @@ def test_frame_agrees_with_brute_force(scene, transfer, data, models, changes):
     look = look_with(transfer, material_of(models, data, **changes))
     frame = render_image(transfer, "front", look)
     truth = reference_image(scene, "front", look, (48, 36), 0)
-    assert relative_rmse(frame, truth) < 0.01  # as for analytic terms at this size, tests/transfer/test_truth.py
+    assert relative_rmse(frame, truth) < 0.01  # as for analytic terms at this size, tests/picture/test_truth.py
 
 
 def test_brute_force_of_the_unedited_material_is_that_of_what_was_measured(scene, data):
@@ -146,15 +146,9 @@ def test_brute_force_of_the_unedited_material_is_that_of_what_was_measured(scene
     assert relative_rmse(measured, sampled) < 0.005
 
 
-def settle(picture):
-    while picture.waiting() is not None or not picture.advance(None).exact:
-        picture.freeze(lambda share: None, lambda: False)
-    return picture
-
-
 def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(transfer, data):
     pointer = "/materials/Ball/terms/1/curves/theta_h"
-    picture = Picture(transfer, "front", FrozenCache(1 << 30))
+    picture = Picture(transfer, "front", Memory(1 << 30))
     picture.set_look(look_with(transfer, material_of(LOBES, data)))
     before = settle(picture).image().copy()
     picture.touch(pointer)
@@ -166,9 +160,9 @@ def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(trans
     edited = look_with(transfer, material_of(LOBES, data, **doubled))
     picture.set_look(edited)
     after = settle(picture).image().copy()
-    np.testing.assert_allclose(after, render_image(transfer, "front", edited), rtol=1e-4, atol=1e-5 * after.max())
+    np.testing.assert_allclose(after, exact_image(transfer, edited), rtol=1e-4, atol=1e-5 * after.max())
     without = look_with(transfer, material_of(LOBES[:1], data))
-    diffuse = render_image(transfer, "front", without)
+    diffuse = exact_image(transfer, without)
     np.testing.assert_allclose(after - before, before - diffuse, rtol=2e-3, atol=1e-4 * after.max())
 
 
@@ -176,15 +170,15 @@ def test_another_material_is_another_operator(transfer, shelf, data, tmp_path):
     write_merl(tmp_path / "red.binary", planes_of(({"model": "lambert", "color": [0.9, 0.0, 0.0]},)))
     red = keep(shelf, tmp_path / "red.binary", "Red")
     try:
-        picture = Picture(transfer, "front", FrozenCache(1 << 30))
+        picture = Picture(transfer, "front", Memory(1 << 30))
         picture.set_look(look_with(transfer, material_of(LOBES, data)))
         settle(picture)
         look = look_with(transfer, material_of(LOBES, red.data))
         picture.set_look(look)
-        np.testing.assert_array_equal(settle(picture).image(), render_image(transfer, "front", look))
+        np.testing.assert_array_equal(settle(picture).image(), exact_image(transfer, look))
         view = transfer.views["front"]
         inside = (view.material_ids() == 2) & (np.bincount(view.pixel).reshape(36, 48) == 1)
         assert picture.image()[inside, 0].all()
         assert not picture.image()[inside, 1:].any()
     finally:
-        SHELF.remove(shelf, red.id)
+        STORE.remove(shelf, red.id)

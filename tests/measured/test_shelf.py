@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from relume.brdf.document import complete_term
 from relume.errors import MaterialError, NotFoundError, ParameterError
-from relume.look.terms import complete_term
-from relume.measured import shelf as shelves
+from relume.measured import asset_store as shelves
+from relume.measured.asset_store import STORE, get_record, keep, material, records
 from relume.measured.merl import write_merl
-from relume.measured.shelf import SHELF, get_record, keep, material, records
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
 
 
 def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
-    monkeypatch.setattr(shelves, "SHELF", replace(SHELF, max_entries=1))
+    monkeypatch.setattr(shelves, "STORE", replace(STORE, max_entries=1))
     other = planes.copy()
     other[0, 0, 0, 0] += 1
     write_merl(tmp_path / "other.binary", other)
@@ -66,8 +66,8 @@ def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
 def test_what_is_removed_is_known_no_more(copied):
     folder, identity = copied
     with pytest.raises(NotFoundError):
-        SHELF.remove(folder, "0" * 16)
-    SHELF.remove(folder, identity)
+        STORE.remove(folder, "0" * 16)
+    STORE.remove(folder, identity)
     assert records(folder) == []
     with pytest.raises(NotFoundError, match="import it first"):
         get_record(folder, identity)
@@ -77,7 +77,7 @@ def test_what_is_removed_is_known_no_more(copied):
     "name", ["", "merl:", "merl:../../../etc/passwd", "merl:0000000000000000", "0000000000000000", "merl:" + "G" * 16]
 )
 def test_only_names_of_imported_materials_are_known(shelf, name):
-    assert not SHELF.is_known(name)
+    assert not STORE.is_known(name)
     with pytest.raises(NotFoundError):
         material(name)
 
@@ -86,11 +86,11 @@ def test_names_are_known_while_their_folder_is_in_use(shelf, data, copied):
     folder, identity = copied
     (folder / identity).rename(folder / "fedcba9876543210")
     name = "merl:fedcba9876543210"
-    assert not SHELF.is_known(name)
-    with SHELF.at(folder):
-        assert SHELF.is_known(name)
-        assert set(SHELF.known_names()) >= {name, data}
-    assert not SHELF.is_known(name)
+    assert not STORE.is_known(name)
+    with STORE.at(folder):
+        assert STORE.is_known(name)
+        assert set(STORE.known_names()) >= {name, data}
+    assert not STORE.is_known(name)
 
 
 def change(document, key, value):
@@ -115,7 +115,7 @@ def test_damaged_files_are_named(copied, file, content):
     path = folder / identity / file
     path.write_bytes(content(json.loads((folder / identity / "material.json").read_text())))
     (folder / identity).rename(folder / "fedcba9876543210")
-    with SHELF.at(folder), pytest.raises(MaterialError, match="import it again"):
+    with STORE.at(folder), pytest.raises(MaterialError, match="import it again"):
         material("merl:fedcba9876543210")
 
 

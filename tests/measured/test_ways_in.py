@@ -10,8 +10,8 @@ from merl_files import planes_of
 from PIL import Image
 
 from cli.main import main
+from relume.measured.asset_store import records
 from relume.measured.merl import is_measured, read_merl, write_merl
-from relume.measured.shelf import records
 from server.app import create_app
 from server.settings import Settings
 

@@ -5,27 +5,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_terms import ANALYTIC
+from sessions import relative_rmse
 from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
 
+from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
+from relume.environments.equirect import texel_directions, texel_solid_angles, uv_to_direction
+from relume.environments.model import Environment
 from relume.errors import CancelledError, PlanError
-from relume.light.environment import texel_directions, texel_solid_angles, uv_to_direction
 from relume.look import default_look, validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.picture.transfer import Transfer
 from relume.reference import Points, reference_image, reference_radiance, texels_of
+from relume.render.image import render_image
 from relume.scene.archive import make_scene
-from relume.scene.model import Environment, Light, Material, Scene
+from relume.scene.model import Light, Material, Scene
 from relume.store import bake_here
 from relume.trace.geometry import merge
-from relume.transfer.base import Recipe
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.render import render_image
 
 WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
-
-
-def relative_rmse(a, b):
-    return np.sqrt(np.mean(np.square(np.subtract(a, b, dtype=float)))) / np.sqrt(np.mean(np.square(b, dtype=float)))
 
 
 def image_of(scene, size, spp, *, reflects=False, **changes):
@@ -155,7 +155,7 @@ def test_rendered_frame_agrees(tmp_path: Path) -> None:
     store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
     default = default_look(scene.materials)
     partial = {"environment": {"scale": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
-    frame = render_image(open_transfer(store), "front", validate(partial, default))
+    frame = render_image(open_transfer(store, Memory(1 << 30)), "front", validate(partial, default))
     truth = image_of(scene, size, 0, **partial)
     assert relative_rmse(frame, truth) < 0.005
     assert frame.mean() == pytest.approx(truth.mean(), rel=0.002)
@@ -217,7 +217,7 @@ def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Transfer]
     scene = make_scene("lit", parts.meshes, parts.materials, parts.cameras, parts.environment, lights=[wall])
     folder = tmp_path_factory.mktemp("lit")
     store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 500), folder / "store.zarr")
-    return scene, open_transfer(store)
+    return scene, open_transfer(store, Memory(1 << 30))
 
 
 @pytest.mark.parametrize("kind", LIGHTS)

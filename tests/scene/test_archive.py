@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
+from relume.remarks import simplified
 from relume.scene.archive import load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Environment, Light, Material, Mesh, Scene, Texture
-from relume.scene.remarks import simplified
+from relume.scene.model import Camera, Light, Material, Mesh, Scene, Texture
 
 
 def small_scene(**changes: object) -> Scene:

@@ -10,8 +10,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from relume.brdf.registry import TERMS
+from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.environments.studio import studio
-from relume.light.environment import texel_directions, texel_solid_angles
 from relume.scene.archive import make_scene
 from relume.scene.demo import demo_scene, still_life
 from relume.scene.demo.materials import materials

@@ -8,14 +8,9 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 
+from relume.environments.equirect import direction_to_uv, texel_directions, texel_solid_angles, uv_to_direction
+from relume.environments.reading import read_environment
 from relume.errors import SceneError
-from relume.light.environment import (
-    direction_to_uv,
-    read_environment,
-    texel_directions,
-    texel_solid_angles,
-    uv_to_direction,
-)
 
 
 def written(path: Path, pixels: np.ndarray) -> Path:

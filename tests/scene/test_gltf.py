@@ -11,8 +11,9 @@ import pytest
 from glb_builder import QUAD, QUAD_NORMALS, QUAD_UVS, Glb, self_contained
 
 from relume.brdf.registry import TERMS
+from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
-from relume.scene.model import Environment, Material, Mesh, Scene
+from relume.scene.model import Material, Mesh, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.look import default_look
 from relume.scene.gltf import import_gltf
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 
 LIGHT = Environment("gray", np.ones((4, 8, 3), np.float32))
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
+from relume.brdf.document import complete_term
 from relume.brdf.fresnel import schlick
 from relume.brdf.registry import TERMS
-from relume.look.terms import complete_term
+from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
 from relume.scene.gltf.sheen import MIN_ALPHA, sheen_curve
 from relume.scene.gltf.terms import COAT_ALBEDO
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 PLASTIC = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.5}

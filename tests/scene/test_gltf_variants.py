@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.gltf import import_gltf
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

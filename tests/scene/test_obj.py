@@ -10,10 +10,11 @@ import numpy as np
 import PIL.Image
 import pytest
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.importer import import_scene
 from relume.scene.mesh_files.corners import creased_normals
-from relume.scene.model import Environment, Light, Mesh, Scene
+from relume.scene.model import Light, Mesh, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

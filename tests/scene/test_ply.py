@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from ply_builder import POINTS, binary, text
 
+from relume.environments.model import Environment
 from relume.scene.importer import import_scene
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

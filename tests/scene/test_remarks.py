@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from relume.environments.model import Environment
+from relume.remarks import remark_of, simplified, unused, wrong
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.finish import MAX_WARNINGS, finished_scene
 from relume.scene.importer import import_scene
-from relume.scene.model import Environment, Scene
-from relume.scene.remarks import remark_of, simplified, unused, wrong
+from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nmtllib none.mtl\nf 1 2 3\n"

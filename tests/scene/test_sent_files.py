@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene import companions
 from relume.scene.companions import Sent
 from relume.scene.importer import import_scene
-from relume.scene.model import Environment
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = b"mtllib ../looks/red.mtl\nusemtl Red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

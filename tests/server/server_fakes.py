@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.environments.model import Environment
 from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
 from relume.look import default_look
+from relume.memory import Holder
+from relume.picture.transfer import Axis, Eyes
 from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.store import open_store
-from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
-from server.live.ports import Library
+from server.library.ports import Library
 
 THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
@@ -91,12 +94,18 @@ class FakeTransfer:
     default_look: dict[str, Any] = field(default_factory=lambda: default_look(tiny_scene().materials))
     material_names: list[str] = field(default_factory=lambda: ["Paper"])
 
+    eyes: Eyes = Eyes.BAKED
+
+    @property
+    def axes(self) -> frozenset[Axis]:
+        return frozenset([Axis.CURVE, *([Axis.BOUNCES] if self.method == "gather" else [])])
+
     def radiance_of(self, name: str | None) -> np.ndarray:
         return np.ones((4, 8, 3), np.float32)
 
 
 @dataclass(frozen=True)
-class FakeNeed:
+class FakeJob:
     """One curve; made when `control.may_freeze` says so."""
 
     control: "Control"
@@ -140,25 +149,31 @@ class FakePicture:
     def __post_init__(self) -> None:
         self.pixels = np.zeros((self.view.height, self.view.width, 3), np.float32)
 
-    def set_look(self, look: Any) -> None:
+    def set_look(self, look: Any, *, hand: str | None, solo: frozenset[str] | None) -> None:
         if look.environment.rotation != 0.0:
             raise EditNotSupportedError("direct", "the environment's rotation")
         if self.look is None or colour_and_sigma(look) != colour_and_sigma(self.look):
             self.spent = 0
         self.look = look
         self.control.num_looks += 1
+        self.control.hands.append(hand)
+        self.control.solos.append(solo)
+
+    def check(self, look: Any) -> None:
+        if self.view.name in self.control.short_of_memory and ior_of(look) != self.ior:
+            raise MemoryBudgetError("the curve", 2, 1, "close it")
 
     def touch(self, pointer: str) -> None:
         if self.view.name in self.control.short_of_memory:
             raise MemoryBudgetError("the curve", 2, 1, "close it")
         self.wanted = pointer
 
-    def waiting(self) -> FakeNeed | None:
+    def next_job(self) -> FakeJob | None:
         lacking = [THETA_D] if self._lacks_theta_d() else []
         needed = [curve for curve in (*lacking, self.wanted) if curve not in self.frozen]
-        return FakeNeed(self.control, needed[0], refines=self.control.refines) if needed else None
+        return FakeJob(self.control, needed[0], refines=self.control.refines) if needed else None
 
-    def adopt(self, need: FakeNeed, made: str) -> None:
+    def install(self, need: FakeJob, made: str) -> None:
         self.frozen.add(made)
 
     def _lacks_theta_d(self) -> bool:
@@ -223,6 +238,8 @@ class Control:
     max_step: int = NUM_COEFFICIENTS
     refines: bool = False
     num_looks: int = 0
+    hands: list[str | None] = field(default_factory=list)
+    solos: list[frozenset[str] | None] = field(default_factory=list)
     num_cancelled: int = 0
     num_opened: int = 0
     freezing: threading.Event = field(default_factory=threading.Event)
@@ -235,8 +252,13 @@ class Control:
     reflections_asked: list[bool] = field(default_factory=list)
 
     def open_library(self, cache_bytes: int, floor_bytes: int) -> Library:
-        paint = self._open, self._picture, self._render, self._render_small, self._reference
-        return Library(*paint, lambda: 123, lambda stores: self.stores_kept.append(set(stores)))
+        paint = self._open, self._open, self._picture, self._render, self._render_small, self._reference
+        return Library(
+            *paint,
+            lambda: {Holder("frozen", "0123"): 100},
+            lambda: 123,
+            lambda stores: self.stores_kept.append(set(stores)),
+        )
 
     def _open(self, path: Path) -> FakeTransfer:
         attributes = open_store(path).attributes

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE, Control, FakeMethod, tiny_scene
 from session_client import Baked
 
-from relume.transfer.base import Recipe
+from relume.bake import Recipe
 from server.app import create_app
 from server.settings import Settings
 from worker.scenes import register_scene
@@ -48,7 +48,7 @@ def open_fake_bakes(settings: Settings) -> BakeService:
 
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    monkeypatch.setattr("server.live.window.SLOW_S", math.inf)  # a busy machine is no slow link
+    monkeypatch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
     app = create_app(settings, open_library=control.open_library, open_bakes=open_fake_bakes)
     with TestClient(app, raise_server_exceptions=False) as client:
         yield client

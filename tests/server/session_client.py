@@ -36,8 +36,8 @@ class Session:
     def send(self, **message: Any) -> None:
         self.websocket.send_text(json.dumps(message))
 
-    def edit(self, revision: int, path: str, value: Any, op: str = "replace") -> None:
-        self.send(type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}])
+    def edit(self, revision: int, path: str, value: Any, op: str = "replace", hand: str | None = None) -> None:
+        self.send(type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}], hand=hand)
 
     def receive(self) -> dict[str, Any] | Frame:
         message = self.websocket.receive()

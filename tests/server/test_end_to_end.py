@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from session_client import Frame, open_session
 from tiny_scenes import still_life
 
+from relume.bake import Recipe
 from relume.scene.ground import with_ground
-from relume.transfer.base import Recipe
 from server.app import create_app
 from server.settings import Settings
 from worker.scenes import register_scene
@@ -204,10 +204,10 @@ def test_colour_bleeding_follows_a_dragged_colour_and_ends_exact(real: TestClien
         assert list(changes)[-1].state == "ready"
     color, picture = "/materials/Floor/terms/0/color", np.zeros((48, 64, 3))
     with open_session(real, bake) as session:
-        session.edit(1, color, [0.1, 0.1, 0.8])  # rows are frozen for this one
+        session.edit(1, color, [0.1, 0.1, 0.8], hand=color)  # rows are frozen for this one
         put(picture, session.exact(1))
         before = picture.copy()
-        session.edit(2, color, [0.8, 0.1, 0.1])
+        session.edit(2, color, [0.8, 0.1, 0.1], hand=color)
         while (first := session.frame()).header["fidelity"] != "followed":  # the last rows may still be missing
             put(picture, first)
         put(picture, first)

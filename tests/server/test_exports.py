@@ -10,7 +10,7 @@ import OpenImageIO
 from fastapi.testclient import TestClient
 from server_fakes import Control
 from session_client import Baked
-from test_truths import is_done, wait_until
+from test_comparisons import is_done, wait_until
 
 
 def test_renders_are_called_like_the_scene_or_as_asked(client: TestClient, baked: Baked) -> None:
@@ -22,7 +22,7 @@ def test_renders_are_called_like_the_scene_or_as_asked(client: TestClient, baked
         return unquote(client.get(f"{url}/frames/0").headers["content-disposition"])
 
     assert name_of({}) == 'attachment; filename="triangle-front.exr"'
-    assert name_of({"name": "../a\r\nb \"c\"/灯"}) == "attachment; filename*=utf-8''a-b-c-灯.exr"
+    assert name_of({"name": '../a\r\nb "c"/灯'}) == "attachment; filename*=utf-8''a-b-c-灯.exr"
     assert name_of({"name": "...", "format": "png"}) == 'attachment; filename="picture.png"'
     assert name_of({"name": "x" * 256}) == f'attachment; filename="{"x" * 120}.exr"'
     assert name_of({"looks": [{}, {}]}) == 'attachment; filename="triangle-front-0000.exr"'

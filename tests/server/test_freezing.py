@@ -8,11 +8,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from server_fakes import Control, FakeNeed
+from server_fakes import Control, FakeJob
 
 from relume.errors import ProtocolError, StoreError
-from server.live.freezing import Freezer
-from server.live.threads import Threads
+from server.library.threads import Threads
+from server.live.sending.freezing import Freezer
 from server.metrics import Metrics
 
 
@@ -26,7 +26,7 @@ class Told:
         self.states.append(message.state)
 
 
-class Broken(FakeNeed):
+class Broken(FakeJob):
     """Cannot be made."""
 
     def make(self, progress: Any, cancelled: Any) -> str:
@@ -63,7 +63,7 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
 def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeNeed(control, "/curves/theta_d", state))  # type: ignore[arg-type]
+        freezer.start(view, FakeJob(control, "/curves/theta_d", state))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         assert not freezer.is_done
         control.may_freeze.set()
@@ -83,7 +83,7 @@ def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
 def test_cancelled_freeze_gives_nothing() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         freezer.cancel()
         await asyncio.wait_for(news.wait(), 60)
@@ -106,7 +106,7 @@ def test_freeze_that_fails_says_why() -> None:
 def test_client_that_leaves_during_a_freeze_ends_it() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
         await asyncio.wait_for(news.wait(), 60)
         with pytest.raises(ProtocolError):
             await freezer.take()
@@ -119,7 +119,7 @@ def test_client_that_leaves_during_a_freeze_ends_it() -> None:
 def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeNeed(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
         assert await asyncio.to_thread(control.freezing.wait, 60)
         await freezer.end()
         assert control.num_cancelled == 1

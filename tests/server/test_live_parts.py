@@ -8,23 +8,23 @@ from typing import Any
 import pytest
 
 from relume.errors import ParameterError, ProtocolError, StoreError
-from server.live.edits import LookDesk
-from server.live.pace import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, Pace
-from server.live.pointers import check_held, find_curve
-from server.live.resume import MAX_KEPT, ResumeStore
-from server.live.shown import Shown
-from server.live.transfers import MAX_IDLE, TransferPool
-from server.live.window import Window
+from server.library.transfers import MAX_IDLE, TransferPool
+from server.live.sending.coefficient_budget import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, CoefficientBudget
+from server.live.state.frame_window import FrameWindow
+from server.live.state.look_state import LookState
+from server.live.state.pointers import check_hand, check_held, find_curve
+from server.live.state.resume import MAX_KEPT, ResumeStore
+from server.live.state.shown_views import ShownViews
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
 }
-ALONE = Shown(["front"], "front")
+ALONE = ShownViews(["front"], "front")
 TERM = "/materials/a~1b/terms"
 
 
 def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -> None:
-    window = Window(ack_seconds=10)
+    window = FrameWindow(ack_seconds=10)
     for _ in range(2):
         assert window.has_room("front", ALONE)
         window.sent("front", 100, now_s=1.0)
@@ -36,7 +36,7 @@ def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -
 
 
 def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one() -> None:
-    window, shown = Window(ack_seconds=10), Shown(["front", "left", "top"], "left")
+    window, shown = FrameWindow(ack_seconds=10), ShownViews(["front", "left", "top"], "left")
     assert all(window.has_room(name, shown) for name in shown.names)
     window.sent("top", 100, now_s=1.0)
     assert [window.has_room(name, shown) for name in shown.names] == [False, True, False]
@@ -47,7 +47,7 @@ def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one()
 
 
 def test_shown_views_keep_the_focus_where_they_can() -> None:
-    shown = Shown(["front"], "front")
+    shown = ShownViews(["front"], "front")
     shown.show(["left", "front", "left"])
     assert (shown.names, shown.focus) == (("left", "front"), "front")
     shown.work_in("left")
@@ -58,7 +58,7 @@ def test_shown_views_keep_the_focus_where_they_can() -> None:
 
 
 def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
-    window = Window(ack_seconds=10)
+    window = FrameWindow(ack_seconds=10)
     window.sent("front", 100, now_s=1.0)
     with pytest.raises(ProtocolError, match="never sent"):
         window.acknowledged(2, now_s=1.0)
@@ -68,7 +68,7 @@ def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
     assert lost.value.close_code == 4408
 
 
-def stream(window: Window, num_frames: int, num_bytes: int, bytes_per_s: float, start_s: float) -> float:
+def stream(window: FrameWindow, num_frames: int, num_bytes: int, bytes_per_s: float, start_s: float) -> float:
     """Send frames one after another over a link of 10 ms round trip; returns the time after them."""
     now_s = start_s
     for _ in range(num_frames):
@@ -80,7 +80,7 @@ def stream(window: Window, num_frames: int, num_bytes: int, bytes_per_s: float, 
 
 
 def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> None:
-    window = Window(ack_seconds=10)
+    window = FrameWindow(ack_seconds=10)
     assert not window.is_slow_for(1_000_000)
     now_s = stream(window, 5, 1_000_000, 100e6, 0.0)
     assert not window.is_slow_for(1_000_000)
@@ -92,35 +92,35 @@ def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> Non
 
 
 def test_pace_settles_where_steps_take_the_target() -> None:
-    pace = Pace()
+    budget = CoefficientBudget()
     ms_per_coefficient = 0.05
     for _ in range(30):
-        pace.learn(pace.max_coefficients * ms_per_coefficient, exact=False)
-    assert pace.max_coefficients == pytest.approx(TARGET_MS / ms_per_coefficient, rel=0.1)
+        budget.learn(budget.max_coefficients * ms_per_coefficient, exact=False)
+    assert budget.max_coefficients == pytest.approx(TARGET_MS / ms_per_coefficient, rel=0.1)
 
 
 def test_pace_spends_less_where_exact_steps_take_too_long() -> None:
-    pace = Pace()
+    budget = CoefficientBudget()
     for _ in range(20):
-        pace.learn(0.1, exact=True)
-    before = pace.max_coefficients
-    pace.learn(2 * TARGET_MS, exact=True)
-    assert pace.max_coefficients == before // 2
+        budget.learn(0.1, exact=True)
+    before = budget.max_coefficients
+    budget.learn(2 * TARGET_MS, exact=True)
+    assert budget.max_coefficients == before // 2
 
 
 def test_pace_is_bounded() -> None:
-    pace = Pace()
+    budget = CoefficientBudget()
     for _ in range(50):
-        pace.learn(1000.0, exact=False)
-    assert pace.max_coefficients == MIN_COEFFICIENTS
+        budget.learn(1000.0, exact=False)
+    assert budget.max_coefficients == MIN_COEFFICIENTS
     for _ in range(50):
-        pace.learn(0.1, exact=True)
-    assert pace.max_coefficients == MAX_COEFFICIENTS
+        budget.learn(0.1, exact=True)
+    assert budget.max_coefficients == MAX_COEFFICIENTS
 
 
 def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
     store = ResumeStore(resume_seconds=600)
-    tokens = [store.open("bake", LookDesk({}, {"k": k}, k), ALONE) for k in range(MAX_KEPT + 5)]
+    tokens = [store.open("bake", LookState({}, {"k": k}, k), ALONE) for k in range(MAX_KEPT + 5)]
     assert len(set(tokens)) == len(tokens)
     for token in tokens:
         store.close(token, now_s=0.0)
@@ -135,7 +135,7 @@ def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
 
 def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
     store = ResumeStore(resume_seconds=600)
-    token = store.open("bake", LookDesk({}, {"k": 1}, 3), ALONE)
+    token = store.open("bake", LookState({}, {"k": 1}, 3), ALONE)
     kept = store.take(token, "bake", 0.0)
     assert kept is not None
     assert kept.revision == 3
@@ -158,6 +158,15 @@ def test_what_a_hand_may_hold_is_of_this_look() -> None:
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/sigma", "/lights/Desk", "/environment/size"):
         with pytest.raises(ParameterError):
             check_held(pointer, document)
+
+
+def test_a_hand_may_be_on_a_curve_or_on_what_may_be_held() -> None:
+    document = {**DOCUMENT, "lights": {"Lamp": {}}}
+    for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/nu", "/lights/Lamp", "/environment/rotation"):
+        check_hand(pointer, document)
+    for pointer in (f"{TERM}/2/curves/theta_h", f"{TERM}/2/params/sigma", "/lights/Desk", "/display/exposure"):
+        with pytest.raises(ParameterError):
+            check_hand(pointer, document)
 
 
 def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> None:

@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
+from relume.balls.library import library_ball, render
 from relume.look.library import presets
-from relume.transfer.balls import library_ball, render
 
 
 def test_thumbnail_shows_a_ball(client: TestClient) -> None:

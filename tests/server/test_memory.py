@@ -18,14 +18,15 @@ from prometheus_client.parser import text_string_to_metric_families
 from session_client import open_session
 from tiny_scenes import still_life
 
-from relume.memory import held_bytes
+from relume.bake import Recipe
+from relume.resident import held_bytes
 from relume.scene.archive import make_scene
-from relume.transfer.base import Recipe
 from server.app import create_app
-from server.live.transfers import TransferPool
+from server.library.transfers import TransferPool
 from server.settings import Settings
 from worker.scenes import register_scene
 
+SIGMA = "/materials/Ball/terms/1/params/sigma"
 IDLE_S, FLOOR_BYTES = 60.0, 100_000
 NUM_SCENES = 3
 CURVE = "/materials/Ball/terms/1/curves/theta_h"
@@ -45,9 +46,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def real(tmp_path: Path, clock: Clock) -> Iterator[TestClient]:
-    settings = Settings(
-        data=tmp_path, allowed_hosts=["testserver"], idle_seconds=IDLE_S, cache_floor_bytes=FLOOR_BYTES
-    )
+    settings = Settings(data=tmp_path, allowed_hosts=["testserver"], idle_seconds=IDLE_S, cache_floor_bytes=FLOOR_BYTES)
     with TestClient(create_app(settings, clock=clock)) as client:
         yield client
 
@@ -77,7 +76,7 @@ def look_at(client: TestClient, bake: str) -> bytes:
     with open_session(client, bake) as session:
         session.exact(0)
         session.send(type="touch", curve=CURVE)
-        session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
+        session.edit(1, SIGMA, 0.3, hand=SIGMA)
         return session.exact(1).payload
 
 
@@ -85,6 +84,36 @@ def gauges(client: TestClient) -> dict[str, float]:
     """Every sample of /metrics by its name, and by its holder where it has one."""
     families = text_string_to_metric_families(client.get("/metrics").text)
     return {s.labels.get("holder", s.name): s.value for family in families for s in family.samples}
+
+
+def held(client: TestClient) -> dict[tuple[str, str], float]:
+    """What is in the memory, by kind and bake."""
+    families = text_string_to_metric_families(client.get("/metrics").text)
+    samples = [sample for family in families for sample in family.samples if sample.name == "relume_memory_bytes"]
+    return {(s.labels["kind"], s.labels["bake"]): s.value for s in samples}
+
+
+def test_metrics_tell_who_holds_what(real: TestClient) -> None:
+    bakes = bake_scenes(real)
+    for bake in bakes:
+        look_at(real, bake)
+    found = held(real)
+    assert {(kind, bake) for kind in ("frozen", "shaded") for bake in bakes} <= set(found)
+    assert all(num_bytes > 0 for num_bytes in found.values())
+    assert sum(found.values()) == gauges(real)["frozen_cache"]
+
+
+def test_a_thumbnail_of_other_code_is_painted_again(
+    real: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bake_scenes(real)
+    address = real.get("/api/scenes").json()[0]["thumbnail"]
+    assert real.get(address).status_code == 200
+    (before,) = (tmp_path / "thumbnails").iterdir()
+    monkeypatch.setattr("server.files.thumbnails.image_code", lambda: "0123456789abcdef")
+    assert real.get(address).status_code == 200
+    (after,) = (tmp_path / "thumbnails").iterdir()
+    assert after != before
 
 
 def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -> None:

@@ -14,10 +14,10 @@ from server_fixtures import open_fake_bakes
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from relume.transfer.base import Recipe
+from relume.bake import Recipe
 from server.app import configure, create_app
-from server.protocol import MAX_MESSAGE_BYTES
 from server.settings import Settings
+from server.wire.protocol import MAX_MESSAGE_BYTES
 from worker.scenes import register_scene
 
 

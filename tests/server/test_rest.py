@@ -199,7 +199,7 @@ def test_render_continues_after_a_restart(settings: Settings, client: TestClient
     assert wait_until_done(client, url)["state"] == "ready"
     services = client.app.state.services
     identity = url.rsplit("/", 1)[1]
-    services.renders._backlog._update(identity, ("ready",), state="running", done=1)  # as a killed server leaves it
+    services.renders._update(identity, ("ready",), state="running", done=1)  # as a killed server leaves it
     status = services.renders.get(url.rsplit("/", 1)[1])
     services.renders.frame_path(status, 1).unlink()
     services.renders.archive_path(status).unlink()

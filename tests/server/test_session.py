@@ -1,17 +1,19 @@
 """Live sessions over a picture whose pixels are known."""
 
+import io
 import json
 import struct
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from PIL import Image
 from server_fakes import SIZE, Control
 from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
-from server.live.window import Window
-from server.protocol import FrameHeader
+from server.live.state.frame_window import FrameWindow
+from server.wire.protocol import FrameHeader
 
 WIDTH, HEIGHT = SIZE
 
@@ -24,7 +26,7 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
         camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8}
         assert hello["views"] == [
-            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera} for n in ("front", "left")
+            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "eye": "baked"} for n in ("front", "left")
         ]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
         assert not hello["resumed"]
@@ -105,6 +107,77 @@ def test_a_look_that_the_bake_cannot_follow_is_taken_back(client: TestClient, ba
         session.exact(2)
 
 
+def test_what_the_hand_is_on_travels_with_its_edit_to_the_picture(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="edit", revision=1, patch=patch, hand=SIGMA)
+        session.exact(1)
+        session.send(type="edit", revision=2, patch=patch, hand=THETA_H)
+        session.exact(2)
+        session.edit(3, SIGMA, 0.4)
+        session.exact(3)
+    assert control.hands[-3:] == [SIGMA, THETA_H, None]
+
+
+@pytest.mark.parametrize("hand", ["/display/exposure", "/lights/Nobody", SIGMA.replace("Paper", "Nobody")])
+def test_edit_by_a_hand_on_nothing_is_refused_whole(client: TestClient, baked: Baked, hand: str) -> None:
+    patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="edit", revision=1, patch=patch, hand=hand)
+        problem = session.text("problem")
+        assert (problem["revision"], problem["problem"]["type"]) == (1, "urn:relume:problem:parameter")
+        session.edit(1, "/display/exposure", 1.0)
+        frame = session.exact(1)
+        assert frame.header["tiles"] == []
+
+
+def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    with open_session(client, baked.bake) as session:
+        hello = session.text("hello")
+        assert hello["solo"] is None
+        session.exact(0)
+        session.send(type="edit", revision=1, patch=[], solo=["environment", "Lamp"])
+        assert session.exact(1).header["tiles"] == []
+        session.edit(2, SIGMA, 0.4)
+        session.exact(2)
+    alone = frozenset({"environment", "Lamp"})
+    assert control.solos[-2:] == [alone, alone]
+    with open_session(client, baked.bake, query=f"?resume={hello['resume']}") as session:
+        resumed = session.text("hello")
+        assert resumed["solo"] == ["Lamp", "environment"]
+        assert resumed["look"]["environment"] == hello["look"]["environment"]
+        session.exact(2)
+        assert control.solos[-1] == alone
+        session.send(type="edit", revision=3, patch=[], solo=None)
+        session.exact(3)
+        assert control.solos[-1] is None
+
+
+def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, baked: Baked, control: Control) -> None:
+    turn = [{"op": "replace", "path": "/environment/rotation", "value": 30.0}]
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="edit", revision=1, patch=turn, solo=["Lamp"])
+        assert session.text("problem")["revision"] == 1
+        session.edit(2, SIGMA, 0.4)
+        session.exact(2)
+    assert control.solos[-1] is None
+
+
+@pytest.mark.parametrize("fields", [{}, {"hand": SIGMA}, {"solo": []}, {"solo": ["Lamp"] * 100}, {"solo": "Lamp"}])
+def test_edit_of_nothing_is_refused(client: TestClient, baked: Baked, fields: dict[str, object]) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send(type="edit", revision=1, patch=[], **fields)
+        assert session.text("problem")["problem"]["type"] == "urn:relume:problem:form"
+
+
 def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -143,11 +216,53 @@ def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> Non
         assert frame.payload[:2] == b"\xff\xd8"
 
 
+@pytest.mark.parametrize(
+    ("space", "sent"),
+    [
+        ([80, 400], (80, 48)),
+        ([400, 24], (40, 24)),
+        ([1000, 1000], SIZE),
+        ([0, 0], (1, 1)),
+        (None, SIZE),
+    ],
+)
+def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
+    client: TestClient, baked: Baked, space: list[int] | None, sent: tuple[int, int]
+) -> None:
+    with open_session(client, baked.bake) as session:
+        session.send(type="stream", format="jpeg")
+        session.send(type="view", name="left", size=space)
+        session.edit(1, SIGMA, 0.4)
+        frame = session.exact(1)
+        assert Image.open(io.BytesIO(frame.payload)).size == sent
+        assert (frame.header["width"], frame.header["height"]) == SIZE
+        assert frame.header["tiles"] == [[0, 0, WIDTH, HEIGHT]]
+
+
+def test_space_is_of_one_view_until_views_are_shown_otherwise(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.send(type="stream", format="jpeg")
+        session.send(type="view", name="left", size=[80, 80])
+        session.send(type="views", names=["left"])
+        session.edit(1, SIGMA, 0.4)
+        assert Image.open(io.BytesIO(session.exact(1).payload)).size == SIZE
+
+
+def test_space_says_nothing_of_hdr_frames(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.send(type="view", name="left", size=[8, 8])
+        session.edit(1, SIGMA, 0.4)
+        while (frame := session.exact(1)).header["view"] != "left":
+            pass
+        assert frame.header["format"] == "rgb9e5"
+        assert len(frame.payload) == 4 * WIDTH * HEIGHT
+
+
 def test_slow_link_gets_jpeg_while_moving_and_one_hdr_still(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     control.max_step = 3
-    monkeypatch.setattr(Window, "is_slow_for", lambda *_: True)
+    monkeypatch.setattr(FrameWindow, "is_slow_for", lambda *_: True)
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, SIGMA, 0.4)

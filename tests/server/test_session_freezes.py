@@ -94,7 +94,7 @@ def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: di
 def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.frame_loop.SETTLE_S", 3600.0)
+    monkeypatch.setattr("server.live.sending.frame_loop.SETTLE_S", 3600.0)
     control.refines = True
     with open_session(client, baked.bake) as session:
         session.exact(0)

@@ -10,7 +10,7 @@ from server_fakes import tiny_scene
 from session_client import Baked
 
 from relume.look import default_look
-from server import shares
+from server.records import shares
 from worker.scenes import delete_scene
 
 LOOK = {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.1, 0.2, 0.3]}]}}}

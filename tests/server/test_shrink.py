@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.shrink import shrink
+from relume.imageio import shrink
 
 
 def test_whole_factors_average_blocks() -> None:

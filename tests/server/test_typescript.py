@@ -1,14 +1,27 @@
-"""The editor's types are those of the server."""
+"""The editor's types are those of the server, and what it knows of looks is what the server checks."""
 
-from server import protocol, typescript
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from relume.errors import ParameterError
+from relume.look import complete, default_look
+from relume.look.document import RANGES
+from relume.look.lights import LIGHT_RANGES, default_light
+from relume.scene.model import Material
+from server import typescript
+from server.wire import protocol
 
 
-def test_generated_file_is_up_to_date() -> None:
-    assert typescript.TARGET.read_text(encoding="utf-8") == typescript.generate(), "run python -m server.typescript"
+@pytest.mark.parametrize("path", typescript.TARGETS, ids=lambda path: path.name)
+def test_generated_file_is_up_to_date(path: Path) -> None:
+    assert path.read_text(encoding="utf-8") == typescript.TARGETS[path](), "run python -m server.typescript"
 
 
 def test_every_message_is_in_its_union() -> None:
-    text = typescript.generate()
+    text = typescript.generate_protocol()
     for model in (*typescript.CLIENT_MESSAGES, *typescript.SERVER_MESSAGES):
         assert f"  | {model.__name__}" in text
     declared = {m for m in vars(protocol).values() if isinstance(m, type) and issubclass(m, protocol.Message)}
@@ -17,6 +30,46 @@ def test_every_message_is_in_its_union() -> None:
 
 
 def test_defaults_are_optional_in_inputs_only() -> None:
-    text = typescript.generate()
+    text = typescript.generate_protocol()
     assert "quality?: number;" in text
     assert "  max_degrees: number;" in text
+
+
+def test_look_is_typed_whole() -> None:
+    text = typescript.generate_look()
+    assert "  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;" in text
+    assert '  texture: "diffuse" | "specular" | null;' in text
+    assert "  catcher?: boolean;" in text
+
+
+DEFAULT = default_look([Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))])
+LIGHTS = [(kind, name) for kind in ("spot", "rectangle") for name in LIGHT_RANGES if name in default_light(kind)]
+
+
+def first(start: Any, number: float) -> Any:
+    """A field with another first number."""
+    return [number, *start[1:]] if isinstance(start, list) else number
+
+
+def every(start: Any, number: float) -> Any:
+    """A field of another number alone."""
+    return [number] * len(start) if isinstance(start, list) else number
+
+
+def check_ends(given: Callable[[Any], dict[str, Any]], start: Any, least: float, most: float) -> None:
+    for field in (first(start, least), every(start, most)):
+        complete(given(field), DEFAULT)
+    for field in (first(start, least - 1), every(start, most + 1)):
+        with pytest.raises(ParameterError):
+            complete(given(field), DEFAULT)
+
+
+@pytest.mark.parametrize(("section", "name"), [(section, name) for section in RANGES for name in RANGES[section]])
+def test_numbers_of_a_look_end_where_the_editor_is_told(section: str, name: str) -> None:
+    check_ends(lambda field: {section: {name: field}}, DEFAULT[section][name], *RANGES[section][name])
+
+
+@pytest.mark.parametrize(("kind", "name"), LIGHTS)
+def test_numbers_of_lights_end_where_the_editor_is_told(kind: str, name: str) -> None:
+    light = default_light(kind)
+    check_ends(lambda field: {"lights": {"L": {**light, name: field}}}, light[name], *LIGHT_RANGES[name])

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relume.bake import ArraySpec
 from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreNotFoundError
 from relume.store import StoreWriter, create_store, open_store, publish
 from relume.store.publish import verify_manifest
-from relume.transfer.base import ArraySpec
 
 ROWS = 100
 SPEC = ArraySpec("views/front/visibility", (ROWS, 7), "uint8", (8, 7), (32, 7))

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, scene_of, sphere
+from tiny_scenes import looking, points_at, scene_of, sphere
 
+from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.scene.cornell import cornell_box
 from relume.trace.cell_tree import NO_CELL, grow_tree, locate16
 from relume.trace.cells import POINTS_A_CELL, choose_cells, face_normals
-from relume.trace.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.trace.geometry import merge
-from relume.trace.links import Gatherers, trace_links
+from relume.trace.links import trace_links
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import trace_from
-from relume.trace.surface import any_tangent
 
 NUM_CELLS = 1200
 
@@ -26,10 +25,9 @@ def box():
     return scene, geometry, choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
 
 
-def points_of(cells, count):
-    normal = cells.normal.reshape(-1, 3)[:: POINTS_A_CELL * cells.num_cells // count][:count]
-    position = cells.position.reshape(-1, 3)[:: POINTS_A_CELL * cells.num_cells // count][:count]
-    return Gatherers(position, normal, any_tangent(normal), normal)
+def points_of(cells, count, first=0):
+    some = cells.gather_samples.rows(slice(None, None, POINTS_A_CELL * cells.num_cells // count)).rows(slice(count))
+    return points_at(some.position, some.normal, first)
 
 
 def random_keys(num, num_sides, seed):
@@ -167,14 +165,14 @@ def test_neighbours_in_number_are_neighbours_in_space(box):
 def test_links_are_those_of_first_hits(box):
     """Every ray's first hit, traced by itself and located by hand."""
     _, geometry, cells = box
-    points, pattern = points_of(cells, 40), make_pattern(24, 9, 3)
-    links = trace_links(geometry, cells.tree, points, pattern, np.arange(100, 140, dtype=np.uint32))
+    points, pattern = points_of(cells, 40, first=100), make_pattern(24, 9, 3)
+    links = trace_links(geometry, cells.tree, points, points.normal, pattern)
     normals = face_normals(geometry)
     origins, directions, expected_of = [], [], []
     for p in range(40):
         n, t = points.normal[p].astype(float), points.tangent[p].astype(float)
         frame = np.stack([t, np.cross(n, t), n])
-        wo = frame @ points.wo[p]
+        wo = frame @ points.normal[p]
         shift = small_shifts_of(pattern, 100 + p)
         for ray in range(33):
             wi = np.array(local_ray(pattern, ray, shift, *wo.astype(np.float32)))
@@ -201,10 +199,10 @@ def test_links_are_those_of_first_hits(box):
 
 def test_order_and_division_of_points_do_not_matter(box):
     _, geometry, cells = box
-    points, pattern, numbers = points_of(cells, 30), make_pattern(16, 0, 3), np.arange(30, dtype=np.uint32)
-    whole = trace_links(geometry, cells.tree, points, pattern, numbers).cell
-    part = Gatherers(*(a[11:23] for a in (points.position, points.normal, points.tangent, points.wo)))
-    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, pattern, numbers[11:23]).cell, whole[11:23])
+    points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
+    whole = trace_links(geometry, cells.tree, points, points.normal, pattern).cell
+    part = points.rows(slice(11, 23))
+    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, part.normal, pattern).cell, whole[11:23])
 
 
 def test_from_a_closed_room_no_ray_escapes():
@@ -213,7 +211,6 @@ def test_from_a_closed_room_no_ray_escapes():
     room = scene_of(ball, camera=looking("front", (0, 0, 1), (0, 0, 0), 1.0))
     geometry = merge(room)
     cells = choose_cells(room, geometry, ("front",), (64, 64), 500)
-    links = trace_links(
-        geometry, cells.tree, points_of(cells, 400), make_pattern(64, 0, 1), np.arange(400, dtype=np.uint32)
-    )
+    points = points_of(cells, 400)
+    links = trace_links(geometry, cells.tree, points, points.normal, make_pattern(64, 0, 1))
     assert np.mean(links.cell == NO_CELL) < 1e-4

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tiny_scenes import looking, mesh, scene_of, studio, torus
 
-from relume.light.environment import lookup
+from relume.environments.equirect import lookup
 from relume.trace.geometry import merge
 from relume.trace.primary import Hits, camera_directions, trace_from
 from relume.trace.surface import surface_at
@@ -42,7 +42,7 @@ def brute_force(scene):
     hit = hits.face >= 0
     radiance = lookup(scene.environment.radiance, directions)
     on = Hits(hits.face[hit], hits.uv[hit], hits.distance[hit])
-    radiance[hit] = mirrored(scene, surface_at(geometry, on, directions[hit]).normal, directions[hit])
+    radiance[hit] = mirrored(scene, surface_at(geometry, on, directions[hit]).points.normal, directions[hit])
     shape = (SIZE[1], FINE, SIZE[0], FINE)
     means = radiance.reshape(*shape, 3).mean(axis=(1, 3)).reshape(-1, 3)
     return means, hit.reshape(shape).mean(axis=(1, 3)).ravel()
@@ -52,9 +52,9 @@ def shown(scene, samples):
     eye = scene.cameras[0].to_world[:3, 3]
     on = samples.material != BACKGROUND
     radiance = samples.surface.diffuse.astype(np.float64)
-    towards = samples.surface.position[on] - eye
+    towards = samples.surface.points.position[on] - eye
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    radiance[on] = mirrored(scene, samples.surface.normal[on], towards)
+    radiance[on] = mirrored(scene, samples.surface.points.normal[on], towards)
     weighted = radiance * samples.weight[:, None]
     return np.stack([np.bincount(samples.pixel, weighted[:, c], SIZE[0] * SIZE[1]) for c in range(3)], axis=1)
 
@@ -99,7 +99,7 @@ def test_a_step_between_parallel_faces_of_one_mesh_is_an_edge():
     samples = sample_view(two_floors(0.1), merge(two_floors(0.1)), "c", SIZE)
     several = np.bincount(samples.pixel) == 2
     assert several.sum() == SIZE[1]
-    depth = samples.surface.position[:, 2]
+    depth = samples.surface.points.position[:, 2]
     for pixel in np.nonzero(several)[0]:
         own = samples.pixel == pixel
         assert np.ptp(depth[own]) == pytest.approx(0.2, abs=1e-3)

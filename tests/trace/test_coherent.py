@@ -30,7 +30,7 @@ def samples_of(scene, size, view=None):
     geometry = merge(scene)
     samples = sample_view(scene, geometry, view or scene.cameras[0].name, size)
     solid = samples.material != BACKGROUND
-    return geometry, samples.surface.position[solid], samples.surface.normal[solid]
+    return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
 
 
 def both(scene, size, num_lights):
@@ -38,11 +38,11 @@ def both(scene, size, num_lights):
     geometry, position, normal = samples_of(scene, size)
     lights = subdivide(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
     count = lights.num_lights
     assert found.rays.full == full.num_rays
     cosine = np.maximum(normal @ lights.direction.T, 0)
-    return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.power[:, 1], found.rays
+    return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.irradiance[:, 1], found.rays
 
 
 def in_pixels(scene, size, values):
@@ -81,7 +81,7 @@ def lids():
 
 
 def first_of(lights, count):
-    return TriangleLights(lights.nodes[..., :count], lights.direction[:count], lights.power[:count])
+    return TriangleLights(lights.nodes[..., :count], lights.direction[:count], lights.irradiance[:count])
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bou
 
 def twin(seen, facing, position, lights):
     """The same bits and number of rays, sample by sample, from the answers of a full trace."""
-    neighbours, power = neighbours_of(lights.direction), luminance(lights.power)
+    neighbours, power = neighbours_of(lights.direction), luminance(lights.irradiance)
     beside, strong = np.split(neighbours.beside, neighbours.first[1:-1]), power > 5e-3 * power.sum()
     bits, rays = np.zeros_like(seen), 0
     for start in range(0, len(seen), 64):
@@ -163,7 +163,7 @@ def test_kernel_does_what_its_twin_does():
     geometry, position, normal = samples_of(still_life(), (26, 20))
     lights = subdivide(studio(), 300)
     seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
     assert found.rays.wrong == 0  # the twin does not mend
     bits, rays = twin(seen, normal @ lights.direction.T > 0, position, lights)
     np.testing.assert_array_equal(bits_of(found.visible, lights.num_lights), bits)
@@ -176,7 +176,7 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
     geometry, position, normal = samples_of(still_life(), (48, 36))
     position, normal = position[:num_samples], normal[:num_samples]
     lights = first_of(subdivide(studio(), 50), num_lights)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power))
+    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
     assert found.visible.shape == full.visible.shape
     assert found.rays.traced <= found.rays.full == full.num_rays
@@ -188,7 +188,7 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
 def test_nothing_to_trace_is_no_error():
     geometry, position, normal = samples_of(still_life(), (24, 18))
     lights = subdivide(studio(), 50)
-    found = trace_coherent(geometry.embree, position[:0], normal[:0], targets_of(lights.direction, lights.power))
+    found = trace_coherent(geometry.embree, position[:0], normal[:0], targets_of(lights.direction, lights.irradiance))
     assert found.visible.shape == (0, 7)
     assert found.rays.traced == found.rays.full == 0
     assert found.rays.wrong_share == 0
@@ -200,6 +200,8 @@ def test_threads_change_neither_bits_nor_counts(monkeypatch):
     results = []
     for threads in ("1", "3"):
         monkeypatch.setenv("RELUME_THREADS", threads)
-        results.append(trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.power)))
+        results.append(
+            trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
+        )
     np.testing.assert_array_equal(results[0].visible, results[1].visible)
     assert results[0].rays == results[1].rays

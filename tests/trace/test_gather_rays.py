@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relume.errors import PlanError
-from relume.trace.gather_rays import (
+from relume.light.gather_rays import (
     MAX_RAYS,
     _step,
     density_about_mirror,

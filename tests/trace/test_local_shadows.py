@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import quad, still_life
+from tiny_scenes import points_at, quad, still_life
 
+from relume.light.gather_rays import shift_of
 from relume.light.local import Triangles, light_sample, make_local, pattern_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
-from relume.trace.gather_rays import shift_of
 from relume.trace.geometry import merge
 from relume.trace.local_shadows import arriving, trace_local
 from relume.trace.view_samples import BACKGROUND, sample_view
@@ -38,7 +38,7 @@ def surfaces():
     geometry = merge(scene)
     samples = sample_view(scene, geometry, "front", (64, 48))
     solid = np.flatnonzero(samples.material != BACKGROUND)[::37]
-    return geometry, samples.surface.position[solid], samples.surface.normal[solid]
+    return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
 
 
 @pytest.mark.parametrize(
@@ -53,14 +53,15 @@ def surfaces():
 def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     geometry, position, normal = surfaces
     made, pattern = make_local(light), pattern_of(light, 20)
-    numbers = np.arange(100, 100 + len(position), dtype=np.uint32)
-    seen = trace_local(geometry.embree, geometry.epsilon, made, pattern, position, normal, numbers)
+    points = points_at(position, normal, first=100)
+    seen = trace_local(geometry.embree, geometry.epsilon, made, pattern, points)
     bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(pattern.uv)].astype(bool)
     triangles = geometry.positions[geometry.faces].astype(float)
     wrong = 0
     for k in range(len(pattern.uv)):
         found = [
-            light_sample(made, pattern, k, *shift_of(pattern, n), *p) for n, p in zip(numbers, position, strict=True)
+            light_sample(made, pattern, k, *shift_of(pattern, n), *p)
+            for n, p in zip(points.seed, position, strict=True)
         ]
         direction, distance = np.array([f[:3] for f in found]), np.array([f[3] for f in found])
         end = position + direction * np.minimum(distance, 100)[:, None]
@@ -70,11 +71,10 @@ def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     assert 0.05 < bits.mean() < 0.95
 
 
-def irradiance(geometry, light, points, normals, triangles=None, num_samples=64):
+def irradiance(geometry, light, position, normal, triangles=None, num_samples=64):
     made, pattern = make_local(light, triangles), pattern_of(light, num_samples)
-    numbers = np.arange(len(points), dtype=np.uint32)
-    seen = trace_local(geometry, 1e-5, made, pattern, points, normals, numbers)
-    return arriving(made, pattern, points, normals, numbers, seen)
+    points = points_at(position, normal)
+    return arriving(made, pattern, points, trace_local(geometry, 1e-5, made, pattern, points))
 
 
 def embree_of(*meshes):

@@ -16,7 +16,7 @@ def on_wall(uv, corners=((0, 0, 0), (0, 0, 2), (0, 2, 2), (0, 2, 0))):
     floor = quad("floor", [[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2]], 0)
     geometry = merge(scene_of(quad("wall", corners, 0), floor, camera=looking("c", [1, 1, 1], [0, 1, 1], 1.0)))
     hits = Hits(np.zeros(1, np.int32), np.array([uv], np.float32), np.ones(1, np.float32))
-    return surface_at(geometry, hits, INWARD).position[0].astype(float), geometry.epsilon
+    return surface_at(geometry, hits, INWARD).points.position[0].astype(float), geometry.epsilon
 
 
 @pytest.mark.parametrize("uv", [(0.4, 0.0), (0.0, 0.0), (1.0, 0.0)], ids=["edge", "corner", "other corner"])
@@ -42,5 +42,5 @@ def test_point_of_a_sliver_stays_in_it():
         )
     )
     hits = Hits(np.zeros(1, np.int32), np.array([[0.5, 0.0]], np.float32), np.ones(1, np.float32))
-    height = surface_at(geometry, hits, INWARD).position[0, 1]
+    height = surface_at(geometry, hits, INWARD).points.position[0, 1]
     assert 0 < height < thin

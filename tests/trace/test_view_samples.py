@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
 
-from relume.light.environment import direction_to_uv
+from relume.environments.equirect import direction_to_uv
 from relume.scene.model import Material, Texture
 from relume.trace.geometry import merge
 from relume.trace.primary import camera_directions
@@ -104,7 +104,7 @@ def test_what_stands_for_a_part_of_a_pixel_lies_in_its_middle():
     rim = np.nonzero((samples.material == 0) & (samples.weight < 1))[0]
     pixel_size = 2 * np.tan(0.4) * 2.0 / SIZE[1]
     corner = np.stack(np.divmod(samples.pixel[rim], SIZE[0])[::-1], axis=1)  # x, y
-    within = samples.surface.position[rim, :2] / pixel_size * (1, -1) + np.array(SIZE) / 2 - corner
+    within = samples.surface.points.position[rim, :2] / pixel_size * (1, -1) + np.array(SIZE) / 2 - corner
     steps = (np.arange(fine) + 0.5) / fine
     at = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     centred = (corner[:, None] + at - np.array(SIZE) / 2) * pixel_size
@@ -119,7 +119,7 @@ def test_position_lies_just_off_the_surface_on_the_viewers_side():
     scene = scene_of(sphere("ball", [0, 0, 0], 1, 0, rings=40), camera=looking("c", [0, 0.5, 4], [0, 0, 0], 0.7))
     samples, eye = sampled(scene), scene.cameras[0].to_world[:3, 3]
     solid = samples.material == 0
-    surface = samples.surface
+    surface = samples.surface.points
     away = np.linalg.norm(surface.position[solid].astype(float), axis=1)
     assert np.abs(away - 1).max() < 0.004  # chords of the facets
     towards = eye - surface.position[solid]
@@ -132,7 +132,7 @@ def test_position_lies_just_off_the_surface_on_the_viewers_side():
 def test_frames_are_unit_and_square(still):
     samples = still[1]
     solid = samples.material != BACKGROUND
-    normal, tangent = samples.surface.normal[solid], samples.surface.tangent[solid]
+    normal, tangent = samples.surface.points.normal[solid], samples.surface.points.tangent[solid]
     for v in (normal, tangent):
         np.testing.assert_allclose(np.linalg.norm(v, axis=1), 1, atol=1e-5)
     assert np.abs((normal * tangent).sum(axis=1)).max() < 1e-5
@@ -147,8 +147,8 @@ def test_background_samples_carry_the_environment_behind_them(still):
     y, x = np.divmod(samples.pixel[rows].astype(int), SIZE[0])
     directions = camera_directions(scene.cameras[0], SIZE, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     half_pixel = 0.5 * 0.8 / SIZE[1]  # near an edge another position of the pixel may stand for all of it
-    np.testing.assert_allclose(samples.surface.position[rows], directions, atol=half_pixel)
-    directions = samples.surface.position[rows]
+    np.testing.assert_allclose(samples.surface.points.position[rows], directions, atol=half_pixel)
+    directions = samples.surface.points.position[rows]
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
     radiance = studio()
     u, v = direction_to_uv(directions)
@@ -217,7 +217,7 @@ def test_mapped_normals_are_unit_outward_and_lean_as_the_map_says(strength):
     lean = np.float32([strength, 0, 1])
     normals = np.tile(lean / np.linalg.norm(lean), (8, 8, 1)).astype(np.float32)
     samples = sampled(flat_scene(Material("M", WHITE, normal_map=Texture(normals)), size=3.0))
-    normal = samples.surface.normal[samples.material == 0]
+    normal = samples.surface.points.normal[samples.material == 0]
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
     assert (normal[:, 2] > 0).all()
     middle = normal[np.abs(samples.pixel[samples.material == 0].astype(int) - 24 * 64 - 32) < 3]
@@ -234,10 +234,10 @@ def test_rough_normal_map_keeps_frames_unit_and_on_the_outer_side():
     )
     samples = sampled(scene)
     solid = samples.material == 0
-    normal, tangent = samples.surface.normal[solid], samples.surface.tangent[solid]
+    normal, tangent = samples.surface.points.normal[solid], samples.surface.points.tangent[solid]
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
     assert np.abs((normal * tangent).sum(axis=1)).max() < 1e-4
-    towards = scene.cameras[0].to_world[:3, 3] - samples.surface.position[solid]
+    towards = scene.cameras[0].to_world[:3, 3] - samples.surface.points.position[solid]
     assert ((normal * towards).sum(axis=1) > 0).all()
 
 
@@ -250,9 +250,9 @@ def test_mesh_without_tangents_or_coordinates_has_frames_all_the_same():
         materials=[Material("M", WHITE, {"diffuse": checker()}, Texture(np.tile(np.float32([0, 0, 1]), (4, 4, 1))))],
     )
     samples = sampled(scene)
-    for v in (samples.surface.normal, samples.surface.tangent, samples.surface.diffuse):
+    for v in (samples.surface.points.normal, samples.surface.points.tangent, samples.surface.diffuse):
         assert np.isfinite(v).all()
-    np.testing.assert_allclose(np.linalg.norm(samples.surface.tangent, axis=1), 1, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(samples.surface.points.tangent, axis=1), 1, atol=1e-5)
 
 
 def test_back_faces_are_shaded_as_if_turned_round():
@@ -261,8 +261,8 @@ def test_back_faces_are_shaded_as_if_turned_round():
     samples = sampled(scene)
     solid = samples.material == 0
     assert solid.sum() > 100
-    assert (samples.surface.normal[solid][:, 2] > 0.999).all()
-    assert (samples.surface.position[solid][:, 2] > 0).all()
+    assert (samples.surface.points.normal[solid][:, 2] > 0.999).all()
+    assert (samples.surface.points.position[solid][:, 2] > 0).all()
 
 
 def test_empty_view_is_all_background():

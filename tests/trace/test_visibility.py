@@ -47,7 +47,7 @@ def surfaces():
     geometry = merge(scene)
     samples = sample_view(scene, geometry, "front", (64, 48))
     solid = samples.material != BACKGROUND
-    return geometry, samples.surface.position[solid], samples.surface.normal[solid]
+    return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
 
 
 @pytest.mark.parametrize("num_points", [1, 15, 16, 17, 511, 513, 1000])
@@ -162,7 +162,7 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     solid = samples.material != BACKGROUND
     assert solid.sum() > 500
     visible = trace_visibility(
-        geometry.embree, samples.surface.position[solid], samples.surface.normal[solid], directions
+        geometry.embree, samples.surface.points.position[solid], samples.surface.points.normal[solid], directions
     ).visible
     bits = bits_of(visible, len(directions))
     np.testing.assert_array_equal(bits, np.broadcast_to(directions[:, 1] > 0, bits.shape))
@@ -171,7 +171,7 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     geometry = merge(scene)
     samples = sample_view(scene, geometry, "c", (64, 48))
     solid = samples.material != BACKGROUND
-    position, normal = samples.surface.position[solid], samples.surface.normal[solid]
+    position, normal = samples.surface.points.position[solid], samples.surface.points.normal[solid]
     bits = bits_of(trace_visibility(geometry.embree, position, normal, directions).visible, len(directions))
     # facets are bent against the smooth normals by up to half of a ring: above both horizons nothing is in the way
     high = normal @ directions.T > np.sin(np.pi / 16)

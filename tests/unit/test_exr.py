@@ -15,7 +15,7 @@ from tiny_scenes import looking, still_life
 from relume.exr.attributes import Origin, attributes_of, world_to_ndc
 from relume.exr.layers import layers_of
 from relume.exr.picture import export_exr
-from relume.exr.writer import channels_of, write_exr
+from relume.imageio.exr import channels_of, write_exr
 from relume.look import Look, default_look, validate
 from relume.scene.ground import with_ground
 from relume.trace.primary import camera_directions

@@ -9,8 +9,8 @@ import pytest
 
 from relume.color import srgb_encode
 from relume.errors import ParameterError, ShapeMismatchError
+from relume.imageio.tonemap import TONE_MAPS, tone_map
 from relume.look.model import ToneMap
-from relume.tonemap import TONE_MAPS, tone_map
 
 AGX_INSET = np.array(
     [

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.environments.model import Environment
 from relume.scene.archive import make_scene
-from relume.scene.model import Camera, Environment, Material, Mesh, Scene
-from relume.transfer.base import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.scene.model import Camera, Material, Mesh, Scene
 
 SHARD, CHUNK, TAIL = 64, 16, 10
 RECIPE = Recipe("fake", ("front", "left"), (16, 32), 24)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from relume.transfer.base import Plan
+from relume.bake import Plan
 from worker.estimate import Finished, crowding, seconds_for
 from worker.executor import TINY_BAKE_RAYS
 

@@ -11,7 +11,7 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 from relume.scene.model import Texture
 from relume.trace.texture import MipMap
 from worker import tasks
-from worker.rest import DEFAULT_IDLE_S, Rest, idle_seconds
+from worker.idle import DEFAULT_IDLE_S, IdleTimer, idle_seconds
 from worker.scenes import register_scene
 from worker.service import BakeService
 
@@ -46,13 +46,13 @@ class Timers:
 def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     timers, forgotten = Timers(), []
     monkeypatch.setattr(threading, "Timer", timers.Timer)
-    rest = Rest(lambda: 60.0, lambda: forgotten.append(True))
-    with rest.kept_awake():
-        with rest.kept_awake():
+    idle_timer = IdleTimer(lambda: 60.0, lambda: forgotten.append(True))
+    with idle_timer.kept_awake():
+        with idle_timer.kept_awake():
             timers.elapse()
         timers.elapse()
     assert forgotten == []
-    with pytest.raises(ZeroDivisionError), rest.kept_awake():
+    with pytest.raises(ZeroDivisionError), idle_timer.kept_awake():
         _ = 1 / 0
     assert len(timers.running) == 1
     timers.elapse()
@@ -68,7 +68,7 @@ def test_scene_and_what_was_built_for_it_go_after_a_bake(tmp_path: Path, monkeyp
         register_scene(service.data_dir, service.ledger, scene)
         with service.subscribe(service.submit(scene.id, RECIPE)) as changes:
             assert list(changes)[-1].state == "ready"
-        with tasks.rest.kept_awake():
+        with tasks.idle_timer.kept_awake():
             loaded = weakref.ref(tasks.scene_of(service.data_dir, scene.id))
             assert tasks.kept_bytes() > 0
             forgotten.clear()

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
+from relume.bake import Recipe, Task
 from relume.errors import NotFoundError
-from relume.transfer.base import Recipe, Task
 from worker import lease
 from worker.database import open_database
 from worker.ledger import Ledger
@@ -34,6 +34,12 @@ def test_recipe_survives_json_and_names_the_bake() -> None:
         Recipe("direct", ("front", "left"), (16, 32), 24),
     ]
     assert len({bake_id(SCENE.id, recipe) for recipe in [RECIPE, *others]} | {bake_id("0" * 16, RECIPE)}) == 6
+
+
+def test_same_recipe_under_other_code_is_another_bake(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = bake_id(SCENE.id, RECIPE)
+    monkeypatch.setattr("worker.status.bake_code", lambda: "fedcba9876543210")
+    assert bake_id(SCENE.id, RECIPE) != before
 
 
 def test_same_recipe_from_many_threads_is_one_bake(ledger: Ledger) -> None:

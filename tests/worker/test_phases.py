@@ -12,7 +12,7 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 from sqlalchemy import inspect
 
 from cli.follow import detail
-from relume.transfer.base import Plan, Task
+from relume.bake import Plan, Task
 from worker.database import open_database
 from worker.executor import TINY_BAKE_RAYS
 from worker.ledger import Ledger
@@ -115,7 +115,7 @@ def test_database_of_an_older_relume_gets_what_it_lacks(tmp_path: Path) -> None:
 
 def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cli.follow.time.time", lambda: 1012.0)
-    plan, none = Plan(1, 1, 1, 1), {"rays_per_second": None, "bytes": 0, "problem": None, "created": 0.0}
+    plan, none = Plan(1, 1, 1, 1), {"rays_per_second": None, "bytes": 0, "problem": None, "created": 0.0, "code": None}
 
     def status(state: Any, phase: Any, seconds_left: float | None = None, ahead: int = 0) -> BakeStatus:
         return BakeStatus(

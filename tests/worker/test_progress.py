@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.transfer.base import Task
+from relume.bake import Task
 from worker.progress import Expected, Progress
 from worker.status import TaskCost
 

@@ -16,7 +16,13 @@ GAP = 2e-5  # between things that touch, so that no ray starts inside the neighb
 
 
 def resting_height(height: Height, x: float, z: float, radius: float) -> float:
-    """Height of the centre of a sphere lowered at (x, z) until it touches the ground."""
+    """Height of the centre of a sphere lowered at (x, z) until it touches the ground, metres.
+
+    Args:
+        height: of the ground at any (x, z), metres.
+        x, z: where the sphere is lowered, metres.
+        radius: of the sphere, metres.
+    """
     r = radius * np.sqrt(np.linspace(0, 1, 24))[:, None]
     phi = np.linspace(0, 2 * np.pi, 33)[None, :-1]
     ground = height(x + r * np.cos(phi), z + r * np.sin(phi))
@@ -24,7 +30,15 @@ def resting_height(height: Height, x: float, z: float, radius: float) -> float:
 
 
 def string_of_pearls(height: Height, path: F64, radii: F64) -> F64:
-    """Centres of touching pearls threaded along a path (n, 2) in (x, z), each lying on the ground. (num_pearls, 3)"""
+    """Centres of touching pearls that are threaded along a path, each lying on the ground.
+
+    Args:
+        height: of the ground at any (x, z), metres.
+        path: points in (x, z), metres. (n, 2)
+        radii: of the pearls in their order, metres. (num_pearls,)
+    Returns:
+        (num_pearls, 3), metres
+    """
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     centres: list[F64] = []
     s, step = 0.0, 2e-4
@@ -40,7 +54,17 @@ def string_of_pearls(height: Height, path: F64, radii: F64) -> F64:
 
 
 def heap(height: Height, centre: tuple[float, float], spread: float, radii: F64, seed: int) -> F64:
-    """Centres of pearls poured at one place: each takes the lowest of many spots that is free. (len(radii), 3)"""
+    """Centres of pearls poured at one place: each takes the lowest of many spots that is free.
+
+    Args:
+        height: of the ground at any (x, z), metres.
+        centre: of the place in (x, z), metres.
+        spread: how far from there the spots lie, metres.
+        radii: of the pearls in the order of their fall, metres. (num_pearls,)
+        seed: of the spots.
+    Returns:
+        (num_pearls, 3), metres
+    """
     rng = np.random.default_rng(seed)
     placed = np.zeros((0, 3))
     for i, radius in enumerate(radii):

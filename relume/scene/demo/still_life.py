@@ -46,7 +46,13 @@ def cameras() -> tuple[Camera, ...]:
 
 
 def look_at(name: str, eye: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
-    """A level camera at `eye` that has `target` in the middle of its picture."""
+    """A level camera at `eye` that has `target` in the middle of its picture.
+
+    Args:
+        name: of the view.
+        eye, target: world space, metres; neither right above the other.
+        yfov: vertical field of view, radians.
+    """
     backward = np.subtract(eye, target)
     backward /= np.linalg.norm(backward)
     right = np.cross([0.0, 1.0, 0.0], backward)

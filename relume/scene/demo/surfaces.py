@@ -110,7 +110,7 @@ def sphere(radius: float, num_rings: int) -> Surface:
 
 
 def merged(surfaces: Sequence[Surface]) -> Surface:
-    """All surfaces as one."""
+    """Several surfaces joined to one."""
     starts = np.cumsum([0, *(len(s.positions) for s in surfaces[:-1])])
     faces = np.concatenate([s.faces + start for s, start in zip(surfaces, starts, strict=True)])
     return Surface(

@@ -99,7 +99,13 @@ def handles() -> Surface:
 
 
 def tube(path: F64, radius: float, num_sides: int) -> Surface:
-    """A round rod along a path (n, 3) that never runs straight up, open at both ends."""
+    """A round rod along a path that never runs straight up, open at both ends.
+
+    Args:
+        path: its middle, metres. (n, 3)
+        radius: metres.
+        num_sides: of the polygon that stands for its circle.
+    """
     forward = normalised(np.gradient(path, axis=0))
     right = normalised(np.cross(forward, [0.0, 1.0, 0.0]))
     up = np.cross(right, forward)

@@ -71,8 +71,14 @@ class AccessorReader:
         return self._integers[index]
 
     def floats(self, index: int, widths: tuple[int, ...], what: str) -> NDArray[np.float32]:
-        """Vectors; normalised integers scaled to [0, 1] or [-1, 1], other integers taken as they are. (count, width)
+        """The vectors of an accessor; normalised integers are scaled to [0, 1] or [-1, 1], others taken as they are.
 
+        Args:
+            index: of the accessor in the document.
+            widths: the numbers of components that are allowed.
+            what: names the data in errors.
+        Returns:
+            (count, width) float32
         Raises:
             SceneError: an index, offset, stride, type or count does not fit the data.
         """
@@ -110,7 +116,15 @@ def _as_told(values: Array, accessor: Accessor, what: str) -> Array:
 
 
 def view_bytes(container: Container, index: int, what: str) -> memoryview:
-    """The bytes of a buffer view."""
+    """The bytes of a buffer view.
+
+    Args:
+        container: the file's document and buffers.
+        index: of the view in the document.
+        what: names the data in errors.
+    Raises:
+        SceneError: there is no such view, or it reaches out of its buffer.
+    """
     view = _at(container.document.bufferViews, index, f"the buffer view of {what}")
     for extension in PACKED_EXTENSIONS:
         if extension in view.extensions:

@@ -60,7 +60,7 @@ class Container:
 
 
 def read_container(data: bytes, companions: Companions) -> Container:
-    """Splits and checks a file.
+    """Splits a file into its document and its buffers, and checks both.
 
     Raises:
         SceneError: truncated, not glTF 2, names files that are not beside it, or requires an extension that packs data.

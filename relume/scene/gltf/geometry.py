@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.gltf.accessors import AccessorReader
 from relume.scene.gltf.document import Document, Primitive
 from relume.scene.model import F32, U32
-from relume.scene.remarks import Remark, simplified, unused, wrong
 
 I64 = NDArray[np.int64]
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -42,6 +42,11 @@ def num_corners(document: Document, primitive: Primitive) -> int:
 def read_primitive(reader: AccessorReader, primitive: Primitive, what: str, warnings: list[Remark]) -> Geometry | None:
     """The primitive's triangles with only the vertices they use; None where it has none (a warning says so).
 
+    Args:
+        reader: of the file's accessors.
+        primitive: as the document has it.
+        what: names the mesh in errors and warnings.
+        warnings: gets one sentence for each thing that is left out.
     Raises:
         SceneError: positions are missing or not finite, or indices are out of range.
     """
@@ -136,7 +141,16 @@ def usable(values: NDArray[np.floating]) -> bool:
 def without_degenerate(
     positions: NDArray[np.floating], faces: I64, what: str, warnings: list[Remark]
 ) -> NDArray[np.bool_]:
-    """Which triangles have area, measured against their longest edge. (num_faces,)"""
+    """Which triangles have area, measured against their longest edge.
+
+    Args:
+        positions: of the vertices. (num_vertices, 3)
+        faces: the triangles' vertices. (num_faces, 3)
+        what: names the mesh in the warning.
+        warnings: gets a sentence where some have none.
+    Returns:
+        (num_faces,) bool
+    """
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
     edge = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)])
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)

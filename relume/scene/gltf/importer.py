@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.environments.model import Environment
 from relume.environments.studio import studio
 from relume.errors import SceneError
+from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.checks import MAX_TRIANGLES
 from relume.scene.companions import Alone, Companions
 from relume.scene.finish import finished_scene
@@ -27,8 +29,7 @@ from relume.scene.gltf.nodes import placed_nodes
 from relume.scene.gltf.uvs import made_tangents, turned_tangents
 from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
 from relume.scene.lights import LightCollector
-from relume.scene.model import Camera, Environment, Mesh, Scene
-from relume.scene.remarks import Remark, simplified, unused, wrong
+from relume.scene.model import Camera, Mesh, Scene
 
 F64 = NDArray[np.float64]
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES

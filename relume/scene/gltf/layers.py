@@ -10,8 +10,8 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
+from relume.remarks import Remark, wrong
 from relume.scene.gltf.document import Extensions, Factor, Number, TextureInfo
-from relume.scene.remarks import Remark, wrong
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
 Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
@@ -81,7 +81,13 @@ UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields}
 
 
 def read_layers(extensions: Extensions, what: str, warnings: list[Remark]) -> Layers:
-    """The extensions that are understood; a warning for each that is not, or is not valid."""
+    """A material's extensions as far as they are understood.
+
+    Args:
+        extensions: as the document has them.
+        what: names the material in warnings.
+        warnings: gets a sentence for each extension that is not understood, or is not valid.
+    """
 
     def read(model: type[M]) -> M:
         extension = f"KHR_materials_{re.sub('(?<=.)(?=[A-Z])', '_', model.__name__).lower()}"

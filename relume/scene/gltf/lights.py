@@ -13,23 +13,21 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.errors import SceneError
-from relume.look.lights import MAX_METRES
+from relume.remarks import Remark, simplified, wrong
+from relume.scene.checks import MAX_METRES
 from relume.scene.gltf.document import Document, Factor, Index, Name, Node, Number
 from relume.scene.lights import LightCollector
-from relume.scene.remarks import Remark, simplified, wrong
 
 F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
 LUMENS_A_WATT = 683.0
 _MAX_DEFINED = 10_000
-_UNITS = simplified(
-    f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts"
-)
+_UNITS = simplified(f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts")
 
 
 class _Spot(BaseModel, frozen=True):
-    """Half-angles, radians."""
+    """The half-angles of a spot's cone, radians."""
 
     innerConeAngle: Annotated[float, Field(ge=0, le=np.pi / 2, allow_inf_nan=False)] = 0.0  # noqa: N815
     outerConeAngle: Annotated[float, Field(gt=0, le=np.pi / 2 + 1e-6, allow_inf_nan=False)] = np.pi / 4  # noqa: N815

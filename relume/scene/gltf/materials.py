@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from relume.errors import SceneError
+from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import TextureInfo
 from relume.scene.gltf.images import ImageReader, to_linear
@@ -22,7 +23,6 @@ from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
 from relume.scene.model import Material, Texture
-from relume.scene.remarks import Remark, simplified, unused, wrong
 
 MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
 

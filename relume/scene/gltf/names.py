@@ -14,7 +14,13 @@ def unique_name(wanted: str, taken: dict[str, int]) -> str:
 
 
 def numbered(plain: str, separator: str, taken: dict[str, int]) -> str:
-    """`plain`, or with the first free number from 2; `taken` holds the last number tried for each name."""
+    """A name that is not taken: the plain one, or it with the first free number from 2.
+
+    Args:
+        plain: the wanted name.
+        separator: stands between the name and the number.
+        taken: the last number tried for each name; the new name is added.
+    """
     name = plain
     while name in taken:
         taken[plain] += 1

@@ -69,7 +69,15 @@ def meshopt_view(view: BufferView, what: str) -> MeshoptView | None:
 
 
 def unpacked_view(packed: MeshoptView, data: bytes, what: str) -> memoryview:
-    """The bytes of a packed buffer view. Raises SceneError where they are damaged."""
+    """The bytes of a buffer view that meshopt has packed.
+
+    Args:
+        packed: what the document says of it: kind, number and size of its elements.
+        data: the packed bytes.
+        what: names the view in errors.
+    Raises:
+        SceneError: the bytes are damaged.
+    """
     try:
         return memoryview(_meshopt(packed, data).tobytes())
     except MeshoptError as problem:
@@ -104,11 +112,14 @@ def draco_part(extensions: Extensions, what: str) -> DracoPart | None:
 
 
 def unpacked_draco(data: bytes, num_corners: int, num_vertices: int, what: str) -> tuple[Array, dict[int, Array]]:
-    """Corner indices (num_corners,) and, by their numbers, the attributes (num_vertices, width) of a Draco mesh.
+    """The corner indices and the attributes of a Draco mesh.
 
     Args:
+        data: the packed bytes.
         num_corners, num_vertices: what the accessors claim.
-
+        what: names the mesh in errors.
+    Returns:
+        The indices (num_corners,), and the attributes (num_vertices, width) by their numbers in the packed mesh.
     Raises:
         SceneError: the data is damaged, or holds other numbers of them.
     """

@@ -23,7 +23,7 @@ class Raster:
 
     @property
     def num_texels(self) -> int:
-        """Of one image."""
+        """The number of texels of an image."""
         return self._height * self._width
 
     def rgb(self, key: str) -> U8:

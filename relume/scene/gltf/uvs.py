@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from relume.remarks import Remark, wrong
 from relume.scene.gltf.document import Index, Number, TextureInfo
 from relume.scene.model import F32, U32
-from relume.scene.remarks import Remark, wrong
 
 
 class Placement(BaseModel, frozen=True):
@@ -41,7 +41,13 @@ class UvUse:
 
 
 def uv_use(textures: Sequence[TextureInfo], what: str, warnings: list[Remark]) -> UvUse:
-    """What the first texture asks for; a warning where another asks for something else."""
+    """The texture coordinates, and their placement, that all images of a material are shown with: the first image's.
+
+    Args:
+        textures: of the material; the first one decides.
+        what: names the material in the warning.
+        warnings: gets a sentence where another texture asks for something else.
+    """
     uses = [_use(texture, what, warnings) for texture in textures]
     if len(set(uses)) > 1:
         warnings.append(wrong(f"the textures of {what} are placed differently; all are placed as the first"))
@@ -62,9 +68,16 @@ def _use(texture: TextureInfo, what: str, warnings: list[Remark]) -> UvUse:
 
 
 def made_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
-    """Tangents along u with handedness, averaged over the triangles of a vertex. (num_vertices, 4)
+    """Tangents along u with handedness, averaged over the triangles of a vertex.
 
     The bitangent cross(normal, tangent)·w points against v, which runs down: up, as the green of a normal map means.
+
+    Args:
+        positions, normals: of the vertices; normals unit. (num_vertices, 3)
+        uvs: texture coordinates, v from the top. (num_vertices, 2)
+        faces: the triangles' vertices. (num_faces, 3)
+    Returns:
+        (num_vertices, 4) float32, unit, the handedness ±1 in w
     """
     p, uv = positions[faces].astype(np.float64), uvs[faces].astype(np.float64)
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -85,7 +98,15 @@ def made_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
 
 
 def turned_tangents(tangents: F32, normals: F32, turn: float) -> F32:
-    """Tangents turned by `turn` radians towards the bitangent cross(normal, tangent)·w. (num_vertices, 4)"""
+    """Tangents turned towards the bitangent cross(normal, tangent)·w.
+
+    Args:
+        tangents: unit, the handedness ±1 in w. (num_vertices, 4)
+        normals: unit. (num_vertices, 3)
+        turn: radians.
+    Returns:
+        (num_vertices, 4) float32
+    """
     along, hand = tangents[:, :3], tangents[:, 3:]
     turned = np.cos(turn) * along + np.sin(turn) * np.cross(normals, along) * hand
     return np.column_stack([turned, hand]).astype(np.float32)

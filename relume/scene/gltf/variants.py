@@ -12,13 +12,13 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
+from relume.brdf.document import complete_term
 from relume.errors import SceneError
-from relume.look.terms import complete_term
+from relume.remarks import Remark, simplified
 from relume.scene.gltf.document import Document, Index, Name, Primitive
 from relume.scene.gltf.materials import Understood
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import F32, Texture
-from relume.scene.remarks import Remark, simplified
 
 EXTENSION = "KHR_materials_variants"
 SAME_IMAGE = 0.01  # relative RMS; two codings of one image differ by less
@@ -87,6 +87,7 @@ def variant_looks(
     """A partial look for each variant, the terms in it complete.
 
     Args:
+        names: of the variants, in the order of the file.
         worn: the scene's materials, and what each is exchanged for.
         wardrobe: the materials that are exchanged for, by their number in the file.
         warnings: gets one sentence for each thing that a look cannot bring.

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.remarks import Remark, wrong
 from relume.scene.gltf.geometry import usable, without_degenerate
 from relume.scene.gltf.uvs import made_tangents
 from relume.scene.model import F32, Material, Mesh
-from relume.scene.remarks import Remark, wrong
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -21,7 +21,7 @@ MAX_FAN = 64  # triangles at a vertex that are compared one with another; more a
 
 @dataclass(frozen=True)
 class Corners:
-    """Triangles of a file.
+    """Triangles as a file numbers them: each corner names a position, a uv and a normal.
 
     Attributes:
         positions: (num_positions, 3). uvs: v from the top. (num_uvs, 2). normals: (num_normals, 3). float64
@@ -39,6 +39,13 @@ def make_mesh(
 ) -> Mesh | None:
     """A mesh with own vertices for each corner; None where no triangle is left (a warning says so).
 
+    Args:
+        corners: the triangles, as the file numbers them.
+        name: of the mesh.
+        number: of its material in the scene.
+        material: the same; a normal map needs tangents.
+        what: names the mesh in errors and warnings.
+        warnings: gets one sentence for each thing that is left out or replaced.
     Raises:
         SceneError: a corner names a vertex that there is not, or one that is not finite.
     """

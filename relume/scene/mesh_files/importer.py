@@ -5,8 +5,10 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Sequence
 
+from relume.environments.model import Environment
 from relume.environments.studio import studio
 from relume.errors import SceneError
+from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.companions import Alone, Companions
 from relume.scene.finish import finished_scene
 from relume.scene.gltf.cameras import framing_camera
@@ -16,14 +18,22 @@ from relume.scene.mesh_files.corners import make_mesh
 from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
 from relume.scene.mesh_files.obj import Obj, read_obj
 from relume.scene.mesh_files.ply import read_ply
-from relume.scene.model import Environment, Light, Material, Mesh, Scene
-from relume.scene.remarks import Remark, simplified, unused, wrong
+from relume.scene.model import Light, Material, Mesh, Scene
 
 MAX_LIBRARIES = 100
 
 
 def import_obj(data: bytes, name: str, environment: Environment | None, companions: Companions) -> Scene:
-    """Reads a Wavefront .obj file and the .mtl files and images that it names. Raises SceneError."""
+    """Reads a Wavefront .obj file, and the .mtl files and images that it names.
+
+    Args:
+        data: the file.
+        name: of the scene.
+        environment: the light to show it in; None for the studio.
+        companions: the files beside it.
+    Raises:
+        SceneError: it is damaged, too large, or has no triangles.
+    """
     warnings: list[Remark] = []
     obj = read_obj(data)
     library = _library(obj, companions, warnings)
@@ -51,7 +61,15 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
 
 
 def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
-    """Reads a Stanford .ply file, text or binary. Raises SceneError."""
+    """Reads a Stanford .ply file, text or binary.
+
+    Args:
+        data: the file.
+        name: of the scene.
+        environment: the light to show it in; None for the studio.
+    Raises:
+        SceneError: it is damaged, too large, or has no triangles.
+    """
     warnings: list[Remark] = []
     corners, color = read_ply(data)
     described = Described()

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import SceneError
+from relume.remarks import Remark, simplified, wrong
 from relume.scene.companions import Companions
 from relume.scene.gltf.images import Decoder, to_linear
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.model import Material, Texture
-from relume.scene.remarks import Remark, simplified, wrong
 
 F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20

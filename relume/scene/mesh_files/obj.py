@@ -26,7 +26,7 @@ LEFT_OUT = {b"p", b"l", b"curv", b"curv2", b"surf"}
 
 @dataclass
 class Obj:
-    """What an OBJ file says.
+    """The triangles of an OBJ file and what it names beside them.
 
     Attributes:
         libraries: the material files it names.
@@ -52,7 +52,7 @@ class Obj:
 
 
 def read_obj(data: bytes) -> Obj:
-    """Parses the text.
+    """Reads the lines of a file.
 
     Raises:
         SceneError: a line is not what its first word says, or there are too many lines of a kind.

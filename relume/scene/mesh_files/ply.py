@@ -93,7 +93,7 @@ def _property(words: list[str]) -> Property:
 
 
 def _columns(vertex: Columns, names: tuple[str, ...]) -> F64:
-    """(rows, len(names)); no rows where a column is missing."""
+    """Some columns of the vertices; no rows where one is missing. (rows, len(names))"""
     columns = [vertex[name] for name in names if name in vertex]
     if len(columns) < len(names) or any(isinstance(column, tuple) for column in columns):
         return np.zeros((0, len(names)))

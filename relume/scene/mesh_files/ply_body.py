@@ -65,18 +65,18 @@ class TextRows:
 
     @property
     def left(self) -> int:
-        """Numbers."""
+        """How many numbers there still are."""
         return len(self._numbers) - self._place
 
     def take(self, kind: str, count: int) -> NDArray[Any]:
-        """As `Rows.take`."""
+        """The next values, as `Rows.take` says."""
         if count > self.left:
             raise SceneError(SHORT)
         self._place += count
         return self._numbers[self._place - count : self._place]
 
     def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
-        """As `Rows.table`."""
+        """The next rows, as `Rows.table` says."""
         width = sum(count for _, count in layout)
         if rows * width > self.left:
             return None
@@ -84,7 +84,7 @@ class TextRows:
         return np.split(values, np.cumsum([count for _, count in layout])[:-1], axis=1)
 
     def skip(self, layout: Layout, rows: int) -> None:
-        """As `Rows.skip`."""
+        """Move on by so many rows, as `Rows.skip` says."""
         self._place += rows * sum(count for _, count in layout)
 
 
@@ -96,11 +96,11 @@ class BinaryRows:
 
     @property
     def left(self) -> int:
-        """Bytes."""
+        """How many bytes there still are."""
         return len(self._body) - self._place
 
     def take(self, kind: str, count: int) -> NDArray[Any]:
-        """As `Rows.take`."""
+        """The next values, as `Rows.take` says."""
         dtype = np.dtype(self._order + kind)
         if count * dtype.itemsize > self.left:
             raise SceneError(SHORT)
@@ -109,7 +109,7 @@ class BinaryRows:
         return values
 
     def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
-        """As `Rows.table`."""
+        """The next rows, as `Rows.table` says."""
         row_bytes = sum(np.dtype(kind).itemsize * count for kind, count in layout)
         if rows * row_bytes > self.left:
             return None
@@ -118,7 +118,7 @@ class BinaryRows:
         return [values[str(k)] for k in range(len(layout))]
 
     def skip(self, layout: Layout, rows: int) -> None:
-        """As `Rows.skip`."""
+        """Move on by so many rows, as `Rows.skip` says."""
         self._place += rows * sum(np.dtype(kind).itemsize * count for kind, count in layout)
 
 

@@ -32,11 +32,14 @@ _SHIFTS = {1: np.arange(8), 2: np.array([6, 4, 2, 0]), 4: np.array([4, 0])}
 
 
 def decode_vertices(source: bytes, count: int, stride: int) -> U8:
-    """The elements. (count, stride)
+    """The elements of a vertex stream.
 
     Args:
+        source: the packed bytes.
+        count: how many elements they hold.
         stride: bytes of an element, a multiple of 4, at most 256.
-
+    Returns:
+        (count, stride) uint8
     Raises:
         MeshoptError: the data is damaged, or holds another number of elements.
     """
@@ -116,9 +119,7 @@ def _walk(
     return at
 
 
-def _unpack_groups(
-    data: U8, bits: int, starts: NDArray[np.int64], targets: NDArray[np.int64], deltas: U8
-) -> None:
+def _unpack_groups(data: U8, bits: int, starts: NDArray[np.int64], targets: NDArray[np.int64], deltas: U8) -> None:
     """Put the differences of all groups of one width in their places."""
     for some in range(0, len(starts), GROUPS_AT_ONCE):
         start, target = starts[some : some + GROUPS_AT_ONCE, None], targets[some : some + GROUPS_AT_ONCE, None]

@@ -1,0 +1,84 @@
+"""What commands need of the rest: settings, the bake service, a scene by the name people give it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from relume.errors import NotFoundError
+
+if TYPE_CHECKING:
+    from relume.look import Look
+    from server.settings import Settings
+    from worker.ledger import Ledger
+    from worker.scenes import SceneRecord
+    from worker.service import BakeService
+    from worker.status import BakeStatus
+
+
+def open_settings(data: Path | None, **others: Any) -> Settings:
+    """Settings from the environment, with what the command line says in their place; what was imported can be named.
+
+    Raises:
+        ParameterError: a setting cannot be what it is.
+    """
+    from pydantic import ValidationError
+
+    from relume.environments.asset_store import STORE as ENVIRONMENTS
+    from relume.errors import ParameterError
+    from relume.measured.asset_store import STORE as MATERIALS
+    from server.settings import Settings
+    from worker.paths import environments_path, materials_path
+
+    given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
+    try:
+        settings = Settings(**given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(map(str, first["loc"]))
+        raise ParameterError(name, first["input"], first["msg"].lower()) from None
+    settings.data.mkdir(parents=True, exist_ok=True)
+    MATERIALS.use(materials_path(settings.data))
+    ENVIRONMENTS.use(environments_path(settings.data))
+    return settings
+
+
+def open_bakes(settings: Settings) -> BakeService:
+    """The bake service of a data folder, not started."""
+    from worker.service import BakeService
+
+    return BakeService(settings.data, settings.database_url, settings.scheduler)
+
+
+def find_scene(ledger: Ledger, name: str) -> SceneRecord:
+    """A scene by id, start of an id, or name. Raises NotFoundError where there is none or more than one."""
+    from worker.scenes import list_scenes
+
+    scenes = list_scenes(ledger)
+    exact = [scene for scene in scenes if name in (scene.id, scene.name)]
+    found = exact or [scene for scene in scenes if len(name) >= 4 and scene.id.startswith(name)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise NotFoundError(f"{len(found)} scenes are called {name!r}; give one of {', '.join(s.id for s in found)}")
+    known = ", ".join(f"{scene.id} ({scene.name})" for scene in scenes[:10]) or "none yet"
+    raise NotFoundError(f"there is no scene {name[:80]!r}; known are: {known}; relume import adds one")
+
+
+def find_bake(service: BakeService, scene: SceneRecord, view: str | None) -> tuple[BakeStatus, str]:
+    """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError."""
+    if view is not None and view not in scene.views:
+        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(scene.views)[:400]}")
+    ready = [bake for bake in service.bakes(scene.id) if bake.state == "ready"]
+    fitting = [bake for bake in ready if view is None or view in bake.recipe.views]
+    if not fitting:
+        raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}")
+    finest = max(fitting, key=lambda bake: bake.rank)
+    return finest, view or finest.recipe.views[0]
+
+
+def complete_look(partial: dict[str, Any], default: dict[str, Any]) -> Look:
+    """A checked look from what a file says and the scene's default. Raises ParameterError."""
+    from relume.look import complete, validate
+
+    return validate(complete(partial, default), default)

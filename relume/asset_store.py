@@ -1,0 +1,159 @@
+"""Stores of imported things: one folder each, named by the hash of the file it came from.
+
+    <folder>/<id>/<record>    JSON: format, id, name, time of import, and what the kind keeps there
+                  …           files of the kind
+
+Look documents name one as "<prefix><id>"; no other string becomes part of a path. A name means the same content
+wherever it is found, so a process looks through all folders that it was told to use.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from relume.errors import NotFoundError, ParameterError, RelumeError
+from relume.replacing import replacing
+
+FORMAT_VERSION = 1
+MAX_JSON_BYTES = 1 << 20
+_ID = re.compile(r"[0-9a-f]{16}")
+
+
+def check_name(name: str) -> str:
+    """A name that people give, without blanks around it. Raises ParameterError unless it is 1 to 80 printable."""
+    name = name.strip()
+    if not name.isprintable() or not 1 <= len(name) <= 80:
+        raise ParameterError("name", name, "1 to 80 printable characters")
+    return name
+
+
+@dataclass(frozen=True)
+class AssetStore:
+    """One kind of imported things.
+
+    Attributes:
+        what: one of them is called, in messages. prefix: of names in looks. record: name of the JSON file.
+        problem: error where one is damaged or the store is full.
+        max_entries: of a folder.
+    """
+
+    what: str
+    prefix: str
+    record: str
+    problem: type[RelumeError]
+    max_entries: int
+    _folders: list[Path] = field(default_factory=list)
+
+    def use(self, folder: Path) -> None:
+        """Find things of this folder too from now on; it need not exist yet."""
+        self._folders.append(folder)
+
+    @contextmanager
+    def at(self, folder: Path) -> Iterator[Path]:
+        """Find things of this folder too for as long as the block runs."""
+        self.use(folder)
+        try:
+            yield folder
+        finally:
+            self._folders.remove(folder)
+
+    def keep(self, folder: Path, source: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> str:
+        """Keep what a file holds under the file's hash, and return its id; what is here already takes the new name.
+
+        Args:
+            folder: where things of this kind are kept. source: the file.
+            name: that people read.
+            fill: writes the kind's files into an empty folder, and returns what the record says besides.
+        Raises:
+            self.problem: the store is full. And what `fill` raises; then nothing is kept.
+        """
+        with source.open("rb") as file:
+            identity = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        target = folder / identity
+        if not target.exists():
+            if len(self.paths(folder)) >= self.max_entries:
+                raise self.problem(f"{self.max_entries} {self.what}s are kept already; delete one first")
+            self._make(folder, target, name, fill)
+        document = self.read(target)
+        if document["name"] != name:
+            with replacing(target / self.record) as unfinished:
+                unfinished.write_text(json.dumps({**document, "name": name}))
+        return identity
+
+    def _make(self, folder: Path, target: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> None:
+        """Write a thing's folder, and give it its name when it is complete."""
+        folder.mkdir(parents=True, exist_ok=True)
+        document = {"format": FORMAT_VERSION, "id": target.name, "name": name, "created": time.time()}
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".") as staging:
+            made = Path(staging) / target.name
+            made.mkdir()
+            (made / self.record).write_text(json.dumps({**document, **fill(made)}))
+            try:
+                os.rename(made, target)
+            except OSError:
+                if not target.exists():  # somebody else has imported it in the meantime
+                    raise
+
+    def paths(self, folder: Path) -> list[Path]:
+        """Folders of all things in a folder."""
+        return [path for path in folder.iterdir() if _ID.fullmatch(path.name)] if folder.is_dir() else []
+
+    def path(self, folder: Path, identity: str) -> Path:
+        """Folder of one thing. Raises NotFoundError."""
+        if not _ID.fullmatch(identity) or not (folder / identity).is_dir():
+            raise NotFoundError(f"there is no {self.what} {identity[:40]!r}; import it first")
+        return folder / identity
+
+    def read(self, path: Path) -> dict[str, Any]:
+        """The record of a thing by its folder. Raises self.problem where it is damaged."""
+        try:
+            with (path / self.record).open("rb") as file:
+                text = file.read(MAX_JSON_BYTES + 1)
+            document = json.loads(text) if len(text) <= MAX_JSON_BYTES else None
+        except (OSError, ValueError, RecursionError) as error:
+            raise self.damaged(path) from error
+        if not isinstance(document, dict) or document.get("format") != FORMAT_VERSION:
+            raise self.damaged(path)
+        if not isinstance(document.get("name"), str) or not isinstance(document.get("created"), float):
+            raise self.damaged(path)
+        return document
+
+    def remove(self, folder: Path, identity: str) -> None:
+        """Delete a thing; looks that name it are refused from now on. Raises NotFoundError."""
+        shutil.rmtree(self.path(folder, identity))
+
+    def damaged(self, path: Path) -> RelumeError:
+        """The error to raise."""
+        return self.problem(f"the {self.what} {path.name} is damaged; delete its folder and import it again")
+
+    def is_known(self, name: str) -> bool:
+        """Whether a look's name means a thing that is here."""
+        return self._find(name) is not None
+
+    def known_names(self) -> list[str]:
+        """All names that mean something."""
+        return sorted({self.prefix + path.name for folder in self._folders for path in self.paths(folder)})
+
+    def found(self, name: str) -> Path:
+        """The folder of what a look names. Raises NotFoundError."""
+        path = self._find(name)
+        if path is None:
+            raise NotFoundError(f"there is no {self.what} {name[:40]!r}; import its file again")
+        return path
+
+    def _find(self, name: str) -> Path | None:
+        identity = name.removeprefix(self.prefix)
+        if identity == name or not _ID.fullmatch(identity):
+            return None
+        return next((folder / identity for folder in reversed(self._folders) if (folder / identity).is_dir()), None)

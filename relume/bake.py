@@ -1,0 +1,174 @@
+"""What a bake is: plan (pure), tasks, compute (pure), and what a worker needs to run it.
+
+bake (worker, once) → freeze (server, on touch) → frame (server, per edit). A method joins by one module and one line in
+`relume.methods.registry`, and inherits the contract suite in tests/contract.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from relume.scene.model import Scene
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to bake. The same scene and recipe give the same store under the same code, bit for bit.
+
+    Attributes:
+        method: name of a transfer method.
+        views: camera names, in order.
+        size: width and height in pixels.
+        num_lights: triangles that the environment is divided into.
+        relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
+    """
+
+    method: str
+    views: tuple[str, ...]
+    size: tuple[int, int]
+    num_lights: int
+    relightable: bool = False
+
+
+@dataclass(frozen=True)
+class ArraySpec:
+    """One Zarr array of a store.
+
+    Attributes:
+        path: inside the store, e.g. "views/front/visibility".
+        chunks: unit of reading. shards: unit of writing; a task owns whole shards.
+    """
+
+    path: str
+    shape: tuple[int, ...]
+    dtype: str
+    chunks: tuple[int, ...]
+    shards: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A piece of a bake that one process computes alone.
+
+    Attributes:
+        stage: index into `BakeMethod.stages`; a stage starts when the one before is complete.
+        index: position within the stage; (stage, index) names the task.
+        view: the view it belongs to, "" for none.
+        start, stop: the rows of the stage's arrays that it owns, shard-aligned.
+    """
+
+    stage: int
+    index: int
+    view: str
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a bake will cost, before anything is traced. Upper bounds.
+
+    Attributes:
+        num_rays: shadow and camera rays.
+        store_bytes: on disk, uncompressed.
+        peak_bytes: memory of one worker process.
+    """
+
+    num_view_samples: int
+    num_rays: int
+    store_bytes: int
+    peak_bytes: int
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a task computed: rows [start, stop) of each array, and what it cost.
+
+    Attributes:
+        arrays: by array path, the task's rows.
+        num_rays: rays traced. trace_s: seconds spent in the tracing kernels alone.
+    """
+
+    arrays: Arrays
+    num_rays: int
+    trace_s: float
+
+
+class StoreReader(Protocol):
+    """Reads what earlier stages wrote; raises `ChunkDamagedError` where a checksum fails."""
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Rows [start, stop) of the array at a path inside the store; `stop` None for all that follow."""
+        ...
+
+    def shape(self, path: str) -> tuple[int, ...]:
+        """Shape of an array."""
+        ...
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """The store's root attributes."""
+        ...
+
+
+class BakeMethod(Protocol):
+    """How one paper's light transport is baked; `relume.methods.base.TransferMethod` opens it as well."""
+
+    @property
+    def name(self) -> str:
+        """What recipes call it."""
+        ...
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Names of its stages, in order."""
+        ...
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Cost of a bake; pure, traces nothing. Raises PlanError where the recipe does not fit the scene."""
+        ...
+
+    def prepare(self, scene: Scene) -> None:
+        """Build what all tasks of a scene share in one process; kept for the next."""
+        ...
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """Root attributes of the store: JSON, enough to open it without the scene."""
+        ...
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The tasks of a stage; pure.
+
+        Args:
+            stage: index into `stages`. scene: that is baked. recipe: how.
+            store: what the stages before wrote.
+        """
+        ...
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """The arrays that a stage fills and whose shape is known before it runs; pure.
+
+        Args:
+            stage: index into `stages`. scene: that is baked. recipe: how.
+            store: what the stages before wrote.
+        """
+        ...
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        """Compute a task's rows; pure, seeded by (scene id, task).
+
+        Args:
+            scene: that is baked. recipe: how.
+            task: one of `tasks`.
+            store: what the stages before wrote.
+        Returns:
+            Rows of the arrays that `arrays` announces. Others are created by the task itself, whole (the view samples
+            of a view, whose number only tracing tells).
+        """
+        ...

@@ -1,0 +1,82 @@
+"""A ball of one material in the studio: thumbnails, lit by the machinery that lights pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.environments.studio import studio
+from relume.imageio import png_bytes, to_bytes, tone_map
+from relume.light.triangles import TriangleLights, subdivide
+from relume.operators.shade import shade
+from relume.picture.wanted import Wanted
+from relume.points import Points
+from relume.project.receivers import Receivers
+
+F32 = NDArray[np.float32]
+
+THUMBNAIL_SIZE = 64
+_EXPOSURE = 1.0
+_NUM_LIGHTS = 200
+_FINER = 2  # samples a pixel, along each side
+_BEHIND = 0.05  # radiance around the ball
+_TO_CAMERA = np.array([0.0, 0.0, 1.0], np.float32)
+
+
+@cache
+def _lights() -> TriangleLights:
+    return subdivide(studio().radiance, _NUM_LIGHTS)
+
+
+def ball_image(documents: Sequence[Mapping[str, Any]], size: int) -> F32:
+    """Render a ball seen from far away; nothing but itself is there to cast a shadow.
+
+    Args:
+        documents: complete terms, without textures.
+        size: width and height in pixels.
+    Returns:
+        Linear radiance. (size, size, 3) float32
+    """
+    finer = _FINER * size
+    across = (np.arange(finer) + 0.5) / finer * 2.1 - 1.05
+    x, y = np.meshgrid(across, -across)
+    inside = x**2 + y**2 < 1.0
+    picture = np.full((finer, finer, 3), _BEHIND)
+    picture[inside] = _shaded(documents, _receivers(x[inside], y[inside]))
+    return np.asarray(picture.reshape(size, _FINER, size, _FINER, 3).mean(axis=(1, 3)), np.float32)
+
+
+def ball_pixels(documents: Sequence[Mapping[str, Any]]) -> NDArray[np.uint8]:
+    """A ball as displayed. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
+    return to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE), _EXPOSURE, "agx"))
+
+
+def ball_png(documents: Sequence[Mapping[str, Any]]) -> bytes:
+    """The same as a PNG."""
+    return png_bytes(ball_pixels(documents))
+
+
+def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:
+    """Points of the unit sphere that face +Z; tangents run around the vertical axis."""
+    normal = np.stack([x, y, np.sqrt(1.0 - x**2 - y**2)], axis=-1).astype(np.float32)
+    tangent = np.stack([normal[:, 2], np.zeros(len(x), np.float32), -normal[:, 0]], axis=-1)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    visible = np.packbits(normal @ _lights().direction.T > 0, axis=1, bitorder="little")
+    points = Points(normal, normal, tangent, np.arange(len(x), dtype=np.uint32))
+    return Receivers(points, np.tile(_TO_CAMERA, (len(x), 1)), visible)
+
+
+def _shaded(documents: Sequence[Mapping[str, Any]], receivers: Receivers) -> NDArray[np.float64]:
+    """Sum of the terms. (n, 3)"""
+    num = len(receivers.normal)
+    radiance = np.zeros((num, 3))
+    for document in documents:
+        wanted = Wanted.of(document, np.arccos(receivers.normal[:, 2].astype(np.float64)))
+        shaded = shade(wanted.term, wanted.bands, _lights(), receivers, lambda share: None, lambda: False)
+        rows = shaded.rows(num) * np.asarray(document["color"])
+        radiance += rows if wanted.outgoing is None else rows * wanted.outgoing.T
+    return radiance

@@ -1,0 +1,77 @@
+"""The library's balls, rendered ahead: one file that comes with the package, a square for each material.
+
+Rendering one takes half a second and there are hundreds, too long to wait for while looking through them.
+`python -m relume.balls.library` renders them all again, which is due when their fits or the way balls are lit change.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.balls.ball import THUMBNAIL_SIZE, ball_pixels
+from relume.brdf.document import complete_term
+from relume.imageio import png_bytes
+from relume.look.library import Preset, presets
+
+ATLAS = Path(__file__).with_name("balls.webp")
+_BESIDE = 32  # balls in a row
+_QUALITY = 90
+
+
+def library_ball(identity: str) -> bytes | None:
+    """The ball of a library material as a PNG; None where the library has no such material."""
+    index = _indices().get(identity)
+    return None if index is None else png_bytes(_square(index))
+
+
+def render(preset: Preset) -> NDArray[np.uint8]:
+    """The ball as the atlas is to show it. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
+    return ball_pixels([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])
+
+
+def write(path: Path, balls: Sequence[NDArray[np.uint8]]) -> None:
+    """Put balls into one picture, row after row."""
+    size, rows = THUMBNAIL_SIZE, -(-len(balls) // _BESIDE)
+    atlas = np.zeros((rows * size, _BESIDE * size, 3), np.uint8)
+    for index, ball in enumerate(balls):
+        row, column = divmod(index, _BESIDE)
+        atlas[row * size : (row + 1) * size, column * size : (column + 1) * size] = ball
+    Image.fromarray(atlas).save(path, "WEBP", quality=_QUALITY, method=6)
+
+
+@cache
+def _indices() -> dict[str, int]:
+    return {preset.id: index for index, preset in enumerate(presets())}
+
+
+@cache
+def _atlas() -> NDArray[np.uint8]:
+    with Image.open(ATLAS) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def _square(index: int) -> NDArray[np.uint8]:
+    row, column = divmod(index, _BESIDE)
+    size = THUMBNAIL_SIZE
+    return _atlas()[row * size : (row + 1) * size, column * size : (column + 1) * size]
+
+
+def main() -> None:
+    """Render all of them."""
+    found, balls = presets(), []
+    for count, preset in enumerate(found, 1):
+        balls.append(render(preset))
+        sys.stderr.write(f"\r{count} of {len(found)}")
+    write(ATLAS, balls)
+    sys.stderr.write("\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""Completing and checking one term of a look against the registry of models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from relume.brdf.curves import CHANNELS
+from relume.brdf.edited import RELATIVE, is_relative
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Curve, Term
+from relume.checks import (
+    MAX_COLOR,
+    Pointer,
+    check_number,
+    check_number_or_rgb,
+    check_object,
+    check_triple,
+    fail,
+    names_text,
+)
+from relume.measured.asset_store import STORE
+
+MAX_POINTS = 4096
+MAX_CURVE_VALUE = 1e6
+_TEXTURES = ("diffuse", "specular")
+_FIELDS = ("model", "data", "color", "texture", "params", "curves")
+
+
+def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The term with every field and parameter; what is left out has the model's default.
+
+    Args:
+        pointer: where the term stands in its look, for the error.
+        given: the term as somebody sent it; anything.
+        known: the valid term that stood here before, if any; its curve objects are not checked again.
+    Raises:
+        ParameterError: something is wrong; it names the JSON pointer of the first such thing.
+    """
+    check_object(pointer, given, _FIELDS)
+    model = given.get("model")
+    term = TERMS.get(model) if isinstance(model, str) else None
+    if term is None:
+        raise fail((*pointer, "model"), model, f"one of {names_text(TERMS)}")
+    color = given.get("color", [1.0, 1.0, 1.0])
+    check_triple((*pointer, "color"), color, 0.0, MAX_COLOR)
+    texture = given.get("texture", term.texture)
+    if texture is not None and texture not in _TEXTURES:
+        raise fail((*pointer, "texture"), texture, f"null or one of {names_text(_TEXTURES)}")
+    known_curves = known["curves"] if known is not None and known["model"] == model else {}
+    return {
+        "model": model,
+        **_checked_data((*pointer, "data"), given, term),
+        "color": color,
+        "texture": texture,
+        "params": _complete_params((*pointer, "params"), given.get("params", {}), term),
+        "curves": _checked_curves((*pointer, "curves"), given.get("curves", {}), term, known_curves),
+    }
+
+
+def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
+    """The name of the material that a term is measured from, where it is."""
+    name = given.get("data")
+    if not term.needs_data:
+        if "data" in given:
+            raise fail(pointer, name, f"nothing: {term.model!r} has no data")
+        return {}
+    if not isinstance(name, str) or not STORE.is_known(name):
+        known = names_text(STORE.known_names())
+        raise fail(pointer, name, f"the data of a measured material that was imported here: {known}")
+    return {"data": name}
+
+
+def _complete_params(pointer: Pointer, given: Any, term: Term) -> dict[str, Any]:
+    check_object(pointer, given, [parameter.name for parameter in term.parameters])
+    params = {}
+    for parameter in term.parameters:
+        value = given.get(parameter.name, parameter.default)
+        check = check_number if parameter.name in term.fixed else check_number_or_rgb
+        check((*pointer, parameter.name), value, parameter.minimum, parameter.maximum)
+        params[parameter.name] = value
+    return params
+
+
+def _checked_curves(pointer: Pointer, given: Any, term: Term, known: Mapping[str, Any]) -> dict[str, Any]:
+    check_object(pointer, given, [curve.name for curve in term.curves])
+    for name, drawn in given.items():
+        if name not in known or drawn is not known[name]:
+            _check_drawn((*pointer, name), drawn, term.curve(name))
+    return dict(given)
+
+
+def _check_drawn(pointer: Pointer, drawn: Any, curve: Curve) -> None:
+    """One object, or a list of objects for different channels."""
+    if not isinstance(drawn, list):
+        _check_drawn_object(pointer, drawn, curve)
+        return
+    if not 1 <= len(drawn) <= len(CHANNELS):
+        raise fail(pointer, drawn, "an object, or a list of one to three")
+    covered: set[str] = set()
+    for k, one in enumerate(drawn):
+        _check_drawn_object((*pointer, k), one, curve)
+        channels = one.get("channels", CHANNELS)
+        if covered & set(channels):
+            raise fail((*pointer, k, "channels"), channels, "channels that no other object of this curve covers")
+        covered |= set(channels)
+
+
+def _check_drawn_object(pointer: Pointer, drawn: Any, curve: Curve) -> None:
+    check_object(pointer, drawn, ("points", "bands", *RELATIVE, "channels"))
+    channels = drawn.get("channels", CHANNELS)
+    if not isinstance(channels, str) or not channels or sorted(set(channels) & set(CHANNELS)) != sorted(channels):
+        raise fail((*pointer, "channels"), channels, "one or more of the letters r, g, b, each once")
+    grounds = ("points" in drawn) + ("bands" in drawn)
+    if grounds > 1 or not (grounds or is_relative(drawn)):
+        raise fail(pointer, drawn, f"either points or bands, or one or more of {names_text(RELATIVE)}")
+    for name in drawn:
+        if name in ("points", "handles"):
+            _check_points((*pointer, name), drawn[name], num_values=1 if name == "points" else 2)
+        elif name != "channels":
+            _check_bands((*pointer, name), drawn[name], curve.num_bands)
+
+
+def _check_points(pointer: Pointer, points: Any, num_values: int) -> None:
+    """Points [degrees, value], or handles [degrees, was, becomes]."""
+    form = "a point [degrees, value]" if num_values == 1 else "a handle [degrees, was, becomes]"
+    if not isinstance(points, list | tuple) or not 2 <= len(points) <= MAX_POINTS:
+        raise fail(pointer, points, f"a list of 2 to {MAX_POINTS}, each {form}")
+    for k, point in enumerate(points):
+        if not isinstance(point, list | tuple) or len(point) != 1 + num_values:
+            raise fail((*pointer, k), point, form)
+    angles, *values = zip(*points, strict=True)
+    _check_values(pointer, angles, 90.0, lambda k: (k, 0))
+    for column, of in enumerate(values, 1):
+        _check_values(pointer, of, MAX_CURVE_VALUE, partial(_in_column, column))
+    not_after = np.diff(np.asarray(angles, np.float64)) <= 0
+    if not_after.any():
+        k = int(np.argmax(not_after)) + 1
+        raise fail((*pointer, k, 0), angles[k], "an angle greater than that of the point before")
+
+
+def _in_column(column: int, row: int) -> Pointer:
+    return row, column
+
+
+def _check_bands(pointer: Pointer, bands: Any, num_bands: int) -> None:
+    allowed = f"{num_bands} values, three times {num_bands} values, or three lists of {num_bands}"
+    if not isinstance(bands, list | tuple):
+        raise fail(pointer, bands, allowed)
+    if len(bands) == 3 and all(isinstance(channel, list | tuple) and len(channel) == num_bands for channel in bands):
+        for channel, values in enumerate(bands):
+            _check_values((*pointer, channel), values, MAX_CURVE_VALUE, lambda k: (k,))
+    elif len(bands) in (num_bands, 3 * num_bands):
+        _check_values(pointer, bands, MAX_CURVE_VALUE, lambda k: (k,))
+    else:
+        raise fail(pointer, bands, allowed)
+
+
+def _check_values(pointer: Pointer, values: Sequence[Any], maximum: float, where: Callable[[int], Pointer]) -> None:
+    """Numbers in [0, maximum], many at once; `where` turns the index of a bad one into the end of its pointer."""
+    in_range = set(map(type, values)) <= {int, float} and min(values) >= 0.0 and max(values) <= maximum
+    if in_range and not math.isnan(sum(values)):  # min and max may pass over a NaN, a sum does not
+        return
+    for k, value in enumerate(values):
+        check_number((*pointer, *where(k)), value, 0.0, maximum)

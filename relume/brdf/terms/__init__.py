@@ -1,0 +1,1 @@
+"""The BRDF models, one term each; `relume.brdf.registry` lists them."""

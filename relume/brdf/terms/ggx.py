@@ -1,0 +1,72 @@
+"""ggx: Walter 2007 with separable Smith masking; what glTF means by metallic-roughness (its metals: f0 per channel)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from relume.brdf.fresnel import schlick
+from relume.brdf.local import MIN_COSINE, ZERO, quotient_ufunc
+from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
+
+_QUARTER = np.float32(0.25)
+
+
+@quotient_ufunc
+def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
+    """1/(4 (n·wi)(n·wo)), zero at and below the horizon.
+
+    Args:
+        wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
+        wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
+    """
+    if wi_z <= ZERO or wo_z <= ZERO:
+        return ZERO
+    # within 2e-4 degrees of the horizon the division would overflow; the masking curves vanish there
+    return _QUARTER / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE))
+
+
+def roughness_to_alpha(roughness: float) -> float:
+    """Width α of the facet distribution from the slider's roughness: its square (Burley 2012, and glTF)."""
+    return roughness * roughness
+
+
+def facets(theta_h: F64, params: Params) -> F64:
+    """D = α² / (π cos⁴ θh (α² + tan² θh)²), eq. 33, Walter 2007; written without the tangent, which has a pole."""
+    alpha2 = roughness_to_alpha(params["roughness"]) ** 2
+    cos2 = np.cos(theta_h) ** 2
+    sin2 = np.sin(theta_h) ** 2
+    return np.asarray(alpha2 / (math.pi * np.square(alpha2 * cos2 + sin2)))
+
+
+def masking(theta: F64, params: Params) -> F64:
+    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole."""
+    alpha2 = roughness_to_alpha(params["roughness"]) ** 2
+    cos = np.cos(theta)
+    return np.asarray(2.0 * cos / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))
+
+
+def reflectance(theta_d: F64, params: Params) -> F64:
+    """Schlick's reflectance at a difference angle, for the reflectance f0 at the normal."""
+    return schlick(np.cos(theta_d), params["f0"])
+
+
+GGX = Term(
+    model="ggx",
+    label="GGX",
+    parameters=(
+        Parameter("roughness", "Roughness", 0.03, 1.0, 0.4, "", "linear", "As artists know it; α is its square."),
+        Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
+    ),
+    curves=(
+        Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("roughness",), 256),
+        Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("f0",), 64),
+        Curve("theta_i", "light masking θi", Angle.THETA_I, masking, ("roughness",), 64),
+        Curve("theta_o", "view masking θo", Angle.THETA_O, masking, ("roughness",), 64),
+    ),
+    quotient=quotient,
+    source="Walter 2007, eqs. 20, 33, 34: f = D F G1(wi) G1(wo) / (4 (n·wi)(n·wo))",
+    texture="specular",
+    help="The highlight of glTF materials, with a long soft tail.",
+)

@@ -1,0 +1,42 @@
+"""lafortune: one generalised cosine lobe (Lafortune 1997), normalised as in Nguyen 2010.
+
+f = (s + 2)/(2π) cos^s γ, cos γ = (Cx ix ox + Cy iy oy + Cz iz oz) / max(|Cx|, |Cy|, |Cz|). The C are fixed at freeze:
+they shape the angle itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from relume.brdf.local import one_above
+from relume.brdf.term import Angle, Curve, Parameter, Params, Term
+from relume.brdf.terms.blinn_phong import lobe
+
+_LOBE = Curve("lobe", "lobe angle", Angle.LOBE, lobe, ("exponent",), 256, (-1.0, -1.0, 1.0))
+
+
+def settle(params: Params) -> dict[str, Any]:
+    """The curve over the lobe that C makes; all C zero make no lobe, every angle is a right one."""
+    c = (params["c_x"], params["c_y"], params["c_z"])
+    largest = max(map(abs, c)) or 1.0
+    return {"curves": (replace(_LOBE, axes=(c[0] / largest, c[1] / largest, c[2] / largest)),)}
+
+
+LAFORTUNE = Term(
+    model="lafortune",
+    label="Lafortune",
+    parameters=(
+        Parameter("exponent", "Exponent", 1.0, 1e5, 20.0, "", "log", "Higher is a smaller, brighter highlight."),
+        Parameter("c_x", "Cx", -1.0, 1.0, -1.0, "", "linear", "Along the tangent: -1 mirrors, +1 sends light back."),
+        Parameter("c_y", "Cy", -1.0, 1.0, -1.0, "", "linear", "Across the tangent: unlike Cx, it is anisotropic."),
+        Parameter("c_z", "Cz", 0.0, 1.0, 1.0, "", "linear", "Below |Cx|, the lobe leans over, off the mirror angle."),
+    ),
+    curves=(_LOBE,),
+    quotient=one_above,
+    source="Lafortune 1997, eq. 4, normalised by Nguyen 2010: f = (s+2)/(2π) cos^s γ",
+    texture="specular",
+    help="A highlight that leans away from the mirror direction, or back to the light.",
+    fixed=("c_x", "c_y", "c_z"),
+    settle=settle,
+)

@@ -1,0 +1,124 @@
+"""measured_lv, measured_hd, measured_hf: a measured material as curves that can be edited, times what they leave.
+
+    M = ρd + ρs     ρd = min(M, g g) = qd g(θi) g(θo)     ρs = M − ρd = qs f(θh) f'(θd)     eq. 18, Ben-Artzi 2006
+    M = q P(θi) Q(θh) P(θo)                                                                 eq. 17, McCool 2001
+
+M is the material's table between its nodes, per channel; the curves come with it, and the quotients hold all that they
+do not tell, so that unedited terms add up to M exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from typing import Any, NoReturn
+
+import numpy as np
+
+from relume.basis.bands import MAX_ANGLE
+from relume.brdf.term import F64, Angle, Curve, Params, Term
+from relume.errors import ParameterError
+from relume.measured.asset_store import material
+from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, Part, quotients
+
+_ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D, Angle.THETA_O: THETA_O}
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A curve at its knots, linear between: along θh in the root of the angle, as the MERL grid has it.
+
+    Attributes:
+        knots: (3, 90).
+    """
+
+    angle: Angle
+    knots: F64
+
+    def __call__(self, gamma: F64) -> F64:
+        """γ in radians (...) -> (3, ...)."""
+        share = np.clip(gamma / MAX_ANGLE, 0.0, 1.0)
+        position = NUM_KNOTS * (np.sqrt(share) if self.angle is Angle.THETA_H else share)
+        return np.stack([np.interp(position, np.arange(NUM_KNOTS), channel) for channel in self.knots])
+
+
+def _one(gamma: F64, params: Params) -> F64:
+    """The declared curve, which stands where no data are named: one at every angle."""
+    return np.ones_like(gamma)
+
+
+def _without_data(*directions: object) -> NoReturn:
+    raise ParameterError("data", None, "the data of a measured material that was imported")
+
+
+_CURVES = {
+    "theta_i": Curve("theta_i", "light angle θi", Angle.THETA_I, _one, (), 64),
+    "theta_h": Curve("theta_h", "half angle θh", Angle.THETA_H, _one, (), 256),
+    "theta_d": Curve("theta_d", "difference angle θd", Angle.THETA_D, _one, (), 64),
+    "theta_o": Curve("theta_o", "view angle θo", Angle.THETA_O, _one, (), 64),
+}
+
+
+@lru_cache(maxsize=64)
+def _settle(part: Part, data: str) -> dict[str, Any]:
+    """Quotient and curves of one material."""
+    found = material(data)
+    knots = found.homomorphic if part is Part.HOMOMORPHIC else found.lobes
+    curves = tuple(replace(c, factor=Factor(c.angle, knots[_ROWS[c.angle]])) for c in _curves_of(part))
+    return {"quotient": partial(quotients, part, found.table, knots), "curves": curves}
+
+
+def _settled(part: Part) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    return lambda fixed: _settle(part, fixed["data"])
+
+
+def _curves_of(part: Part) -> tuple[Curve, ...]:
+    names = {
+        Part.DIFFUSE: ("theta_i", "theta_o"),
+        Part.SPECULAR: ("theta_h", "theta_d"),
+        Part.HOMOMORPHIC: ("theta_h", "theta_i", "theta_o"),
+    }
+    return tuple(_CURVES[name] for name in names[part])
+
+
+def _term(model: str, label: str, part: Part, source: str, texture: str, text: str) -> Term:
+    return Term(
+        model=model,
+        label=label,
+        parameters=(),
+        curves=_curves_of(part),
+        quotient=_without_data,
+        source=source,
+        texture=texture,
+        help=text,
+        settle=_settled(part),
+        num_channels=3,
+        needs_data=True,
+    )
+
+
+MEASURED_LV = _term(
+    "measured_lv",
+    "Measured, diffuse-like",
+    Part.DIFFUSE,
+    "Ben-Artzi 2006, eq. 18: ρd = q g(θi) g(θo)",
+    "diffuse",
+    "The part of a measured material that hardly changes with the azimuth; adds up to it with measured_hd.",
+)
+MEASURED_HD = _term(
+    "measured_hd",
+    "Measured, specular-like",
+    Part.SPECULAR,
+    "Ben-Artzi 2006, eq. 18: ρs = q f(θh) f'(θd)",
+    "specular",
+    "The highlight of a measured material; adds up to it with measured_lv.",
+)
+MEASURED_HF = _term(
+    "measured_hf",
+    "Measured, in one product",
+    Part.HOMOMORPHIC,
+    "McCool 2001, Ben-Artzi 2006, eq. 17: ρ = q P(θi) Q(θh) P(θo)",
+    "specular",
+    "A whole measured material in one product; for cloth and others without two lobes.",
+)

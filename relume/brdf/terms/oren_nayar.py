@@ -1,0 +1,69 @@
+"""oren_nayar: the full model of Oren & Nayar 1994, facets that shade, hide and light each other; all of it quotient.
+
+σ, the deviation of the facets' slope angles, and the albedo of the light that is reflected twice are fixed at freeze.
+The paper has the albedo squared in that part; one factor is the term's colour. The curve over θi is one, for drawing.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from relume.brdf.local import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
+from relume.brdf.term import Angle, Curve, Parameter, Params, Term
+from relume.brdf.terms.lambert import one
+
+_PER_PI, _PER_HALF_PI = 1.0 / math.pi, 2.0 / math.pi
+
+
+@quotient_ufunc_with(2)
+def quotient(sigma, albedo, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
+    """(L1 + L2)/(ρ E0 cos θi): radiance after one reflection and after two, per albedo and irradiance.
+
+    Args:
+        sigma: the slope's standard deviation σ, radians. albedo: the albedo ρ of a facet.
+        wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
+        wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
+    """
+    if wi_z <= ZERO or wo_z <= ZERO:
+        return ZERO
+    # tangents overflow within 2e-4 degrees of the horizon
+    theta_i, theta_o = math.acos(min(max(wi_z, MIN_COSINE), ONE)), math.acos(min(max(wo_z, MIN_COSINE), ONE))
+    alpha, beta = max(theta_i, theta_o), min(theta_i, theta_o)
+    sines = math.sqrt((wi_x * wi_x + wi_y * wi_y) * (wo_x * wo_x + wo_y * wo_y))
+    # straight from above there is no azimuth, and no tan β for it to multiply
+    cos_phi = (wi_x * wo_x + wi_y * wo_y) / max(sines, 1e-12)
+    cos_phi = min(max(cos_phi, -ONE), ONE)
+    variance = sigma * sigma
+    share = variance / (variance + 0.09)
+    low = beta * _PER_HALF_PI
+    c1 = ONE - HALF * variance / (variance + 0.33)
+    c2 = 0.45 * share * (math.sin(alpha) - (low * low * low if cos_phi < ZERO else ZERO))
+    c3 = 0.125 * share * (alpha * _PER_HALF_PI * low) ** 2
+    once = c1 + cos_phi * c2 * math.tan(beta) + c3 * (ONE - abs(cos_phi)) * math.tan(HALF * (alpha + beta))
+    twice = albedo * 0.17 * variance / (variance + 0.13) * (ONE - cos_phi * low * low)
+    # the published fit falls below zero where very rough facets are seen against grazing light
+    return _PER_PI * max(once + twice, ZERO)
+
+
+def settle(params: Params) -> dict[str, Any]:
+    """The quotient of facets this rough."""
+    return {"quotient": partial(quotient, params["sigma"], params["albedo"])}
+
+
+OREN_NAYAR = Term(
+    model="oren_nayar",
+    label="Oren–Nayar (rough diffuse)",
+    parameters=(
+        Parameter("sigma", "Roughness σ", 0.0, 1.0, 0.5, "rad", "linear", "Deviation of slopes; 0 is Lambert."),
+        Parameter("albedo", "Albedo between facets", 0.0, 1.0, 0.5, "", "linear", "Of light that is reflected twice."),
+    ),
+    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, one, (), 64),),
+    quotient=partial(quotient, 0.5, 0.5),
+    source="Oren & Nayar 1994, the full model with interreflections",
+    texture="diffuse",
+    help="Clay, plaster, the moon: flatter than Lambert, and bright where light and eye agree.",
+    fixed=("sigma", "albedo"),
+    settle=settle,
+)

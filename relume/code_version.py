@@ -1,0 +1,91 @@
+"""Which code made what is kept on disk: a hash over the sources that decide it, part of the names of images and bakes.
+
+What decides a number is a module and all that it imports, so the sources are found by following imports, and a new
+module or a moved one is never forgotten. Comments count: telling them apart would cost more than making things anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Collection, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parent
+_IMPORT = re.compile(r"^\s*(?:from (\w[\w.]*) import (\([^)]*\)|[^\n#]*)|import (\w[\w.]*))", re.MULTILINE)
+
+_IMAGES = ("methods", "operators", "picture")
+_TRUTHS = (*_IMAGES, "reference")
+_BAKES = ("methods.registry", "scene.archive", "store.fill")
+_AFTER_BAKES = (  # methods import these to open what was baked
+    "operators", "picture", "project",
+    "methods.cell_light", "methods.local_lights", "methods.reflected", "methods.thinned", "methods.transfer",
+)  # fmt: skip
+
+
+@cache
+def image_code() -> str:
+    """Names the code that makes images of terms from a bake. 16 hexadecimal digits"""
+    return code_hash(sources_of(_IMAGES))
+
+
+@cache
+def truth_code() -> str:
+    """Names the code that compares images with brute force. 16 hexadecimal digits"""
+    return code_hash(sources_of(_TRUTHS))
+
+
+@cache
+def bake_code() -> str:
+    """Names the code that makes bakes from scenes. 16 hexadecimal digits"""
+    return code_hash(sources_of(_BAKES, but_for=_AFTER_BAKES))
+
+
+def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
+    """Hash over the names and contents of sources. 16 hexadecimal digits"""
+    digest = hashlib.sha256()
+    for path in sorted(sources):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def sources_of(names: Iterable[str], but_for: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
+    """Sources of modules of a package, and of all those of its modules that they import, directly or through others.
+
+    Args:
+        names: without the package's own, "store.fill"; of a package inside it, all of its modules.
+        but_for: packages and modules inside it that are left out, with what only they import.
+        package: folder of the package.
+    Raises:
+        ModuleNotFoundError: one of `names` is not there.
+    """
+    left_out = {package.joinpath(*name.split(".")) for name in but_for}
+    found: set[Path] = set()
+    todo = [source for name in names for source in _roots(package, name)]
+    while todo:
+        path = todo.pop()
+        if path not in found and left_out.isdisjoint((path.with_suffix(""), *path.parents)):
+            found.add(path)
+            todo.extend(_imported(package, path))
+    return found
+
+
+def _roots(package: Path, name: str) -> list[Path]:
+    folder = package.joinpath(*name.split("."))
+    found = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
+    if not found or not all(path.is_file() for path in found):
+        raise ModuleNotFoundError(f"{package.name}.{name} has no sources; what is kept on disk cannot be named")
+    return found
+
+
+def _imported(package: Path, path: Path) -> Iterator[Path]:
+    """Modules of the package that a source imports: `from a.b import c` may mean module a.b, or a.b.c."""
+    for origin, names, module in _IMPORT.findall(path.read_text("utf-8")):
+        top, _, inside = (origin or module).partition(".")
+        if top != package.name:
+            continue
+        folder = package.joinpath(*inside.split(".")) if inside else package
+        within = (folder / name for name in re.findall(r"\w+", names))
+        for candidate in (folder, *within):
+            yield from (p for p in (candidate.with_suffix(".py"), candidate / "__init__.py") if p.is_file())

@@ -1,0 +1,120 @@
+"""Environments that were imported; `relume.asset_store` keeps them.
+
+    <folder>/<id>/radiance.npy        as `relume.environments.reading` reads the file, at most 2048 texels wide
+                  thumbnail.png
+                  environment.json    name, and what had to be changed
+
+Look documents name one as "env:<id>".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.asset_store import AssetStore
+from relume.environments.model import Environment
+from relume.environments.reading import read_environment
+from relume.environments.thumbnail import write_thumbnail
+from relume.errors import SceneError
+from relume.imageio import shrink
+from relume.remarks import Remark, remark_of, simplified
+
+STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
+MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
+_RADIANCE, _THUMBNAIL = "radiance.npy", "thumbnail.png"
+
+
+@dataclass(frozen=True)
+class EnvironmentRecord:
+    """What lists show of an imported environment.
+
+    Attributes:
+        created: seconds since 1970. warnings: what was changed when it was read, one sentence each.
+    """
+
+    id: str
+    name: str
+    created: float
+    warnings: tuple[Remark, ...]
+
+    @property
+    def map(self) -> str:
+        """The name by which look documents mean this environment."""
+        return STORE.prefix + self.id
+
+
+def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
+    """Import an equirectangular .hdr or .exr file; the same content twice is the same, its newest name wins.
+
+    Args:
+        folder: of the asset store.
+        source: the file to import.
+        name: what people call it.
+    Raises:
+        SceneError: the file cannot be used, or the store is full.
+    """
+    environment = _reduced(read_environment(source, name))
+
+    def fill(made: Path) -> dict[str, Any]:
+        np.save(made / _RADIANCE, environment.radiance)
+        write_thumbnail(made / _THUMBNAIL, environment.radiance)
+        return {"warnings": [remark.document() for remark in environment.warnings]}
+
+    return get_record(folder, STORE.keep(folder, source, name, fill))
+
+
+def records(folder: Path) -> list[EnvironmentRecord]:
+    """All environments of a folder, newest first."""
+    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
+    return sorted(found, key=lambda record: (-record.created, record.name))
+
+
+def get_record(folder: Path, identity: str) -> EnvironmentRecord:
+    """One environment. Raises NotFoundError; SceneError where its files are damaged."""
+    path = STORE.path(folder, identity)
+    document = STORE.read(path)
+    warnings = document.get("warnings")
+    if not isinstance(warnings, list):
+        raise STORE.damaged(path)
+    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(remark_of, warnings)))
+
+
+def thumbnail_path(folder: Path, identity: str) -> Path:
+    """A small picture of one. Raises NotFoundError."""
+    return STORE.path(folder, identity) / _THUMBNAIL
+
+
+def imported(name: str) -> Environment:
+    """What a look's `map` names; its texels stay on the disk and are read where they are needed.
+
+    Raises:
+        NotFoundError: it is not here. SceneError: its files are damaged.
+    """
+    return _load(STORE.found(name))
+
+
+@lru_cache(maxsize=32)
+def _load(path: Path) -> Environment:
+    try:
+        radiance = np.load(path / _RADIANCE, mmap_mode="r", allow_pickle=False).view(np.ndarray)
+    except (OSError, ValueError, EOFError) as error:
+        raise STORE.damaged(path) from error
+    height = len(radiance) if radiance.ndim else 0
+    if height == 0 or radiance.shape != (height, 2 * height, 3) or radiance.dtype != np.float32:
+        raise STORE.damaged(path)
+    return Environment(STORE.read(path)["name"], radiance)
+
+
+def _reduced(environment: Environment) -> Environment:
+    """The environment halved until it is narrow enough to be weighed in seconds."""
+    height, width, _ = environment.radiance.shape
+    if width <= MAX_WIDTH:
+        return environment
+    size = MAX_WIDTH, MAX_WIDTH // 2
+    said = simplified(f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}")
+    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, said))

@@ -1,0 +1,136 @@
+"""Measured materials that were imported; `relume.asset_store` keeps them.
+
+    <folder>/<id>/measured.binary    the file as it came
+                  table.npy          the same as `relume.measured.lookup` reads it
+                  material.json      name, curves and how well they do without the quotient
+
+Look documents name one as "merl:<id>".
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.asset_store import AssetStore
+from relume.errors import MaterialError
+from relume.measured.factors import factorise
+from relume.measured.lookup import F32, NUM_KNOTS, table_of
+from relume.measured.merl import F64, SHAPE, read_merl
+
+STORE = AssetStore("measured material", "merl:", "material.json", MaterialError, max_entries=500)
+_SOURCE, _TABLE = "measured.binary", "table.npy"
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MaterialRecord:
+    """What lists show of a measured material.
+
+    Attributes:
+        created: seconds since 1970.
+        lobes_error, homomorphic_error: of the curves alone, see `relume.measured.factors.Factors`.
+    """
+
+    id: str
+    name: str
+    created: float
+    lobes_error: Rgb
+    homomorphic_error: Rgb
+
+    @property
+    def data(self) -> str:
+        """The name by which look documents mean this material."""
+        return STORE.prefix + self.id
+
+    def terms(self) -> list[dict[str, Any]]:
+        """The unedited material as terms of a look, without textures: what was measured is the whole colour."""
+        return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the quotients and curves of a material read. lobes, homomorphic: as in `Factors`. (4, 3, 90) each"""
+
+    table: F32
+    lobes: F64
+    homomorphic: F64
+
+
+def keep(folder: Path, source: Path, name: str) -> MaterialRecord:
+    """Import a MERL file; the same content twice is the same material, its newest name wins.
+
+    Args:
+        folder: of the asset store.
+        source: the file to import.
+        name: what people call it.
+    Raises:
+        MaterialError: the file cannot be used, or the store is full.
+    Cost: some seconds, 0.5 GB of memory.
+    """
+    planes = read_merl(source)
+
+    def fill(made: Path) -> dict[str, Any]:
+        table = table_of(planes)
+        shutil.copyfile(source, made / _SOURCE)
+        np.save(made / _TABLE, table)
+        return {key: np.asarray(value).tolist() for key, value in asdict(factorise(planes, table)).items()}
+
+    return get_record(folder, STORE.keep(folder, source, name, fill))
+
+
+def records(folder: Path) -> list[MaterialRecord]:
+    """All materials of a folder, newest first."""
+    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
+    return sorted(found, key=lambda record: (-record.created, record.name))
+
+
+def get_record(folder: Path, identity: str) -> MaterialRecord:
+    """One material. Raises NotFoundError; MaterialError where its files are damaged."""
+    path = STORE.path(folder, identity)
+    document = STORE.read(path)
+    try:
+        errors = [_rgb(document[key]) for key in ("lobes_error", "homomorphic_error")]
+    except (KeyError, TypeError, ValueError) as error:
+        raise STORE.damaged(path) from error
+    return MaterialRecord(identity, document["name"], document["created"], *errors)
+
+
+def source_of(data: str) -> Path:
+    """The file that a material was imported from. Raises NotFoundError."""
+    return STORE.found(data) / _SOURCE
+
+
+def material(data: str) -> Measured:
+    """What a look's `data` names; its table stays on the disk and is read where it is needed.
+
+    Raises:
+        NotFoundError: it is not here. MaterialError: its files are damaged.
+    """
+    return _load(STORE.found(data))
+
+
+@lru_cache(maxsize=32)
+def _load(path: Path) -> Measured:
+    document = STORE.read(path)
+    try:
+        table = np.load(path / _TABLE, mmap_mode="r", allow_pickle=False).view(np.ndarray)
+        curves = [np.array(document[part], np.float64) for part in ("lobes", "homomorphic")]
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise STORE.damaged(path) from error
+    if table.shape != (*SHAPE, 3) or table.dtype != np.float32:
+        raise STORE.damaged(path)
+    for curve in curves:
+        if curve.shape != (4, 3, NUM_KNOTS) or not (np.isfinite(curve) & (curve > 0)).all():
+            raise STORE.damaged(path)
+    return Measured(table, *curves)
+
+
+def _rgb(values: Any) -> Rgb:
+    red, green, blue = (float(value) for value in values)
+    return red, green, blue

@@ -1,0 +1,128 @@
+"""Reflected light on gather cells: direct light, then bounce after bounce along links; never a matrix, never inverted.
+
+    L_0 = ρ/π E,   L_{b+1}(g) = ρ(g) · mean over the gather rays r of g of L_b(link(g, r)),   L = Σ_b L_b
+
+with ρ the diffuse reflectance of a cell and E its irradiance from the environment. Rays of density cos θ / π make the
+mean an estimate of ∫ L cos θ dω / π; a ray that leaves the scene finds nothing, since what it would find is in E.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.triangles import TriangleLights
+from relume.parallel import for_ranges, for_shares
+from relume.trace.cell_tree import NO_CELL
+
+F32 = NDArray[np.float32]
+
+_POINTS_A_RANGE = 2048
+_PREVIEW_BOUNCES = 6  # a thousandth of the light in a Cornell box is wrong then
+_LARGEST_SHARE = 0.999
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _irradiance(normal, visible, directions, across, start, stop, out):  # type: ignore[no-untyped-def]
+    for p in range(start, stop):
+        red = green = blue = 0.0
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+        for m in range(directions.shape[0]):
+            if (visible[p, m >> 3] >> (m & 7)) & 1:
+                cosine = max(nx * directions[m, 0] + ny * directions[m, 1] + nz * directions[m, 2], np.float32(0))
+                red += cosine * across[m, 0]
+                green += cosine * across[m, 1]
+                blue += cosine * across[m, 2]
+        out[p, 0], out[p, 1], out[p, 2] = red, green, blue
+
+
+def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) -> F32:
+    """Sum the irradiance of points, with the cosine of each light's mean direction.
+
+    Args:
+        normal: of the points, unit. (n, 3) float32
+        visible: light m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
+        lights: the environment's triangles.
+    Returns:
+        E per channel. (n, 3) float32
+    """
+    out = np.empty((len(normal), 3), np.float32)
+    args = (normal, visible, lights.direction, lights.irradiance)
+    for_ranges(lambda start, stop: _irradiance(*args, start, stop, out), len(normal), _POINTS_A_RANGE)
+    return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True)
+def _bounce(links, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
+    """Reflect once. radiance: four channels, so that a cell's are added at once; black in row `NO_CELL`."""
+    share = np.float32(1 / links.shape[1])
+    total = np.empty(4, np.float32)
+    for cell in range(start, stop):
+        total[:] = 0
+        for ray in range(links.shape[1]):
+            seen = radiance[links[cell, ray]]
+            for channel in range(4):
+                total[channel] += seen[channel]
+        for channel in range(3):
+            out[cell, channel] = reflectance[cell, channel] * total[channel] * share
+
+
+def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
+    """Reflect the light of cells once more: L_{b+1} of L_b.
+
+    Args:
+        links: cell that each ray of a cell hits. (C, rays) uint16
+        reflectance: diffuse, in [0, 1]. (C, 3) float32. radiance: L_b. (C, 3) float32
+    Returns:
+        L_{b+1}. (C, 3) float32
+    Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.
+    """
+    out = np.empty_like(radiance)
+    padded = np.zeros((NO_CELL + 1, 4), np.float32)
+    padded[: len(radiance), :3] = radiance
+    for_shares(lambda start, stop: _bounce(links, reflectance, padded, start, stop, out), len(links))
+    return out
+
+
+def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
+    """Sum the radiance that cells send out after at most `num_bounces` reflections between them, L_0 included.
+
+    Args:
+        links, reflectance: as in `bounce`. direct: L_0. (C, 3) float32
+        num_bounces: at least 0.
+    Returns:
+        Σ_b L_b. (C, 3) float32
+    """
+    total = direct.astype(np.float64)
+    radiance = direct
+    for _ in range(num_bounces):
+        radiance = bounce(links, reflectance, radiance)
+        total += radiance
+    return total.astype(np.float32)
+
+
+def preview_bounced(
+    links: NDArray[np.uint16], few_links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int
+) -> F32:
+    """Estimate `bounced` for a moving hand: after a few bounces, as if each left the same share of the one before.
+
+    The bounces are a power iteration: their shape settles soon, and then only their size changes.
+
+    Args:
+        links: of all rays, for the first bounce. (C, rays) uint16
+        few_links: of some of them, for all other bounces, whose light is even already. What noise they leave is each
+            cell's own, and gather rays see many cells. (C, fewer rays) uint16
+        reflectance, direct, num_bounces: as in `bounced`.
+    Returns:
+        Σ_b L_b, roughly. (C, 3) float32
+    """
+    first = min(num_bounces, _PREVIEW_BOUNCES)
+    total, radiance, before = direct.astype(np.float64), direct, direct
+    for k in range(first):
+        radiance, before = bounce(links if k == 0 else few_links, reflectance, radiance), radiance
+        total += radiance
+    size, size_before = (np.sqrt(np.square(a, dtype=np.float64).sum(axis=0)) for a in (radiance, before))
+    share = np.minimum(size / np.maximum(size_before, 1e-30), _LARGEST_SHARE)
+    total += radiance * (share * (1 - share ** (num_bounces - first)) / (1 - share))
+    return total.astype(np.float32)

@@ -1,0 +1,82 @@
+"""What a bake needs at most, from the scene and the recipe alone: samples of a view, and memory of a process.
+
+Nothing is traced to plan a bake, so the number of samples is bounded by what a pixel can hold; foliage and hair come
+near it, most scenes have one to two. Bytes were measured, and are rounded up so that every scene stays below them:
+`relume bench plan` prints the share of the bounds that scenes take.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from relume.bake import Recipe
+from relume.scene.model import Mesh, Scene, Texture
+from relume.trace.view_samples import POSITIONS_A_PIXEL
+
+PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
+
+_TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
+LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
+BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
+_PYRAMID, _HALVING = 4 / 3, 2  # of a texture's bytes: all its levels; while the next is made, of the largest
+_LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power, place in the tree
+
+
+def samples_of_view(recipe: Recipe) -> int:
+    """View samples of one view: every position of every pixel sees something else."""
+    width, height = recipe.size
+    return POSITIONS_A_PIXEL * width * height
+
+
+def camera_rays(recipe: Recipe) -> int:
+    """Rays that find the samples of all views: one through each pixel, then all positions of each."""
+    width, height = recipe.size
+    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views)
+
+
+def lights_bytes(scene: Scene, recipe: Recipe) -> int:
+    """Of the store: the light triangles, and the environment to weigh them by."""
+    return recipe.num_lights * _LIGHT_BYTES + scene.environment.radiance.nbytes
+
+
+def triangles_bytes(scene: Scene) -> int:
+    """Of the store: the triangles, their corners and the material of each."""
+    return sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
+
+
+def num_triangles(scene: Scene) -> int:
+    """Of all meshes together."""
+    return sum(len(mesh.faces) for mesh in scene.meshes)
+
+
+def process_bytes(scene: Scene) -> int:
+    """What a process holds between tasks: the program, the scene, its merged triangles, their tree, mip pyramids."""
+    textures = [texture.pixels.nbytes for texture in _textures(scene)]
+    meshes = [array.nbytes for mesh in scene.meshes for array in _arrays(mesh)]
+    largest = max([scene.environment.radiance.nbytes, *textures, *meshes])  # read from disk, it is there twice
+    return (
+        PROGRAM_BYTES
+        + scene.environment.radiance.nbytes
+        + 2 * sum(meshes)
+        + num_triangles(scene) * _TREE_BYTES_A_TRIANGLE
+        + int(_PYRAMID * sum(textures))
+        + _HALVING * largest
+    )
+
+
+def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
+    """What a task of the first stage takes besides: the lights, or the samples of a view."""
+    height, width, _ = scene.environment.radiance.shape
+    num_rays = camera_rays(recipe) // len(recipe.views)
+    return max(int(height * width) * LIGHT_BYTES_A_TEXEL, num_rays * BYTES_A_RAY)
+
+
+def _textures(scene: Scene) -> list[Texture]:
+    found = [texture for material in scene.materials for texture in material.textures.values()]
+    return found + [material.normal_map for material in scene.materials if material.normal_map is not None]
+
+
+def _arrays(mesh: Mesh) -> list[NDArray[Any]]:
+    return [mesh.positions, mesh.normals, mesh.tangents, mesh.uvs, mesh.faces]

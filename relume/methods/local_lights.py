@@ -1,0 +1,164 @@
+"""Local lights over a baked store: their shadows are traced when a look asks for them, and remembered by who asks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
+from relume.look import LightGeometry
+from relume.memory import Memory
+from relume.methods.store_io import read_gather_samples
+from relume.picture.light import Light, Source
+from relume.points import Points
+from relume.project.receivers import LocalRays
+from relume.trace.cells import POINTS_A_CELL
+from relume.trace.embree import EmbreeScene
+from relume.trace.geometry import is_front, off_surface
+from relume.trace.local_shadows import arriving, trace_local
+from relume.trace.preview_light import PreviewLight, preview_light
+
+F32 = NDArray[np.float32]
+
+SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
+PREVIEW_SAMPLES = 4  # for each of both while a hand moves it
+
+
+@dataclass(frozen=True)
+class Shadows:
+    """Samples of a light that points see, as in `LocalRays.visible`."""
+
+    visible: NDArray[np.uint8]
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.visible.nbytes
+
+
+class LocalLights:
+    """The triangles of a store, and lights among them; shared by all pictures of the bake.
+
+    Args:
+        key: of the bake in `memory`.
+    """
+
+    def __init__(self, store: StoreReader, memory: Memory, key: str) -> None:
+        self._store, self._memory, self._key = store, memory, key
+
+    @cached_property
+    def _positions(self) -> F32:
+        return np.asarray(self._store.read("scene/positions"), np.float32)
+
+    @cached_property
+    def _faces(self) -> NDArray[np.uint32]:
+        return np.asarray(self._store.read("scene/faces"), np.uint32)
+
+    @cached_property
+    def _embree(self) -> EmbreeScene:
+        return EmbreeScene.build(self._positions, self._faces)
+
+    @cached_property
+    def _off_surface(self) -> float:
+        return off_surface(self._positions)
+
+    def all_rays(
+        self,
+        light: Light,
+        points: Points,
+        shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None,
+    ) -> list[LocalRays]:
+        """Find the local light that comes directly to points, as rays.
+
+        Args:
+            light: all that arrives at the picture. points: where it arrives.
+            shadows_of: where they are remembered; they are traced where there is no such place.
+        """
+        if not light.paths.direct:
+            return []
+        find = shadows_of or self.shadows
+        return [
+            LocalRays(
+                self._light(geometry),
+                pattern_of(geometry, SAMPLES),
+                np.array(gain, np.float32),
+                find(shadow_geometry(geometry), points).visible,
+            )
+            for geometry, gain in light.local
+        ]
+
+    def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
+        """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
+        pattern = pattern_of(geometry, PREVIEW_SAMPLES)
+        return preview_light(self._embree, self._off_surface, self._light(geometry), pattern, points)
+
+    def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
+        """Make rays of a previewed light, for terms that ask where light comes from. seen: `PreviewLight.visible`"""
+        light, pattern = self._light(source.geometry), pattern_of(source.geometry, PREVIEW_SAMPLES)
+        return LocalRays(light, pattern, np.array(source.gain, np.float32), seen)
+
+    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
+        """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
+        pattern = pattern_of(geometry, SAMPLES)
+        seen = np.full((points.num_points, -(-len(pattern.uv) // 8)), 255, np.uint8)
+        return arriving(self._light(geometry), pattern, points, seen)
+
+    def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
+        """What points see of a light."""
+        return Shadows(self._trace(geometry, points, SAMPLES))
+
+    @cached_property
+    def _gather_samples(self) -> Points:
+        return read_gather_samples(self._store)
+
+    @cached_property
+    def _few_gather_samples(self) -> Points:
+        """One of the points of each cell."""
+        return self._gather_samples.rows(slice(None, None, POINTS_A_CELL))
+
+    def irradiance(self, geometry: LightGeometry) -> F32:
+        """What comes to every gather cell from a light of unit emission, the mean over its points. (C,) float32"""
+        return self._memory.keep((self._key, "light on cells", geometry), lambda: self._irradiance(geometry))
+
+    def _irradiance(self, geometry: LightGeometry) -> F32:
+        points, pattern = self._gather_samples, pattern_of(geometry, SAMPLES_OF_CELLS)
+        seen = self._trace(geometry, points, SAMPLES_OF_CELLS)
+        of_points = arriving(self._light(geometry), pattern, points, seen).reshape(-1, POINTS_A_CELL)
+        return np.asarray(of_points.mean(axis=1, dtype=np.float64), np.float32)
+
+    def preview_irradiance(self, geometry: LightGeometry) -> F32:
+        """Preview what comes to every gather cell from a light of unit emission, at one of its points. (C,) float32"""
+        key = self._key, "preview light on cells", geometry
+        return self._memory.passing.keep(key, lambda: self.preview(geometry, self._few_gather_samples).arriving)
+
+    def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
+        """Whether points of a material that shines are seen from a side that does.
+
+        Args:
+            material: its index. eye: place that they are seen from. (3,) position: of the points. (n, 3) float32
+        """
+        if self._is_two_sided(material):
+            return np.ones(len(position), np.bool_)
+        return is_front(self._embree, self._positions, self._faces, eye, position)
+
+    def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
+        light, pattern = self._light(geometry), pattern_of(geometry, num_samples)
+        return trace_local(self._embree, self._off_surface, light, pattern, points)
+
+    def _light(self, geometry: LightGeometry) -> LocalLight:
+        return self._memory.keep((self._key, "local light", geometry), lambda: self._make(geometry))
+
+    def _make(self, geometry: LightGeometry) -> LocalLight:
+        if geometry.kind != "mesh":
+            return make_local(geometry)
+        material = list(self._store.attributes["materials"]).index(geometry.material)
+        faces = self._faces[self._store.read("scene/face_material") == material]
+        return make_local(geometry, Triangles(self._positions[faces], self._is_two_sided(material)))
+
+    def _is_two_sided(self, material: int) -> bool:
+        return bool(self._store.attributes["double_sided"][material])

@@ -1,0 +1,30 @@
+"""The list of transfer methods. To add one: write its module beside this one and add it here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from relume.errors import StoreError
+from relume.memory import Memory
+from relume.methods.base import TransferMethod
+from relume.methods.direct import DirectMethod
+from relume.methods.gather import GatherMethod
+from relume.picture.transfer import Transfer
+from relume.store import open_store
+
+METHODS: dict[str, TransferMethod] = {method.name: method for method in (DirectMethod(), GatherMethod())}
+
+
+def open_transfer(path: Path, memory: Memory) -> Transfer:
+    """Open a published store by the method that baked it.
+
+    Args:
+        memory: of all that is made from the bake and may be made again.
+    Raises:
+        StoreNotFoundError, SchemaVersionError, ChunkDamagedError, StoreError: see `relume.store.open_store`.
+    """
+    store = open_store(path)
+    method = METHODS.get(str(store.attributes.get("method")))
+    if method is None:
+        raise StoreError(f"no method of this version bakes like {path.name}; delete the bake, bake again")
+    return method.open(store, str(path.resolve()), memory)

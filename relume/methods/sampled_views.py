@@ -1,0 +1,205 @@
+"""Fixed views: their samples, and which light triangles each of those sees; methods share these two stages.
+
+The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
+triangles, and each view's samples), then "visibility" (rows of each view).
+
+    scene/positions, faces, face_material                    triangles, for shadows of lights that looks add
+    lights/environment                                       radiance, to weigh it again
+    lights/tiles                                             relume.light.tiles.Tiles
+    lights/nodes, direction, power                           relume.light.triangles.TriangleLights
+    views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
+    views/<k>/position, normal, tangent, diffuse, specular
+    views/<k>/visibility                                     samples on surfaces only
+    views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.errors import PlanError
+from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
+from relume.light.triangles import weigh
+from relume.look import default_look
+from relume.methods import bounds
+from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
+from relume.scene.model import Camera, Scene
+from relume.trace.coherent import Targets, targets_of, trace_coherent
+from relume.trace.geometry import Geometry, merge
+from relume.trace.view_samples import BACKGROUND, sample_view
+
+CHUNK_ROWS = 1024
+MAX_PIXELS = 4096 * 4096
+_SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
+_SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
+_METADATA_BYTES = 1 << 20
+
+
+class Sampled(NamedTuple):
+    """What every task of the second stage needs of the first.
+
+    Attributes:
+        store: it was read from. targets: of shadow rays. num_surface_samples: of each view.
+    """
+
+    store: StoreReader
+    targets: Targets
+    num_surface_samples: tuple[int, ...]
+
+
+class SampledViews:
+    """The two stages as a part of a method; a `relume.bake.BakeMethod` but for its name."""
+
+    stages: tuple[str, ...] = ("samples", "visibility")
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._geometry: tuple[str, Geometry] | None = None
+        self._sampled: Sampled | None = None
+
+    def __reduce__(self) -> tuple[type[SampledViews], tuple[()]]:
+        return type(self), ()  # travels to workers without what it keeps
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Upper bounds from the recipe alone."""
+        width, height = recipe.size
+        known = [camera.name for camera in scene.cameras]
+        if unknown := [view for view in recipe.views if view not in known]:
+            raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(known)}")
+        if not recipe.views or len(set(recipe.views)) != len(recipe.views):
+            raise PlanError("name each view once, and at least one")
+        if not (width >= 16 and height >= 16 and width * height <= MAX_PIXELS):
+            raise PlanError(f"{width}×{height} pixels were asked for; give at least 16×16, at most {MAX_PIXELS} in all")
+        if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
+            raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
+        samples = bounds.samples_of_view(recipe) * len(recipe.views)
+        bits = (recipe.num_lights + 7) // 8
+        in_store = samples * (bits + _SURFACE_BYTES) + bounds.lights_bytes(scene, recipe)
+        return Plan(
+            num_view_samples=samples,
+            num_rays=samples * recipe.num_lights + bounds.camera_rays(recipe),
+            store_bytes=in_store + bounds.triangles_bytes(scene) + _METADATA_BYTES,
+            peak_bytes=bounds.process_bytes(scene)
+            + max(bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)),
+        )
+
+    def prepare(self, scene: Scene) -> None:
+        """Build the triangles' search tree."""
+        self.geometry_of(scene)
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """What opening the store needs besides its arrays."""
+        cameras = {camera.name: camera for camera in scene.cameras}
+        return {
+            "method": recipe.method,
+            "scene": scene.id,
+            "size": list(recipe.size),
+            "num_lights": recipe.num_lights,
+            "relightable": recipe.relightable,
+            "look": default_look(scene.materials, scene.lights),
+            "materials": [material.name for material in scene.materials],
+            "double_sided": [material.double_sided for material in scene.materials],
+            "views": [_described(cameras[view]) for view in recipe.views],
+        }
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The lights and each view; then whole shards of each view's surface samples. See `BakeMethod`."""
+        if stage == 0:
+            return [Task(0, 0, "", 0, 0), *(Task(0, k + 1, view, 0, 0) for k, view in enumerate(recipe.views))]
+        ranges = [
+            (view, start, min(start + SHARD_ROWS, rows))
+            for k, view in enumerate(recipe.views)
+            for rows in [self.sampled_of(store).num_surface_samples[k]]
+            for start in range(0, rows, SHARD_ROWS)
+        ]
+        return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
+        if stage == 0:
+            return []
+        bits = (store.shape("lights/power")[0] + 7) // 8
+        num_surface_samples = self.sampled_of(store).num_surface_samples
+        return [
+            ArraySpec(
+                f"views/{k}/visibility",
+                (num_surface_samples[k], bits),
+                "uint8",
+                (CHUNK_ROWS, bits),
+                (SHARD_ROWS, bits),
+            )
+            for k in range(len(recipe.views))
+        ]
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
+        if task.stage == 1:
+            return self._visibility(scene, recipe.views.index(task.view), task, store)
+        if not task.view:
+            return Written({**self._lights(scene, recipe), **self._triangles(scene)}, 0, 0.0)
+        samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
+        points = samples.surface.points
+        arrays: dict[str, NDArray[Any]] = {
+            "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
+            "position": points.position, "normal": points.normal, "tangent": points.tangent,
+            "diffuse": samples.surface.diffuse, "specular": samples.surface.specular,
+        }  # fmt: skip
+        prefix = f"views/{recipe.views.index(task.view)}"
+        return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
+
+    @staticmethod
+    def _lights(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        radiance = scene.environment.radiance
+        tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
+        lights = weigh(tiles, radiance)
+        return {
+            "lights/nodes": lights.nodes,
+            "lights/direction": lights.direction,
+            "lights/power": lights.irradiance,
+            "lights/tiles": tiles.codes,
+            "lights/environment": radiance,
+        }
+
+    def _triangles(self, scene: Scene) -> dict[str, NDArray[Any]]:
+        geometry = self.geometry_of(scene)
+        return {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
+        prefix = f"views/{k}"
+        position = store.read(f"{prefix}/position", task.start, task.stop)
+        normal = store.read(f"{prefix}/normal", task.start, task.stop)
+        found = trace_coherent(self.geometry_of(scene).embree, position, normal, self.sampled_of(store).targets)
+        rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
+        arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
+        return Written(arrays, found.rays.traced, found.trace_s)
+
+    def geometry_of(self, scene: Scene) -> Geometry:
+        """The scene's triangles, built once for all tasks of a process."""
+        with self._lock:
+            if self._geometry is None or self._geometry[0] != scene.id:
+                self._geometry = scene.id, merge(scene)
+            return self._geometry[1]
+
+    def sampled_of(self, store: StoreReader) -> Sampled:
+        """What the first stage has written, read once for all tasks of a store."""
+        with self._lock:
+            if self._sampled is None or self._sampled.store is not store:
+                views = range(len(store.attributes["views"]))
+                rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
+                self._sampled = Sampled(store, _targets(store), rows)
+            return self._sampled
+
+
+def _described(camera: Camera) -> dict[str, Any]:
+    """A view among a store's attributes."""
+    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+
+
+def _targets(store: StoreReader) -> Targets:
+    return targets_of(read_traced_directions(store), read_lights(store).irradiance)

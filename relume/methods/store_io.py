@@ -1,0 +1,74 @@
+"""Lights, gather cells and ray counts as a store keeps them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.brdf.albedo import TEXTURES
+from relume.errors import StoreError
+from relume.light.tiles import Tiles
+from relume.light.triangles import TriangleLights
+from relume.methods.cell_light import CellLight
+from relume.points import Points
+from relume.trace.cell_tree import CellTree
+from relume.trace.cells import gather_samples_of
+from relume.trace.coherent import RayCounts
+
+F32 = NDArray[np.float32]
+
+SHARD_ROWS = 16_384
+
+
+def read_lights(store: StoreReader) -> TriangleLights:
+    """The light triangles of a store."""
+    return TriangleLights(*(store.read(f"lights/{name}") for name in ("nodes", "direction", "power")))
+
+
+def read_tiles(store: StoreReader) -> Tiles:
+    """The tiles that its light triangles stand for. Raises StoreError where they do not tile the sphere."""
+    tiles = Tiles(store.read("lights/tiles"))
+    if not tiles.is_whole():
+        raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
+    return tiles
+
+
+def read_traced_directions(store: StoreReader) -> F32:
+    """Where shadow rays went: light that may come to any part of a tile is asked for in its middle. (M, 3) float32"""
+    if store.attributes["relightable"]:
+        return read_tiles(store).centroids.astype(np.float32)
+    return read_lights(store).direction
+
+
+def read_tree(store: StoreReader) -> CellTree:
+    """The tree over a store's gather cells."""
+    return CellTree(*(store.read(f"cells/{name}") for name in CellTree._fields))
+
+
+def read_gather_samples(store: StoreReader, start: int = 0, stop: int | None = None) -> Points:
+    """The points that stand for gather cells [start, stop) of a store, those of a cell one after another."""
+    position, normal = (store.read(f"cells/{name}", start, stop) for name in ("position", "normal"))
+    return gather_samples_of(position, normal, start)
+
+
+def read_cells(store: StoreReader) -> CellLight:
+    """The gather cells of a store."""
+    normal, visible = store.read("cells/normal"), store.read("cells/visibility")
+    return CellLight(
+        normal,
+        visible.reshape(*normal.shape[:2], visible.shape[1] // normal.shape[1]),
+        store.read("cells/links"),
+        store.read("cells/material"),
+        np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
+    )
+
+
+def read_rays(store: StoreReader) -> RayCounts:
+    """Shadow rays of the whole bake: traced, saved, and how often a prediction was found wrong."""
+    counts = [
+        store.read(f"views/{k}/rays/{shard}")
+        for k in range(len(store.attributes["views"]))
+        for shard in range(-(-store.shape(f"views/{k}/visibility")[0] // SHARD_ROWS))
+    ]
+    return RayCounts(*(int(count) for count in np.sum(counts, axis=0))) if counts else RayCounts(0, 0, 0, 0)

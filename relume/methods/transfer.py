@@ -1,0 +1,320 @@
+"""Bakes of fixed views, opened for freezing and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume import environments
+from relume.bake import StoreReader
+from relume.code_version import image_code
+from relume.environments.equirect import lookup, shrunk, turned
+from relume.errors import ParameterError, StoreError
+from relume.light.blur import blurred, reduced
+from relume.light.local import num_samples
+from relume.light.tiles import Tiles
+from relume.light.triangles import TriangleLights, weigh
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
+from relume.memory import Memory
+from relume.methods.cell_light import CellLight
+from relume.methods.local_lights import SAMPLES, LocalLights, Shadows
+from relume.methods.reflected import Reflected
+from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
+from relume.methods.thinned import ThinnedStore
+from relume.operators.image_files import ImageFiles
+from relume.picture.light import Light
+from relume.picture.transfer import Arriving, Axis, Eyes
+from relume.points import Points
+from relume.project.receivers import GatherRays, Rays, Receivers
+from relume.trace.cell_tree import NO_CELL
+from relume.views.view import View, open_view
+
+_PREVIEW_WIDTH = 512
+_EDITED_BYTES = 256 << 20
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class BakedViews:
+    """One bake of fixed views in which light comes straight; a `relume.picture.transfer.Transfer`.
+
+    Attributes:
+        memory: of all that is made from the bake and may be made again.
+        key: path of the store; tells this bake's entries from other bakes' in the memory.
+        default_look: the complete look of the scene as it was imported.
+    """
+
+    memory: Memory
+    key: str
+    store: StoreReader
+    scene_id: str
+    method: str
+    num_lights: int
+    default_look: dict[str, Any]
+    material_names: Sequence[str]
+    views: dict[str, View]
+
+    eyes = Eyes.BAKED
+    axes = frozenset((Axis.CURVE, Axis.PARAMETER, Axis.LIGHT, Axis.ENVIRONMENT))
+
+    @cached_property
+    def derived(self) -> ImageFiles:
+        """Images of the default look, made once."""
+        return ImageFiles(Path(self.key) / "derived", image_code())
+
+    @cached_property
+    def edited(self) -> ImageFiles:
+        """Those of other looks, the newest of them, for when the same look is opened after a restart."""
+        return ImageFiles(Path(self.key) / "edited", image_code(), _EDITED_BYTES)
+
+    def has_image(self, key: Hashable) -> bool:
+        """Whether the image of a term is beside the store, under the name of a job without the store's own."""
+        return self.derived.has(key) or self.edited.has(key)
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """What local lights need."""
+        return LocalLights(self.store, self.memory, self.key)
+
+    @cached_property
+    def lights(self) -> TriangleLights:
+        """The environment's triangles."""
+        return read_lights(self.store)
+
+    def radiance_of(self, name: str | None) -> NDArray[np.float32]:
+        """Radiance of an environment, None for the scene's own. (height, width, 3) float32
+
+        Raises:
+            NotFoundError: it is not here. SceneError: its files are damaged.
+        """
+        return environments.find(name).radiance if name is not None else self._own_radiance()
+
+    def _own_radiance(self) -> F32:
+        def read() -> F32:
+            return np.asarray(self.store.read("lights/environment"), np.float32)
+
+        return self.memory.keep((self.key, "environment"), read)
+
+    def lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+        """The triangles of an environment: the tiles of the bake, weighed again."""
+        return self.lights if environment == BAKED_ENVIRONMENT else self._weighed(environment)
+
+    def lights_of(self, light: Light) -> TriangleLights:
+        """Those of them by which light comes straight to the picture."""
+        return _shown(self.lights_in(light.environment), light)
+
+    def preview_lights_of(self, light: Light) -> TriangleLights:
+        """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
+        return _shown(self._weighed_for_preview(light.environment), light)
+
+    def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
+        def weighed() -> TriangleLights:
+            return weigh(self._tiles, self.radiance_of(environment.map), environment.rotation)
+
+        return self.memory.keep((self.key, "lights", environment), weighed)
+
+    def _weighed_for_preview(self, environment: EnvironmentKey) -> TriangleLights:
+        def weighed() -> TriangleLights:
+            radiance = self.radiance_of(environment.map)
+            if radiance.shape[1] > _PREVIEW_WIDTH:
+                key = self._owner_of(environment.map), "small environment", environment.map
+                radiance = self.memory.keep(key, lambda: shrunk(radiance, _PREVIEW_WIDTH))
+            return weigh(self._tiles, radiance, environment.rotation)
+
+        return self.memory.passing.keep((self.key, "preview lights", environment), weighed)
+
+    def _owner_of(self, name: str | None) -> str:
+        """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
+        return self.key if name is None else "environments"
+
+    @cached_property
+    def _tiles(self) -> Tiles:
+        return read_tiles(self.store)
+
+    @property
+    def reflected(self) -> Reflected | None:
+        """Light between surfaces: none was baked."""
+        return None
+
+    def reflected_in(self, light: Light) -> F32 | None:
+        """Radiance of the gather cells; None where they send nothing to the picture."""
+        return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
+
+    def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
+        """What arrives at a material's samples in a light; shadows that the memory lacks are traced. See `Transfer`."""
+        lights = self.lights_of(light)
+        receivers = view.receivers(material, is_lit=lights.num_lights > 0)
+        return lights, replace(receivers, rays=self._rays(view, material, light, memory))
+
+    def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
+        """The rays among what arrives: those of local lights."""
+        if not light.local:
+            return ()
+
+        def remembered(geometry: LightGeometry, points: Points) -> Shadows:
+            key = (self.key, view.name, material, "shadows", geometry)
+            num_bytes = len(points.position) * -(-num_samples(geometry, SAMPLES) // 8)
+            return memory.get(key, Shadows, num_bytes, lambda: self.local.shadows(geometry, points))
+
+        return self.local.all_rays(light, view.points(material), remembered)
+
+    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+        """Some of a material's samples. See `Transfer`."""
+        whole = view.receivers(material)
+        return FewSamples(self, replace(whole.places(chosen), visible=whole.visible[chosen]))
+
+    def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:
+        """What the environment brings to points, seen along their normals, if nothing hides it. See `Transfer`."""
+        straight = light._replace(paths=light.paths._replace(direct=True).without_reflections())
+        above = points.normal @ read_traced_directions(self.store).T > 0
+        seen = np.packbits(above, axis=1, bitorder="little")
+        lights = self.preview_lights_of(straight) if is_preview else self.lights_of(straight)
+        return lights, Receivers(points, points.normal, seen)
+
+    def thinned(self, view_name: str, step: int) -> Self:
+        """One view of the bake with 1 / step² of its pixels. Its images are not kept: no folder is beside its key."""
+        index = self.views[view_name].index
+        store, key = ThinnedStore(self.store, index, step), f"{self.key}/{step}"
+        return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.memory, key)})
+
+    def shines_at(self, view: View, material: int) -> NDArray[np.bool_]:
+        """Whether the samples of a material that shines are seen from a side that does."""
+        eye = view.camera.to_world[:3, 3].astype(np.float32)
+        return self.local.shines_at(material, eye, view.points(material).position)
+
+    def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
+        """Radiance of a view's samples of an environment. (n, 3) float32"""
+        if environment == BAKED_ENVIRONMENT:
+            return view.background()
+        return self.seen_in(environment, view.background_directions())
+
+    def seen_in(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
+        """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3) float32"""
+        name = environment.map
+        radiance = self._blurred(name, blur) if blur else self.radiance_of(name)
+        return lookup(radiance, turned(directions, -environment.rotation).astype(np.float32))
+
+    def _blurred(self, name: str | None, degrees: float) -> F32:
+        owner = self._owner_of(name)
+
+        def few() -> F32:
+            return reduced(self.radiance_of(name))
+
+        def made() -> F32:
+            return blurred(self.memory.keep((owner, "reduced environment", name), few), degrees)
+
+        return self.memory.passing.keep((owner, "blurred environment", name, degrees), made)
+
+
+@dataclass(frozen=True)
+class FewSamples:
+    """A few samples of a material, shaded at once in any light; a `relume.picture.transfer.Few`.
+
+    Attributes:
+        receivers: without any rays.
+        gathered: their gather rays, where those were baked; they bring nothing yet.
+    """
+
+    transfer: BakedViews
+    receivers: Receivers
+    gathered: GatherRays | None = None
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory they hold."""
+        few, links = self.receivers, 0 if self.gathered is None else self.gathered.links.nbytes
+        return int(2 * few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links)
+
+    def arriving(self, light: Light) -> Arriving:
+        """What arrives at them in a light; the environment from a small map, local lights exactly."""
+        transfer = self.transfer
+        radiance = transfer.reflected_in(light) if self.gathered is not None else None
+        gathered = () if self.gathered is None or radiance is None else (replace(self.gathered, radiance=radiance),)
+        local = transfer.local.all_rays(light, self.receivers.points)
+        return transfer.preview_lights_of(light), replace(self.receivers, rays=(*gathered, *local))
+
+
+@dataclass(frozen=True)
+class BouncedViews(BakedViews):
+    """A bake of fixed views in which light comes from other surfaces, too.
+
+    Attributes:
+        cells: gather cells, which send it.
+    """
+
+    cells: CellLight
+
+    axes = BakedViews.axes | {Axis.BOUNCES}
+
+    @cached_property
+    def reflected(self) -> Reflected:
+        """Light that gather cells send out."""
+        cells = self.cells
+
+        def of_environment(environment: EnvironmentKey) -> F32:
+            key = self.key, "environment on cells", environment
+            return self.memory.keep(key, lambda: cells.irradiance(self.lights_in(environment)))
+
+        def irradiance(light: Light, is_preview: bool) -> F32:
+            of_local = self.local.preview_irradiance if is_preview else self.local.irradiance
+            arriving = np.zeros((cells.num_cells, 3), np.float32)
+            if light.is_environment_lit:
+                arriving += np.array(light.environment_gain, np.float32) * of_environment(light.environment)
+            for geometry, gain in light.local:
+                arriving += np.array(gain, np.float32) * of_local(geometry)[:, None]
+            return arriving
+
+        return Reflected(cells, irradiance, self.memory, self.key)
+
+    def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
+        """The rays among what arrives: those of gather cells, and of local lights."""
+        local, radiance = super()._rays(view, material, light, memory), self.reflected_in(light)
+        return local if radiance is None else (view.gather_rays(material, radiance), *local)
+
+    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+        """Some of a material's samples. See `Transfer`."""
+        few, nothing = super().some(view, material, chosen), np.zeros((NO_CELL + 1, 3), np.float32)
+        return replace(few, gathered=view.gather_rays(material, nothing).alone(chosen))
+
+
+def _shown(lights: TriangleLights, light: Light) -> TriangleLights:
+    """The triangles of an environment by which light comes straight to the picture, beside local lights."""
+    if not (light.paths.direct and light.is_environment_lit):
+        return lights.none()
+    if light.environment_gain == (1.0, 1.0, 1.0):
+        return lights
+    return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))
+
+
+def described(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
+    """The fields of `BakedViews` as a store has them.
+
+    Args:
+        store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+    Raises:
+        StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
+    """
+    found = store.attributes
+    try:
+        return {
+            "memory": memory,
+            "key": key,
+            "store": store,
+            "scene_id": found["scene"],
+            "method": found["method"],
+            "num_lights": found["num_lights"],
+            "default_look": complete({}, found["look"]),
+            "material_names": tuple(found["materials"]),
+            "views": {view["name"]: open_view(store, k, memory, key) for k, view in enumerate(found["views"])},
+        }
+    except (KeyError, TypeError, IndexError, ParameterError) as error:
+        raise StoreError(
+            f"the store's description is not of this form ({error}); delete the bake, bake again"
+        ) from error

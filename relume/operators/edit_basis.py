@@ -1,0 +1,103 @@
+"""What an operator leaves free: one curve in its wavelet basis, or whatever moves several of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.daubechies import analysis
+from relume.brdf.term import Curve, Term
+from relume.light.triangles import TriangleLights
+from relume.operators.frozen import Frozen, freeze
+from relume.project.receivers import Receivers
+
+F64 = NDArray[np.float64]
+
+
+class EditBasis(Protocol):
+    """A direction in which a term is free; hashable, and equal where its operators are interchangeable."""
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        ...
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Names of the curves that are free, all others being dormant."""
+        ...
+
+    @property
+    def num_columns(self) -> int:
+        """Coefficients a channel."""
+        ...
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every curve can be said in it; else what it shows is near the look, not the look."""
+        ...
+
+    def holds_for(self, document: Mapping[str, Any]) -> bool:
+        """Whether the curves of a term document of the same kind lie along it."""
+        ...
+
+    def coefficients(self, bands: Mapping[str, F64]) -> F64:
+        """c of a term's curves, (3, J) each. (3, num_columns)"""
+        ...
+
+    def freeze(
+        self,
+        term: Term,
+        bands: Mapping[str, F64],
+        lights: TriangleLights,
+        receivers: Receivers,
+        progress: Callable[[float], None],
+        cancelled: Callable[[], bool],
+    ) -> Frozen:
+        """The operator. See `relume.operators.frozen.freeze`."""
+        ...
+
+
+@dataclass(frozen=True)
+class CurveBasis:
+    """One curve, free to take any shape."""
+
+    name: str
+    label: str
+    num_columns: int
+
+    is_complete = True
+
+    @classmethod
+    def of(cls, curve: Curve) -> CurveBasis:
+        """Along a declared curve."""
+        return cls(curve.name, curve.label, curve.num_bands)
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """The curve alone."""
+        return (self.name,)
+
+    def holds_for(self, document: Mapping[str, Any]) -> bool:
+        """Any shape is among its own."""
+        return True
+
+    def coefficients(self, bands: Mapping[str, F64]) -> F64:
+        """Of the wavelets."""
+        return analysis(bands[self.name])
+
+    def freeze(
+        self,
+        term: Term,
+        bands: Mapping[str, F64],
+        lights: TriangleLights,
+        receivers: Receivers,
+        progress: Callable[[float], None],
+        cancelled: Callable[[], bool],
+    ) -> Frozen:
+        """See `relume.operators.frozen.freeze`."""
+        return freeze(term, bands, self.name, lights, receivers, progress, cancelled)

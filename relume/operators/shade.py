@@ -1,0 +1,84 @@
+"""The image of a term with all its curves contracted: what a picture shows before anybody touches a curve.
+
+    Σ_j c_j T_j = Σ_m V L_m Ω_m cos θi · q · Π_f mean_m(f)
+
+The same sums as freezing makes, in another order, so that a picture does not change when a curve is frozen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.light.triangles import TriangleLights
+from relume.operators.frozen import tiles_of
+from relume.parallel import for_steps
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+from relume.project.receivers import Receivers
+
+F32 = NDArray[np.float32]
+
+_SAMPLES_A_STEP = 512
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """An image of one term, before colour, texture and outgoing curves. (tiles, 3, samples) float32"""
+
+    image: F32
+
+    @classmethod
+    def of(cls, rows: F32) -> Shaded:
+        """From one row for each sample, padded with zeros to whole tiles. rows: (n, 3)"""
+        tiles, samples = tiles_of(len(rows))
+        padded = np.zeros((tiles * samples, 3), np.float32)
+        padded[: len(rows)] = rows
+        return cls(np.ascontiguousarray(padded.reshape(tiles, samples, 3).transpose(0, 2, 1)))
+
+    def rows(self, num_samples: int) -> F32:
+        """One row for each sample. (num_samples, 3)"""
+        return self.image.transpose(0, 2, 1).reshape(-1, 3)[:num_samples]
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.image.nbytes
+
+
+def shaded_bytes(num_samples: int) -> int:
+    """Memory that shading needs to keep."""
+    tiles, samples = tiles_of(num_samples)
+    return tiles * samples * 3 * 4
+
+
+def shade(
+    term: Term,
+    bands: Mapping[str, NDArray[np.float64]],
+    lights: TriangleLights,
+    receivers: Receivers,
+    progress: Callable[[float], None],
+    cancelled: Callable[[], bool],
+) -> Shaded:
+    """Contract all curves of a term.
+
+    Args:
+        bands: of each curve that depends on wi. (3, J) each
+        lights, receivers: what arrives, and where.
+        progress: called with the share done. cancelled: asked now and then.
+    Raises:
+        CancelledError: `cancelled` said so.
+    """
+    num_samples = len(receivers.normal)
+    rows = np.zeros((num_samples, 3), np.float32)
+    contraction = contract(term, bands, None)
+
+    def step(start: int, stop: int) -> None:
+        rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)[:, 0]
+
+    for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "shading")
+    return Shaded.of(rows)

@@ -1,0 +1,41 @@
+"""How truly an image shows what it shows, and how near a picture is to its look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+from typing import Literal, get_args
+
+
+class Fidelity(IntEnum):
+    """How truly an image shows the curves and the light that it is said to show, worst first.
+
+    NOTHING: nothing has been made. PREVIEW: interpolated between few samples. FOLLOWED: an exact image and what has
+    changed of light since, evaluated roughly. NEAR: a sum along the few nodes of a parameter. EXACT: the whole sum.
+    """
+
+    NOTHING = 0
+    PREVIEW = 1
+    FOLLOWED = 2
+    NEAR = 3
+    EXACT = 4
+
+
+Word = Literal["preview", "approximate", "followed", "near", "exact"]
+"""What a frame says of its picture, worst first; "approximate": it shows an older look, or not all coefficients yet."""
+
+_ORDER: tuple[Word, ...] = get_args(Word)
+
+
+def word_of(fidelity: Fidelity, *, is_wanted: bool) -> Word:
+    """The word for an image of some fidelity; `is_wanted`: what it shows is what the look asks for."""
+    if fidelity <= Fidelity.PREVIEW:
+        return "preview"
+    if not is_wanted:
+        return "approximate"
+    return {Fidelity.FOLLOWED: "followed", Fidelity.NEAR: "near"}.get(fidelity, "exact")  # type: ignore[return-value]
+
+
+def worst(found: Iterable[Word]) -> Word:
+    """What can be said of several images together; "exact" of none."""
+    return min(found, key=_ORDER.index, default="exact")

@@ -1,0 +1,269 @@
+"""What a picture needs made before it can go on: found by looking, made in any thread, installed by the picture's user.
+
+All that `make` reads was fixed when the job was found: the picture may be changed while it runs, and `install` looks
+whether what was made is still wanted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.look.model import Rgb
+from relume.operators.edit_basis import EditBasis
+from relume.operators.frozen import Frozen, frozen_bytes
+from relume.operators.shade import Shaded, shade, shaded_bytes
+from relume.picture.fidelity import Fidelity
+from relume.picture.light import Light, parts_of
+from relume.picture.live_term import LiveTerm
+from relume.picture.material_image import MaterialImage
+from relume.picture.shown import Shown
+from relume.picture.view_images import ViewImages
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Progress = Callable[[float], None]
+Cancelled = Callable[[], bool]
+
+
+class Job(Protocol):
+    """Something to be made.
+
+    Attributes:
+        what: in words. state: what making it is called. key: equal keys are the same job.
+        refines: the picture is near its look without it, so that it can wait until the hand rests.
+    """
+
+    @property
+    def what(self) -> str: ...
+    @property
+    def state(self) -> Literal["freezing", "shading"]: ...
+    @property
+    def key(self) -> tuple[Hashable, ...]: ...
+    @property
+    def refines(self) -> bool: ...
+    def make(self, progress: Progress, cancelled: Cancelled) -> Any:
+        """Make it, unless the memory has it. Raises CancelledError where `cancelled`, asked now and then, said so."""
+        ...
+
+    def install(self, made: Any) -> None:
+        """Go on with what `make` returned, unless the look has moved on to where it is of no use."""
+        ...
+
+
+class Part(NamedTuple):
+    """Of a light. key: of the image in it alone. gain: how much of it there is, of each channel."""
+
+    key: tuple[Hashable, ...]
+    light: Light
+    gain: Rgb
+
+
+class Place(NamedTuple):
+    """A term of a picture: where it is, and the one that was there when a job was found."""
+
+    images: ViewImages
+    material: MaterialImage
+    live: LiveTerm
+
+    @property
+    def name(self) -> str:
+        """The material's."""
+        return self.images.transfer.material_names[self.material.index]
+
+    def is_there(self) -> bool:
+        """Whether the look still has this term."""
+        return any(self.live is known for known in self.material.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class Freeze:
+    """The operator of a term along what an edit moves, everything else dormant (eq. 22, Ben-Artzi 2006).
+
+    Attributes:
+        bands: of the term's curves, (3, J) each. light: what arrives.
+    """
+
+    place: Place
+    basis: EditBasis
+    key: tuple[Hashable, ...]
+    term: Term
+    bands: Mapping[str, F64]
+    light: Light
+    refines: bool
+    state: Literal["freezing", "shading"] = "freezing"
+
+    @classmethod
+    def of(cls, place: Place, basis: EditBasis) -> Freeze:
+        """The operator for what is wanted of a term now."""
+        images, material, live = place
+        key, is_seen = images.key_of_operator(material, live, basis, live.target), live.is_seen()
+        return cls(place, basis, key, live.term, live.target, live.light, is_seen)
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        return f"{self.place.name}, {self.basis.label}"
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory to keep it."""
+        return frozen_bytes(self.place.material.num_samples, self.basis.num_columns)
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> Frozen:
+        """See `Job`."""
+        images, material, _ = self.place
+
+        def frozen() -> Frozen:
+            arriving = images.arriving(material, self.light)
+            return self.basis.freeze(self.term, self.bands, *arriving, progress, cancelled)
+
+        return images.cache.get(self.key, Frozen, self.num_bytes, frozen)
+
+    def install(self, made: Frozen) -> None:
+        """See `Job`; the dormant curves of the operator must be those that are wanted now.
+
+        Where the image shows other curves, or the operator can say them better, it is summed anew.
+        """
+        images, material, live = self.place
+        if not self.place.is_there() or self.key != images.key_of_operator(material, live, self.basis, live.target):
+            return
+        ready, differing = live.ready, set(live.differing())
+        is_known = live.is_firm and ready.basis == self.basis  # its coefficients hold, also where only some were moved
+        says_better = ready.fidelity == Fidelity.NEAR and self.basis.is_complete
+        if not differing <= set(self.basis.moves) or (differing and not is_known) or says_better:
+            live.put(ready.summed(made, self.basis, live.target, live.light))
+        elif not is_known:
+            live.put(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(live.target)))
+
+
+@dataclass(frozen=True, eq=False)
+class Shade:
+    """The image of a term's target in some light, from nothing: what every route to EXACT must agree with.
+
+    Attributes:
+        model: of the term. bands: of its curves, (3, J) each. parts: that the light is the sum of.
+        is_default: the look is the scene's own, whose images stay beside the store.
+    """
+
+    place: Place
+    key: tuple[Hashable, ...]
+    term: Term
+    model: Hashable
+    bands: Mapping[str, F64]
+    light: Light
+    parts: Sequence[Part]
+    is_default: bool
+    refines: bool
+    state: Literal["freezing", "shading"] = "shading"
+
+    @classmethod
+    def of(cls, place: Place, light: Light, *, refines: bool | None = None) -> Shade:
+        """Of the term at a place, in some light. refines: whether it can wait; by itself where the term can be seen
+        without it."""
+        images, material, live = place
+        key, waits = images.key_of_image(material, live, light), live.is_seen() if refines is None else refines
+        parts = [Part(images.key_of_image(material, live, part), part, gain) for part, gain in parts_of(light).items()]
+        is_default = images.is_default(material, live, light)
+        return cls(place, key, live.term, live.model, live.target, light, parts, is_default, waits)
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        return f"{self.place.name}, {self.term.label}"
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory to keep it."""
+        return shaded_bytes(self.place.material.num_samples)
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> Shaded:
+        """See `Job`; kept beside the store as well."""
+        images = self.place.images
+        kept = images.transfer.derived if self.is_default else images.transfer.edited
+        shape = self.place.live.ready.image.shape
+
+        def shaded() -> Shaded:
+            return kept.get(self.key[1:], shape, lambda: self._summed(progress, cancelled))
+
+        return images.cache.get(self.key, Shaded, self.num_bytes, shaded)
+
+    def _summed(self, progress: Progress, cancelled: Cancelled) -> Shaded:
+        """Shade the parts of the light that no other image has had, and sum all."""
+        images, material, live = self.place
+
+        def shaded(light: Light, done: int) -> Shaded:
+            def tell(share: float) -> None:
+                progress((done + share) / max(1, len(self.parts)))
+
+            return shade(self.term, self.bands, *images.arriving(material, light), tell, cancelled)
+
+        if len(self.parts) < 2:
+            return shaded(self.light, 0)
+        found: list[tuple[F32, Rgb]] = []
+        for done, (key, light, gain) in enumerate(self.parts):
+            part = images.cache.get(key, Shaded, self.num_bytes, partial(shaded, light, done))
+            found.append((part.image, gain))
+        return Shaded(weighted_sum(np.zeros_like(live.ready.image), found))
+
+    def install(self, made: Shaded) -> None:
+        """See `Job`; an image of older curves is shown where there is none: a hand may not rest for long."""
+        images, material, live = self.place
+        if not self.place.is_there() or (live.model, live.light) != (self.model, self.light):
+            return
+        is_current = self.key == images.key_of_image(material, live, self.light)
+        if not live.is_firm or (is_current and (not live.is_exact() or live.ready.rounding > 0)):
+            basis = live.ready.basis  # a hand that is on something goes on from here
+            coefficients = None if basis is None else basis.coefficients(self.bands)
+            live.put(Shown(made.image.copy(), Fidelity.EXACT, self.bands, self.light, basis, coefficients))
+
+
+@dataclass(frozen=True, eq=False)
+class Settle:
+    """An image that was summed from steps, summed once: at rest, exact is a fact.
+
+    Attributes:
+        ready: the state that the steps led to. sum_into: writes the same image, summed once, over zeros.
+    """
+
+    place: Place
+    key: tuple[Hashable, ...]
+    ready: Shown = field(repr=False)
+    sum_into: Callable[[F32], object] = field(repr=False)
+    refines: bool = True
+    state: Literal["freezing", "shading"] = "shading"
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        return f"{self.place.name}, {self.place.live.term.label}"
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> F32:
+        """See `Job`; takes as long as reading once what is summed."""
+        image = np.zeros_like(self.ready.image)
+        self.sum_into(image)
+        progress(1.0)
+        return image
+
+    def install(self, made: F32) -> None:
+        """See `Job`; of no use where another step has been added."""
+        live = self.place.live
+        if live.ready is self.ready:
+            live.put(replace(self.ready, image=made, rounding=0.0))
+
+
+def weighted_sum(start: F32, parts: Sequence[tuple[F32, Rgb]]) -> F32:
+    """Σ g R, added to an image in place: transport is linear in light.
+
+    Args:
+        start: (tiles, 3, samples) float32, written. parts: images of the same shape, and the gain of each channel.
+    """
+    for image, gain in parts:
+        start += np.array(gain, np.float32)[:, None] * image
+    return start

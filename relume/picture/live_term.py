@@ -1,0 +1,142 @@
+"""One term of one material in a picture: what is wanted of it, what it has ready, and what the picture shows of it.
+
+Exactness is tracked as in eqs. 29 to 31, Ben-Artzi 2006: an image belongs to coefficients, and a step adds
+T · (c_perfect − c_shown), the most important ones first where there is no time for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.operators.edit_basis import EditBasis
+from relume.operators.frozen import tiles_of
+from relume.picture.fidelity import Fidelity, Word, word_of
+from relume.picture.light import Light
+from relume.picture.shown import Shown
+from relume.picture.wanted import Wanted
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+class LiveTerm:
+    """State of one term.
+
+    Attributes:
+        document: of the term in the newest look. light: in which it is wanted.
+        term: the declaration of its model, fixed parameters put in. model: what tells it from other models.
+        target: bands of each curve in the newest look. (3, J) float64 each
+        target_rows: the same as bytes, in order of the curves' names: what keys are made of.
+        outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
+        ready: the newest image of it.
+        displayed: the image in the picture; another one than `ready` until all terms can be shown in one light.
+        is_composed: the picture's radiance has `displayed` in it as it is now.
+    """
+
+    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, light: Light) -> None:
+        self.light = light
+        self._theta_o = np.arccos(cos_theta_o)
+        tiles, samples = tiles_of(len(cos_theta_o))
+        self.ready = self.displayed = Shown(np.zeros((tiles, 3, samples), np.float32))
+        self.is_composed = False
+        self.model: Hashable = None
+        self.set_document(document)
+        self.displayed = self.ready
+
+    def set_document(self, document: Mapping[str, Any]) -> None:
+        """A new target; another model, or another value of a fixed parameter, starts from nothing."""
+        wanted = Wanted.of(document, self._theta_o)
+        if wanted.model != self.model:
+            self.ready = Shown(np.zeros_like(self.ready.image))
+            self.displayed = replace(self.displayed, bands={})  # of another model: none of the curves that are wanted
+        elif self.ready.basis is not None and not self.ready.basis.holds_for(document):
+            self.ready = self._go_on_as(self.ready.without_basis())
+        self.document, self.term, self.model = wanted.document, wanted.term, wanted.model
+        self.target, self.outgoing = wanted.bands, wanted.outgoing
+        self.target_rows = _rows(self.target, ())
+        self.is_composed = False
+
+    def set_light(self, light: Light) -> None:
+        """It is wanted in another light; the picture goes on showing what it shows (`show_ready`)."""
+        self.light = light
+        self.ready = self.ready.in_other_light()
+        anchor = self.ready.anchor
+        if anchor is not None and anchor.light == light:  # as before, after all
+            self.ready = replace(anchor.without_basis(), image=anchor.image.copy())
+
+    def put(self, shown: Shown) -> None:
+        """A new image is ready; the picture shows it at once, unless it is held back until all terms have one."""
+        self.ready = self._go_on_as(shown)
+
+    def _go_on_as(self, shown: Shown) -> Shown:
+        """The image that takes the place of `ready`, in the picture as well where that shows it."""
+        if self.displayed is self.ready:
+            self.displayed, self.is_composed = shown, False
+        return shown
+
+    def show_ready(self) -> None:
+        """The picture shows what is ready from now on, where there is anything."""
+        if self.ready.fidelity and self.displayed is not self.ready:
+            self.displayed, self.is_composed = self.ready, False
+
+    @property
+    def newest(self) -> Shown:
+        """What could be shown of it now: what is ready, else what was shown before."""
+        return self.ready if self.ready.fidelity else self.displayed
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether there is nothing of it that could be shown."""
+        return not self.newest.fidelity
+
+    @property
+    def is_firm(self) -> bool:
+        """Whether steps may be added to what is ready."""
+        return self.ready.is_firm
+
+    def differing(self) -> list[str]:
+        """Curves whose target is not summed in what is ready."""
+        return self.ready.differing(self.target) if self.is_firm else list(self.target)
+
+    def is_exact(self) -> bool:
+        """Whether what is ready is all that is wanted."""
+        return self.ready.fidelity == Fidelity.EXACT and not self.differing()
+
+    def is_seen(self) -> bool:
+        """Whether its look can be seen though nothing firm is ready, so that shading may wait for the hand to rest.
+
+        Where the light has changed every position of the hand brings another preview; the first one of all, of a
+        picture that has just been opened, is the only one, and knows nothing of curves that were moved since.
+        """
+        ready = self.ready
+        is_rough = Fidelity.NOTHING < ready.fidelity < Fidelity.NEAR
+        return is_rough and (ready.anchor is not None or not ready.differing(self.target))
+
+    def lacks_only_light(self) -> bool:
+        """Whether all that is between its anchor and what is wanted is a change of light."""
+        anchor = self.ready.anchor
+        return anchor is not None and not self.is_firm and not anchor.differing(self.target)
+
+    @property
+    def word(self) -> Word:
+        """How near what the picture shows of it is to its look."""
+        shown = self.displayed
+        return word_of(shown.fidelity, is_wanted=shown.light == self.light and not shown.differing(self.target))
+
+    def key_of_operator(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
+        """What an operator depends on besides view and material: model, light, and the curves that are dormant."""
+        return ((self.model, self.light), basis, *_rows(bands, basis.moves))
+
+    def key_of_image(self, light: Light) -> tuple[Hashable, ...]:
+        """What the image of the target in some light depends on besides view and material."""
+        return ((self.model, light), None, *self.target_rows)
+
+
+def _rows(bands: Mapping[str, F64], moved: tuple[str, ...]) -> list[bytes]:
+    """Bands of the curves that are not moved, in order of their names."""
+    return [bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in moved]

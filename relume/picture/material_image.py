@@ -1,0 +1,123 @@
+"""The live image of one material: its terms, composed into the radiance of its view samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.picture.light import Light
+from relume.picture.live_term import LiveTerm
+from relume.views.compose import add_term
+from relume.views.view import View
+
+F32 = NDArray[np.float32]
+
+
+class MaterialImage:
+    """State of one material in one view.
+
+    Attributes:
+        num_composed: how often its radiance has been written: whoever has seen as many has seen it as it is.
+    """
+
+    def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]], light: Light) -> None:
+        self._view, self.index = view, index
+        rows = view.rows(index)
+        self.num_samples = rows.stop - rows.start
+        self._first = rows.start
+        self._cos_theta_o = view.cos_theta_o[rows]
+        self._textures = {name: texture[rows] for name, texture in view.textures.items()}
+        self.documents = list(documents)
+        self._light = light
+        self.terms = [LiveTerm(document, self._cos_theta_o, light) for document in documents]
+        self._emission = (0.0, 0.0, 0.0)
+        self._shines: F32 | None = None
+        self._factor: F32 | None = None
+        self._unlit: F32 | None = None
+        self.factor_key: Hashable = None
+        self._is_current = False
+        self.num_composed = 0
+
+    def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
+        """New targets; terms that stay as they are keep their images."""
+        if list(documents) == self.documents:
+            return
+        kept = len(self.terms)
+        for k, document in enumerate(documents):
+            if k >= kept:
+                self.terms.append(LiveTerm(document, self._cos_theta_o, self._light))
+            elif document != self.documents[k]:
+                self.terms[k].set_document(document)
+        del self.terms[len(documents) :]
+        self.documents = list(documents)
+        self._is_current = False
+
+    def set_light(self, light: Light) -> None:
+        """It is lit by this from now on."""
+        self._light = light
+        for term in self.terms:
+            term.set_light(light)
+
+    def set_emission(self, emission: tuple[float, float, float], shines: Callable[[int], NDArray[np.bool_]]) -> None:
+        """The surfaces send this out themselves, where `shines` says so of the material's samples."""
+        if emission == self._emission:
+            return
+        self._emission, self._is_current = emission, False
+        if self._shines is None:
+            self._shines = shines(self.index).astype(np.float32)
+
+    def set_factor(self, key: Hashable, factor: F32 | None, unlit: F32 | None) -> None:
+        """Every sample's finished radiance is multiplied, as on a ground that only catches shadows; None: by one.
+
+        Args:
+            key: that tells it from others, None for none. factor: (3, n) float32
+            unlit: added to what is multiplied: what samples show without any light. (3, n) float32 or None for nothing
+        """
+        if key != self.factor_key:
+            self.factor_key, self._factor, self._unlit, self._is_current = key, factor, unlit, False
+
+    @property
+    def is_caught(self) -> bool:
+        """Whether only shadows on it are shown."""
+        return self._factor is not None
+
+    def compose(self, radiance: F32) -> bool:
+        """Write the material's samples into the view's radiance; False where nothing has changed since."""
+        if self._is_current and all(term.is_composed for term in self.terms):
+            return False
+        for k, term in enumerate(self.terms):
+            color, texture, has_texture = self._factors(term)
+            outgoing = term.outgoing if self._factor is None else self._factor
+            add_term(term.displayed.image, color, texture, outgoing, has_texture, self._first, k == 0, radiance)
+            term.is_composed = True
+        own = radiance[:, self._first : self._first + self.num_samples]
+        if not self.terms:
+            own[:] = 0
+        if self._unlit is not None:
+            own += self._unlit
+        if self._shines is not None and any(self._emission):
+            own += np.outer(np.array(self._emission, np.float32), self._shines)
+        self._is_current = True
+        self.num_composed += 1
+        return True
+
+    def term_radiance(self, term: LiveTerm, image: F32, radiance: F32) -> None:
+        """Write what another image of one term would give alone to `radiance`, (3, samples); the term stays."""
+        color, texture, has_texture = self._factors(term)
+        add_term(image, color, texture, term.outgoing, has_texture, self._first, True, radiance)
+
+    def factors_at(self, term: LiveTerm, sample: int) -> NDArray[np.float64]:
+        """What multiplies a term's image at one of the material's samples. (3,) float64"""
+        color, texture, has_texture = self._factors(term)
+        factor = color.astype(np.float64)
+        if has_texture:
+            factor = factor * texture[sample]
+        return factor if term.outgoing is None else factor * term.outgoing[:, sample]
+
+    def _factors(self, term: LiveTerm) -> tuple[F32, F32, bool]:
+        color = np.asarray(term.document["color"], np.float32)
+        name = term.document.get("texture")
+        return color, self._textures[name or "diffuse"], name is not None

@@ -1,0 +1,212 @@
+"""One live picture: a view under a look that changes while somebody drags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.curves import curve_bands, generated_bands
+from relume.errors import ParameterError
+from relume.imageio import to_bytes
+from relume.look import Look
+from relume.memory import Memory
+from relume.operators.shade import shaded_bytes
+from relume.picture.backdrop import Backdrop
+from relume.picture.fidelity import Word, worst
+from relume.picture.hand import Hand, Held
+from relume.picture.jobs import Freeze, Job, Place
+from relume.picture.light import Solo
+from relume.picture.pointer import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
+from relume.picture.probe import brush, probe
+from relume.picture.transfer import Transfer
+from relume.picture.transition import Transition
+from relume.picture.view_images import ViewImages, documents_of
+from relume.views.resolve import encode, resolve
+from relume.views.view import Tile
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Advance:
+    """What one step changed.
+
+    Attributes:
+        tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
+        fidelity: how nearly it shows it. complete: something of every term is shown.
+    """
+
+    tiles: list[Tile]
+    exact: bool
+    fidelity: Word
+    complete: bool
+
+    @property
+    def changed(self) -> bool:
+        """Whether any pixel may be new."""
+        return bool(self.tiles)
+
+
+class Picture:
+    """State of one session's picture; used from one thread at a time, while a `Job` is made in another.
+
+    Args:
+        is_watched: somebody looks at it while it opens, and sees a rough picture first where a better one takes long.
+    """
+
+    def __init__(self, transfer: Transfer, view_name: str, cache: Memory, *, is_watched: bool = False) -> None:
+        self._images = ViewImages(transfer, view_name, cache)
+        self._view = self._images.view
+        self._look = self._images.default
+        self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
+        self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
+        self._backdrop = Backdrop(self._images)
+        self._touched: CurvePointer | ParameterPointer | None = None
+        self._moved: CurvePointer | ParameterPointer | None = None
+        self._pointer: Pointer | None = None
+        self._transition = Transition(self._images, is_watched=is_watched)
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all, before any picture is given it; nothing changes.
+
+        Raises:
+            MemoryBudgetError: the images of its terms are larger than the memory may be.
+        """
+        samples = ((m.num_samples, len(documents_of(look, name))) for name, m in self._images.by_name.items())
+        self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
+
+    def set_look(self, look: Look, *, hand: str | None = None, solo: Solo = None) -> None:
+        """A new target; nothing is computed yet.
+
+        Args:
+            hand: pointer to what the user's hand is on while it makes this look, see `parse_pointer`; None where that
+                is not known, as after an undo.
+            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+        Raises:
+            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment
+                cannot be had. The picture stays as it was.
+        """
+        moved = None if hand is None else parse_pointer(hand)
+        before, images = self._images.light, self._images
+        images.set_look(look, solo)
+        self._moved = moved if isinstance(moved, CurvePointer | ParameterPointer) else None
+        self._pointer = moved or self._pointer
+        if (images.light.environment, images.light.local) != (before.environment, before.local):
+            self._touched = None  # the hand has moved on to a light
+        self._look = look
+
+    def touch(self, pointer: str) -> None:
+        """Prepare what a hand takes hold of ahead of its first edit.
+
+        Args:
+            pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h"; see `parse_pointer`.
+        Raises:
+            ParameterError: there is no such curve or parameter in this look.
+        """
+        touched = parse_pointer(pointer)
+        if isinstance(touched, CurvePointer | ParameterPointer):
+            self._images.find(touched)
+            self._touched = touched
+        self._pointer = touched
+
+    def next_job(self) -> Job | None:
+        """What must be made next, for the look or for what was touched; None where nothing is lacking.
+
+        The picture may be advanced meanwhile: all that does not depend on it follows the look.
+        """
+        return self._transition.next_job(self._hand(), self._look)
+
+    def install(self, job: Job, made: Any) -> None:
+        """Go on with what a job has made, unless the look has moved on to where it is of no use."""
+        self._transition.install(job, made)
+        touched = self._hand().touched
+        if not isinstance(job, Freeze) or touched is None or touched.place.live is not job.place.live:
+            return
+        if touched.basis != job.basis and touched.place.live.ready.basis == job.basis:
+            self._touched = None  # the hand has moved on to something else of this term
+
+    def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
+        """Make what `next_job` names and install it.
+
+        Raises:
+            CancelledError: `cancelled` said so; the picture stays as it was.
+            MemoryBudgetError: it is larger than the cache may be.
+        """
+        job = self.next_job()
+        if job is not None:
+            self.install(job, job.make(progress, cancelled))
+
+    def advance(self, max_coefficients: int | None) -> Advance:
+        """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
+        images, transition = self._images, self._transition
+        transition.step(max_coefficients)
+        tiles: set[Tile] = set()
+        light, gain = transition.light, self._backdrop.gain_of(transition.gain, self._look.background)
+        is_new_behind = self._backdrop.follow(self._look, light, gain, self._radiance)
+        for index, material in enumerate(images.by_name.values()):
+            if material.num_samples and material.compose(self._radiance):
+                tiles.update(self._view.tiles_of_material[index])
+        if is_new_behind or not np.array_equal(self._gain, gain):
+            self._gain = gain
+            tiles.update(self._view.all_tiles)
+        fidelity = worst(live.word for _, live in images.terms())
+        complete = not any(live.is_blank for _, live in images.terms())
+        in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
+        return Advance(in_order, fidelity == "exact", fidelity, complete)
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture."""
+        return self._view.all_tiles
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
+        return encode(self._view, self._radiance, tiles, form, self._gain)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
+        if not self._backdrop.is_transparent:
+            return None
+        alpha = self._backdrop.alpha(for_display=True)
+        return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
+
+    def alpha(self, *, for_display: bool) -> F32 | None:
+        """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
+        return self._backdrop.alpha(for_display=for_display) if self._backdrop.is_transparent else None
+
+    def image(self) -> F32:
+        """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
+        whole = [(0, 0, self._view.width, self._view.height)]
+        pixels = resolve(self._view, self._radiance, whole, self._gain)
+        return pixels.reshape(self._view.height, self._view.width, 3)
+
+    def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bands of a curve as displayed and as its parameters alone would give it. (3, J) each"""
+        wanted = parse_curve(pointer)
+        _, term = self._images.find(wanted)
+        declared = term.term.curve(wanted.name)
+        return curve_bands(term.document, declared), generated_bands(term.document, declared)
+
+    def probe(self, x: int, y: int) -> dict[str, Any]:
+        """What makes up a pixel, and where its surface is; see `relume.picture.probe.probe`."""
+        return probe(self._images, self._radiance, self._gain, self._touched, x, y)
+
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Which pixels a stretch of a curve lights. See `relume.picture.probe.brush`."""
+        return brush(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
+
+    def _hand(self) -> Hand:
+        """What the hand is on in the look as it is now."""
+        return Hand(self._held(self._touched), self._held(self._moved), self._pointer)
+
+    def _held(self, pointer: CurvePointer | ParameterPointer | None) -> Held | None:
+        """What a pointer means in the look as it is now; None where an edit has removed it."""
+        if pointer is None:
+            return None
+        try:
+            return Held(Place(self._images, *self._images.find(pointer)), self._images.basis(pointer))
+        except ParameterError:
+            return None

@@ -1,0 +1,116 @@
+"""From a pixel to the curve behind it, and from a stretch of a curve to the pixels that it lights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.daubechies import analysis, synthesis
+from relume.color import luminance
+from relume.errors import EditNotSupportedError, ParameterError
+from relume.operators.edit_basis import CurveBasis
+from relume.picture.live_term import LiveTerm
+from relume.picture.pointer import CurvePointer, ParameterPointer
+from relume.picture.view_images import ViewImages
+from relume.views.resolve import resolve
+
+F32 = NDArray[np.float32]
+
+
+def probe(
+    images: ViewImages,
+    radiance: F32,
+    gain: NDArray[np.float64],
+    touched: CurvePointer | ParameterPointer | None,
+    x: int,
+    y: int,
+) -> dict[str, Any]:
+    """A pixel's material, where its surface is, radiance, and what each band of its active curve gives to it.
+
+    Args:
+        images: of the picture. x, y: of the pixel.
+        radiance: of every view sample. (3, samples) float32. gain: multiplies each channel. (3,)
+        touched: of the term to answer for, where it is the pixel's material's.
+    Raises:
+        ParameterError: the pixel lies outside the picture.
+    """
+    view = images.view
+    if not (0 <= x < view.width and 0 <= y < view.height):
+        raise ParameterError("pixel", [x, y], f"x below {view.width} and y below {view.height}")
+    pixel = y * view.width + x
+    entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
+    samples, weights = view.order[entries], view.weight[entries]
+    seen = gain * (radiance[:, samples] * weights).sum(axis=1)
+    heaviest = int(samples[np.argmax(weights)])
+    index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
+    found = {"material": None, "position": None, "normal": None, "radiance": seen, "bands": None, "curve": None}
+    if index >= len(images.by_name):
+        return found
+    name = images.transfer.material_names[index]
+    position, normal = view.surface_at(heaviest)
+    found |= {"material": name, "position": position, "normal": normal}
+    for k, term in _touched_first(images, name, touched):
+        bands = _contributions(images, name, term, samples, weights)
+        if bands is not None and isinstance(term.ready.basis, CurveBasis):
+            pointer = str(CurvePointer(name, k, term.ready.basis.name))
+            return found | {"bands": gain[:, None] * bands, "curve": pointer}
+    return found
+
+
+def _touched_first(
+    images: ViewImages, name: str, touched: CurvePointer | ParameterPointer | None
+) -> list[tuple[int, LiveTerm]]:
+    terms = list(enumerate(images.by_name[name].terms))
+    if touched is not None and touched.material == name:
+        terms.sort(key=lambda item: item[0] != touched.term)
+    return terms
+
+
+def _contributions(
+    images: ViewImages, name: str, term: LiveTerm, samples: NDArray[np.int32], weights: F32
+) -> NDArray[np.float64] | None:
+    """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None where none is frozen."""
+    material = images.by_name[name]
+    frozen = images.operator(material, term)
+    ready = term.ready
+    if frozen is None or not isinstance(ready.basis, CurveBasis):
+        return None
+    rows = images.view.rows(material.index)
+    curve = synthesis(ready.coefficients) if ready.coefficients is not None else term.target[ready.basis.name]
+    bands = np.zeros_like(curve)
+    for sample, weight in zip(samples, weights, strict=True):
+        if rows.start <= sample < rows.stop:
+            row = int(sample) - rows.start
+            tile, offset = divmod(row, frozen.transport.shape[3])
+            columns = synthesis(frozen.transport[tile, :, :, offset].astype(np.float64))
+            bands += weight * columns * material.factors_at(term, row)[:, None] * curve
+    return bands
+
+
+def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: float, to_deg: float) -> F32:
+    """How much of each pixel comes from a stretch of a curve, 0 to 1. (height, width) float32
+
+    Args:
+        images, radiance: as in `probe`. pointer: to the curve. from_deg, to_deg: ends of the stretch, degrees.
+    Raises:
+        EditNotSupportedError: the curve is not frozen yet; touch it and freeze first.
+    """
+    material, term = images.find(pointer)
+    frozen = images.operator(material, term)
+    if frozen is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
+        raise EditNotSupportedError(images.transfer.method, "a brush over a curve that is not open; open it first")
+    bands = synthesis(term.ready.coefficients)
+    edges = np.linspace(0, 90, bands.shape[1] + 1)
+    overlap = np.clip(np.minimum(edges[1:], to_deg) - np.maximum(edges[:-1], from_deg), 0, None) / np.diff(edges)
+    part = np.empty_like(term.ready.image)
+    frozen.write_image(analysis(bands * overlap), part)
+    lit_radiance = np.zeros_like(radiance)
+    material.term_radiance(term, part, lit_radiance)
+    view = images.view
+    whole = [(0, 0, view.width, view.height)]
+    lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0), 0))
+    total = luminance(resolve(view, radiance, whole, 1.0))
+    share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 1e-9)
+    return np.clip(share, 0, 1).reshape(view.height, view.width).astype(np.float32)

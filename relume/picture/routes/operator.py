@@ -1,0 +1,116 @@
+"""The routes of a curve or a parameter that is in hand: the term's frozen operator, R += T · Δc or R = Σ_s c_s R_s.
+
+A step adds the most important coefficients first where there is no time for all (eqs. 29 to 31, Ben-Artzi 2006). Along
+a parameter, whose few coefficients say curves only nearly, a step sums all of them, and the image is near its look.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.operators.frozen import Frozen
+from relume.operators.stream import columns_of, stream
+from relume.picture.jobs import Place, Settle
+from relume.picture.shown import UNIT_ROUNDOFF, Shown, length_of
+
+F64 = NDArray[np.float64]
+
+# Share of an image's length that float32 sums may have left in it before it is summed anew instead of gone on with; a
+# frame's pixels have nine bits.
+MAX_ROUNDING = 2.0**-11
+MOST_AT_REST = 2.0**-16
+_COLUMNS_A_SUM = 4  # that `stream` adds to the image at once
+
+
+def step(place: Place, max_coefficients: int | None) -> None:
+    """Bring the curves that a term's operator leaves free to their target, as far as the operator is there.
+
+    Args:
+        max_coefficients: of each channel, at most; None for all.
+    """
+    images, material, live = place
+    frozen = images.operator(material, live)
+    if frozen is not None:
+        after = advance(live.ready, live.target, frozen, max_coefficients)
+        if after is not live.ready:
+            live.put(after)
+
+
+def advance(ready: Shown, target: Mapping[str, F64], frozen: Frozen, max_coefficients: int | None) -> Shown:
+    """What an image shows after one step along its basis; the same where that leaves nothing free that differs.
+
+    Args:
+        ready: with basis and coefficients. target: bands of each of the term's curves. (3, J) each
+        frozen: the operator that the coefficients are of. max_coefficients: of each channel, at most; None for all.
+    """
+    basis, light = ready.basis, ready.light
+    if basis is None or light is None or set(ready.differing(target)).isdisjoint(basis.moves):
+        return ready
+    moved = {**ready.bands, **{name: target[name] for name in basis.moves}}
+    if not basis.is_complete:
+        return ready.summed(frozen, basis, moved, light)
+    return _add_change(ready, moved, frozen, max_coefficients)
+
+
+def is_worn(ready: Shown) -> bool:
+    """Whether steps have left more in an image than may stay there at rest."""
+    return ready.rounding > 0 and ready.rounding > MOST_AT_REST * length_of(ready.image)
+
+
+def settle_job(place: Place) -> Settle | None:
+    """What makes of an image that was summed from steps one that was summed once from all coefficients.
+
+    None where the operator is gone, and where there is no need: a few small steps leave less than a sum of all
+    coefficients, whose columns cancel.
+    """
+    images, material, live = place
+    ready, frozen = live.ready, images.operator(material, live)
+    basis, coefficients = ready.basis, ready.coefficients
+    if frozen is None or basis is None or coefficients is None:
+        return None
+    if ready.rounding <= _rounding(0.0, coefficients, frozen):
+        return None
+    key = images.key_of_operator(material, live, basis, live.target)
+    return Settle(place, (*key, "settled"), ready, lambda image: frozen.write_image(coefficients, image))
+
+
+def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Frozen, max_coefficients: int | None) -> Shown:
+    """Add T · Δc; where float32 sums have left too much in the image, sum all of it anew."""
+    assert ready.basis is not None
+    assert ready.coefficients is not None
+    shown, perfect = ready.coefficients, ready.basis.coefficients(moved)
+    change = perfect - shown
+    budget = change.size if max_coefficients is None else 3 * max_coefficients
+    if np.count_nonzero(change) > budget:
+        weight = np.abs(change) * frozen.importance
+        change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
+        perfect = np.where(change == 0, shown, perfect)  # a sum would leave a rest to move again
+        unsaid = {name: np.full_like(moved[name], np.nan) for name in ready.basis.moves}  # shows no curve exactly
+        moved = {**moved, **unsaid}
+    length = length_of(ready.image)
+    stream(frozen.transport, columns_of(change), ready.image)
+    rounding = float(np.hypot(ready.rounding, _rounding(length, change, frozen)))
+    after = replace(ready, bands=moved, coefficients=perfect, rounding=rounding)
+    return after if rounding <= MAX_ROUNDING * length else _anew(after, frozen)
+
+
+def _anew(ready: Shown, frozen: Frozen) -> Shown:
+    """The same image summed once from its coefficients, in place."""
+    assert ready.coefficients is not None
+    frozen.write_image(ready.coefficients, ready.image)
+    return replace(ready, rounding=0.0)
+
+
+def _rounding(length: float, change: F64, frozen: Frozen) -> float:
+    """Length of the rounding errors of one step, to be expected of n additions with unit roundoff u.
+
+    √n u (‖R‖ + Σ_j |Δc_j| ‖T_j‖); n in place of √n bounds it always, and is never met (Higham and Mary 2019).
+    """
+    num = int(np.count_nonzero(change, axis=1).max())
+    added = float(np.sum(np.abs(change) * frozen.importance))
+    return math.sqrt(num / _COLUMNS_A_SUM + _COLUMNS_A_SUM) * UNIT_ROUNDOFF * (length + added) if num else 0.0

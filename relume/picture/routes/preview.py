@@ -1,0 +1,173 @@
+"""A preview of other light: one sample of each small square of pixels is shaded, those between are interpolated.
+
+When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
+counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time.
+A preview costs a few thousand samples whatever the picture's size, holds no operator, and lets the hand see where the
+light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from relume.brdf.term import Term
+from relume.look.model import Rgb
+from relume.operators.shade import Shaded, shade
+from relume.picture.fidelity import Fidelity
+from relume.picture.jobs import Cancelled, Place, Progress
+from relume.picture.light import Light
+from relume.picture.transfer import Few, Transfer
+from relume.picture.view_images import ViewImages
+from relume.views.view import View
+
+F32 = NDArray[np.float32]
+
+_MOST_SHADED = 6000  # samples of a view, about
+_FEW_TO_SHADE = 8 * _MOST_SHADED  # samples of terms of a view; they take about as long as choosing some of them
+_NUM_NEIGHBOURS = 3
+_PIXELS_A_TURN = 10.0  # a unit of normals counts as so many squares of pixels
+_SOFT = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
+
+
+@dataclass(frozen=True)
+class Sparse:
+    """The samples of a material that are shaded, and how all others are made from them.
+
+    Attributes:
+        few: the samples. weights: rows sum to one. (samples, few samples) sparse float32
+    """
+
+    few: Few
+    weights: Any
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        weights = self.weights
+        return int(self.few.num_bytes + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
+
+
+def choose_sparse(transfer: Transfer, view: View, material: int) -> Sparse:
+    """One sample of each square of pixels that a material is seen in; reads the store.
+
+    Those between take the mean of the nearest, by place in the picture and by normal.
+
+    Args:
+        transfer: an opened bake. view: one of its views. material: index of the material.
+    """
+    rows = view.rows(material)
+    step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
+    y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
+    _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
+    turn = _PIXELS_A_TURN * step * view.points(material).normal
+    place = np.concatenate([np.stack([x, y], axis=1), turn], axis=1)
+    num = min(_NUM_NEIGHBOURS, len(chosen))
+    distance, nearest = cKDTree(place[chosen]).query(place, k=list(range(1, num + 1)))
+    weight = 1 / (distance**2 + _SOFT)
+    weight /= weight.sum(axis=1, keepdims=True)
+    first = np.arange(0, weight.size + 1, num)
+    shape = (len(place), len(chosen))
+    weights = csr_array((weight.ravel().astype(np.float32), nearest.ravel(), first), shape=shape)
+    return Sparse(transfer.some(view, material, chosen), weights)
+
+
+def _sparse(images: ViewImages, material: int) -> Sparse:
+    """Of a material of a view, kept in the cache with the operators."""
+
+    def choose() -> Sparse:
+        return choose_sparse(images.transfer, images.view, material)
+
+    return images.cache.get(_key(images, material), Sparse, _bytes_of(images, material), choose)
+
+
+def _key(images: ViewImages, material: int) -> tuple[Hashable, ...]:
+    return images.transfer.key, images.view.name, material, "sparse"
+
+
+def _bytes_of(images: ViewImages, material: int) -> int:
+    """Memory that `Sparse` takes at most, but for the few samples themselves."""
+    rows = images.view.rows(material)
+    return int(rows.stop - rows.start) * (_NUM_NEIGHBOURS * 12 + 8)
+
+
+def can_preview(images: ViewImages) -> bool:
+    """Whether the cache has room for it beside other things."""
+    return 2 * sum(_bytes_of(images, k) for k in range(len(images.by_name))) <= images.cache.budget_bytes
+
+
+def helps_to_open(images: ViewImages) -> bool:
+    """Whether a picture that shows nothing yet is seen much sooner so than by making the images that it lacks."""
+    lacking = sum(m.num_samples for m, image in images.terms() if not images.is_at_hand(m, image))
+    return lacking > _FEW_TO_SHADE and can_preview(images)
+
+
+def is_prepared(images: ViewImages) -> bool:
+    """Whether the samples have been chosen: the first preview of a view takes a second more."""
+    seen = {material.index for material, _ in images.terms()}
+    return all(images.cache.find(_key(images, index), Sparse) is not None for index in seen)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One term, as it was when the preview was asked for."""
+
+    place: Place
+    term: Term
+    bands: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """Rough images of terms in one light; the only route that reaches any light, from nothing.
+
+    Attributes:
+        gain: what multiplies the finished picture in that light.
+    """
+
+    key: tuple[Hashable, ...]
+    images: ViewImages
+    light: Light
+    gain: Rgb
+    parts: Sequence[_Part]
+    what: str = "the light"
+
+    state: Literal["freezing", "shading"] = "shading"
+    refines = False
+
+    @classmethod
+    def of(cls, images: ViewImages, places: Iterable[Place], what: str) -> Preview:
+        """Of the terms at these places of a picture's images, in the look as it is now. what: in words."""
+        parts = [_Part(place, place.live.term, place.live.target) for place in places]
+        key = images.transfer.key, images.view.name, images.light
+        return cls(key, images, images.light, images.gain, parts, what)
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> list[F32]:
+        """See `Job`. Returns images of all parts, (tiles, 3, samples) float32 each."""
+        found = []
+        for k, part in enumerate(self.parts):
+            sparse = _sparse(self.images, part.place.material.index)
+            shaded = shade(part.term, part.bands, *sparse.few.arriving(self.light), lambda share: None, cancelled)
+            found.append(_spread(shaded, sparse.weights))
+            progress((k + 1) / len(self.parts))
+        return found
+
+    def install(self, made: Sequence[F32]) -> None:
+        """See `Job`; also where the hand has turned the light further meanwhile."""
+        for part, image in zip(self.parts, made, strict=True):
+            live = part.place.live
+            is_followed = live.ready.fidelity == Fidelity.FOLLOWED and live.ready.light == live.light
+            if not (live.is_firm or is_followed) and part.place.is_there():
+                rough = replace(live.ready, image=image, fidelity=Fidelity.PREVIEW, bands=part.bands, light=self.light)
+                live.put(rough)
+
+
+def _spread(shaded: Shaded, weights: Any) -> F32:
+    """An image of all samples from that of the few. (tiles, 3, samples) float32"""
+    return Shaded.of(weights @ shaded.rows(weights.shape[1])).image

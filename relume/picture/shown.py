@@ -1,0 +1,81 @@
+"""The one state of a term's image: what it shows, how truly, and from which exact image it can go on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.operators.edit_basis import EditBasis
+from relume.operators.frozen import Frozen
+from relume.picture.fidelity import Fidelity
+from relume.picture.light import Light
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+UNIT_ROUNDOFF = 2.0**-24  # of float32
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What an image of one term shows, before colour, texture and outgoing curves.
+
+    The image belongs to the picture's own thread: steps are added in place, and nothing else keeps it but its anchor.
+
+    Attributes:
+        image: Σ_j c_j T_j. (tiles, 3, samples) float32
+        fidelity: how truly it shows `bands` under `light`.
+        bands: of each curve, (3, J) float64; not a number where only the most important coefficients have been moved.
+        light: what arrives; None where nothing is shown.
+        basis: what the operator in use leaves free. coefficients: c of it in `image`. (3, columns) float64
+        rounding: length of the errors to be expected in `image` of float32 sums since all of it was summed at once.
+        anchor: the last image of which every coefficient was summed, where that was in another light.
+    """
+
+    image: F32
+    fidelity: Fidelity = Fidelity.NOTHING
+    bands: Mapping[str, F64] = field(default_factory=dict)
+    light: Light | None = None
+    basis: EditBasis | None = None
+    coefficients: F64 | None = None
+    rounding: float = 0.0
+    anchor: Shown | None = None
+
+    @property
+    def is_firm(self) -> bool:
+        """Whether steps may be added to it: it is the sum of known coefficients in a known light."""
+        return self.fidelity >= Fidelity.NEAR
+
+    def differing(self, wanted: Mapping[str, F64]) -> list[str]:
+        """Names of the wanted curves that the image does not show."""
+        return [name for name, bands in wanted.items() if not np.array_equal(bands, self.bands.get(name, np.nan))]
+
+    def in_other_light(self) -> Shown:
+        """Nothing, from where changes of light can be followed."""
+        anchor = replace(self, anchor=None) if self.is_firm else self.anchor
+        return Shown(np.zeros_like(self.image), anchor=anchor)
+
+    def summed(self, frozen: Frozen, basis: EditBasis, target: Mapping[str, F64], light: Light) -> Shown:
+        """The image of a target from all coefficients of an operator, written where this one's image stood.
+
+        Args:
+            frozen: the operator along `basis` in this light, its dormant curves those of the target.
+            target: bands of each of the term's curves. (3, J) each
+        """
+        coefficients = basis.coefficients(target)
+        frozen.write_image(coefficients, self.image)
+        fidelity = Fidelity.EXACT if basis.is_complete else Fidelity.NEAR
+        return Shown(self.image, fidelity, dict(target), light, basis, coefficients)
+
+    def without_basis(self) -> Shown:
+        """The same image, which follows no operator any more."""
+        return replace(self, basis=None, coefficients=None)
+
+
+def length_of(image: F32) -> float:
+    """Of an image as a vector over all its samples and channels."""
+    flat = image.reshape(-1)
+    return float(np.sqrt(np.dot(flat, flat)))

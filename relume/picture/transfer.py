@@ -1,0 +1,172 @@
+"""What a picture asks of an opened bake, whichever method made it; `relume.methods` implements it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # a server that only describes its API loads no kernels
+    from relume.bake import StoreReader
+    from relume.light.triangles import TriangleLights
+    from relume.look import EnvironmentKey, LightGeometry
+    from relume.memory import Memory
+    from relume.operators.image_files import ImageFiles
+    from relume.picture.light import Light, Source
+    from relume.points import Points
+    from relume.project.receivers import LocalRays, Receivers
+    from relume.trace.preview_light import PreviewLight
+    from relume.views.view import View
+
+F32 = NDArray[np.float32]
+
+
+class Axis(Enum):
+    """What a person can change in the pictures of a bake while they look at them."""
+
+    CURVE = "curve"
+    PARAMETER = "parameter"
+    LIGHT = "light"
+    ENVIRONMENT = "environment"
+    BOUNCES = "bounces"
+    EYE = "eye"
+
+
+class Eyes(Enum):
+    """Where its pictures are seen from: places that were baked, or any."""
+
+    BAKED = "baked"
+    FREE = "free"
+
+
+Arriving: TypeAlias = "tuple[TriangleLights, Receivers]"
+"""The environment's triangles, and the points that they and rays bring light to."""
+
+
+class Few(Protocol):
+    """A few samples of a material, kept so that they can be shaded in any light at once."""
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory they hold."""
+        ...
+
+    def arriving(self, light: Light) -> Arriving:
+        """What arrives at them in a light, found quickly."""
+        ...
+
+
+class Bounced(Protocol):
+    """Light that surfaces send onto each other, as far as it can be followed while it changes."""
+
+    @property
+    def num_cells(self) -> int:
+        """Pieces of surface that send it."""
+        ...
+
+    def preview_under(self, light: Light) -> F32:
+        """Radiance that they send out. (at least num_cells, 3)"""
+        ...
+
+
+class Local(Protocol):
+    """Local lights, as far as they can be followed while they move."""
+
+    def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
+        """What comes to points from a light of unit emission, found quickly."""
+        ...
+
+    def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
+        """The same as rays, for terms that ask where light comes from. seen: of `PreviewLight`"""
+        ...
+
+    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
+        """What would come to points from a light of unit emission if nothing were in its way. (n,)"""
+        ...
+
+
+class Transfer(Protocol):
+    """One opened bake, shared by all its pictures.
+
+    Attributes:
+        memory: of all that is made from the bake and may be made again.
+        key: tells what is made from this bake from what is made from others in the memory.
+        default_look: the complete look of the scene as it was imported. derived, edited: images of it, and of others.
+        eyes, axes: what its pictures can do; nobody asks for the method's name.
+        reflected: light between surfaces; None where none was baked.
+    """
+
+    @property
+    def memory(self) -> Memory: ...
+    @property
+    def key(self) -> str: ...
+    @property
+    def store(self) -> StoreReader: ...
+    @property
+    def scene_id(self) -> str: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def default_look(self) -> dict[str, Any]: ...
+    @property
+    def material_names(self) -> Sequence[str]: ...
+    @property
+    def views(self) -> Mapping[str, View]: ...
+    @property
+    def eyes(self) -> Eyes: ...
+    @property
+    def axes(self) -> frozenset[Axis]: ...
+    @property
+    def derived(self) -> ImageFiles: ...
+    @property
+    def edited(self) -> ImageFiles: ...
+    @property
+    def reflected(self) -> Bounced | None: ...
+    @property
+    def local(self) -> Local: ...
+    def has_image(self, key: Any) -> bool:
+        """Whether the image of a term is kept beside the store, under the name of a job without the store's own."""
+        ...
+
+    def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
+        """What arrives at a material's samples in a light.
+
+        Args:
+            view: whose samples. material: index of the material. memory: keeps shadows that must be traced.
+        """
+        ...
+
+    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> Few:
+        """Some of a material's samples in a view; `chosen`, (k,), counts from the material's first."""
+        ...
+
+    def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:
+        """What the environment of a light brings to points, seen along their normals, if nothing hides it.
+
+        Args:
+            is_preview: found quickly, from a small map.
+        """
+        ...
+
+    def thinned(self, view_name: str, step: int) -> Self:
+        """One view of the bake with 1 / step² of its pixels, for small pictures."""
+        ...
+
+    def shines_at(self, view: View, material: int) -> NDArray[np.bool_]:
+        """Whether the samples of a material that shines are seen from a side that does."""
+        ...
+
+    def radiance_of(self, name: str | None) -> F32:
+        """Radiance of an environment, None for the scene's own. (height, width, 3)"""
+        ...
+
+    def background_in(self, environment: EnvironmentKey, view: View) -> F32:
+        """Radiance of a view's samples of an environment. (n, 3)"""
+        ...
+
+    def seen_in(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
+        """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3)"""
+        ...

@@ -1,0 +1,286 @@
+"""The one transition: of the routes to what is wanted, the one of highest fidelity that lacks nothing makes the frame.
+
+What the next better one lacks is made next: first what light needs to be followed, then what shows nothing at all, then
+what the hand is on, then what refines a picture at rest, then what can be made ahead.
+
+One picture, one light: what a picture shows in another light it shows there all at once. When light changes, images of
+terms become ready one after another; until all of them are in one light the picture goes on showing those in the light
+before, with the background, the shining surfaces and the gain of that light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from relume.look import Look
+from relume.look.model import Rgb
+from relume.operators.edit_basis import CurveBasis, EditBasis
+from relume.operators.frozen import frozen_bytes
+from relume.operators.shade import shaded_bytes
+from relume.picture.fidelity import Fidelity
+from relume.picture.hand import Hand
+from relume.picture.jobs import Freeze, Job, Place, Shade
+from relume.picture.light import Light, of_source, vector_of
+from relume.picture.routes import operator
+from relume.picture.routes.base import LightRoute
+from relume.picture.routes.follow import Follow
+from relume.picture.routes.mix import Mix
+from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared
+from relume.picture.routes.recall import Recall
+from relume.picture.view_images import ViewImages
+from relume.project.contraction import contract
+
+
+class Transition:
+    """Of one picture.
+
+    Attributes:
+        light: in which the picture is shown. gain: what multiplies it.
+    """
+
+    def __init__(self, images: ViewImages, *, is_watched: bool) -> None:
+        self._images, self._is_watched = images, is_watched
+        self._mix, self._follow = Mix(), Follow(images)
+        # highest fidelity first, and of equal ones what costs least
+        self._routes: Sequence[LightRoute] = (Recall(), self._mix, self._follow)
+        self._previewed: tuple[Light, Rgb] | None = None
+        self.light, self.gain = images.light, images.gain
+        images.shine_in(self.light)
+
+    # what a frame shows
+
+    def step(self, max_coefficients: int | None) -> None:
+        """Bring every term as near to what is wanted as it can be now."""
+        self._change_light()
+        for place in self._places():
+            if not place.live.is_exact():
+                operator.step(place, max_coefficients)
+
+    def install(self, job: Job, made: object) -> None:
+        """Go on with what a job has made."""
+        job.install(made)
+        if isinstance(job, Preview):
+            self._previewed = job.light, job.gain
+        self._change_light()
+
+    def _change_light(self) -> None:
+        """Bring terms to the light that is wanted, if all can be; else those that can to the light of a preview."""
+        wanted = self._images.light
+        unlit = self._unlit()
+        late = [p for p in unlit if not p.live.is_blank and p.live.ready.light != wanted]
+        if all(self._route(place, wanted) for place in late):
+            self._bring(unlit, wanted)
+        elif self._previewed is not None and any(p.live.ready.light == self._previewed[0] for p in unlit):
+            self._bring(unlit, self._previewed[0])
+        self._show()
+
+    def _bring(self, unlit: Iterable[Place], light: Light) -> None:
+        for place in unlit:
+            route, ready = self._route(place, light), place.live.ready
+            if route is not None and (ready.light != light or ready.fidelity < route.fidelity):
+                route.apply(place, light)
+
+    def _route(self, place: Place, light: Light) -> LightRoute | None:
+        """The best way to bring a term's curves to a light at once; none where it would not show them exactly."""
+        if not place.live.lacks_only_light():
+            return None
+        wanted = self._images.light
+        able = (r for r in self._routes if light == wanted or r.fidelity < Fidelity.NEAR)
+        return next((r for r in able if r.reaches(place, light) and not r.needs(place, light)), None)
+
+    def _show(self) -> None:
+        """Show every term's newest image, if all are in one light; those that show nothing at all are in any."""
+        images, before = self._images, self.light
+        lit = {place.live.newest.light for place in self._places() if not place.live.is_blank}
+        if lit <= {images.light}:
+            self.light, self.gain, self._previewed = images.light, images.gain, None
+        elif self._previewed is not None and lit == {self._previewed[0]}:
+            self.light, self.gain = self._previewed
+        else:
+            return
+        for place in self._places():
+            place.live.show_ready()
+        if self.light != before:
+            images.shine_in(self.light)
+
+    # what is made next
+
+    def next_job(self, hand: Hand, look: Look) -> Job | None:
+        """The most urgent job; None where nothing is lacking. hand: what the user is on. look: as it is now."""
+        stages = (self._rows_wanted, self._preview_wanted, self._elements_wanted, self._lacking, self._touched)
+        for stage in stages:
+            found = stage(hand)
+            if found is not None:
+                return found
+        return self._refining() or self._ahead(hand, look)
+
+    def _rows_wanted(self, hand: Hand) -> Job | None:
+        """Light has changed under a hand, and only rows can follow it."""
+        if not hand.moves_light or not self._must_follow():
+            return None
+        return self._rows()
+
+    def _preview_wanted(self, hand: Hand) -> Job | None:
+        """The picture is in another light than is wanted, or opens; or samples are chosen before the light turns."""
+        images = self._images
+        if self._lacks_preview(hand):
+            is_opening = all(place.live.is_blank for place in self._places())
+            lacking = [place for place in self._unlit() if self._route(place, images.light) is None]
+            return Preview.of(images, lacking, "a preview" if is_opening else "the light")
+        if hand.is_turning and can_preview(images) and not is_prepared(images):
+            return Preview.of(images, self._places(), "the light")
+        return None
+
+    def _lacks_preview(self, hand: Hand) -> bool:
+        images = self._images
+        if all(place.live.is_blank for place in self._places()):
+            return self._is_watched and helps_to_open(images)
+        if self.light == images.light or not can_preview(images):
+            return False
+        is_at_once = all(self._route(place, images.light) is not None for place in self._unlit())
+        return not is_at_once and not (hand.moves_light and self._must_follow())
+
+    def _must_follow(self) -> bool:
+        """Whether every term shows what is wanted, or will, roughly, with rows; and gains alone do not explain it."""
+        wanted, follow = self._images.light, self._follow
+        unlit = self._unlit()
+        reached = all(p.live.lacks_only_light() and follow.reaches(p, wanted) for p in unlit)
+        is_moved = any(not self._mix.reaches(place, wanted) for place in unlit)
+        return bool(unlit) and reached and is_moved and follow.has_room()
+
+    def _elements_wanted(self, hand: Hand) -> Job | None:
+        """The image of a source that is lacking to mix a term, of a material with few samples first."""
+        unlit = (place for place in self._places() if place.live.lacks_only_light())
+        return _first_lacking(self._mix, unlit, self._images.light)
+
+    def _lacking(self, hand: Hand) -> Job | None:
+        """One job for each term whose image is not what is wanted and follows no operator towards it; cheap ones first,
+        those of the touched material before all others."""
+        candidates = list(self._bases_lacking(hand))
+        if not candidates:
+            return None
+        place, basis = min(candidates, key=lambda item: _cost(item[0], item[1], hand))
+        if basis is not None:
+            return Freeze.of(place, basis)
+        # where no operator fits, an image that shows older curves stands until the hand rests
+        return Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
+
+    def _bases_lacking(self, hand: Hand) -> Iterator[tuple[Place, EditBasis | None]]:
+        for place in self._places():
+            live = place.live
+            differing = set(live.differing())
+            basis = hand.basis_of(live, differing)
+            if not live.is_firm:
+                # its operator along a curve gives the image as well, and exactly
+                is_whole = basis is not None and basis.is_complete and self._fits(place, basis)
+                yield place, basis if is_whole else None
+            elif differing and not self._follows(place, basis):
+                first = next(name for name in live.target if name in differing)
+                wanted = basis or CurveBasis.of(live.term.curve(first))
+                yield place, wanted if self._fits(place, wanted) else None
+
+    def _fits(self, place: Place, basis: EditBasis) -> bool:
+        """Whether the memory may hold an operator; where not, the term is shaded."""
+        return frozen_bytes(place.material.num_samples, basis.num_columns) <= self._images.cache.budget_bytes
+
+    def _follows(self, place: Place, basis: EditBasis | None) -> bool:
+        """Whether the operator in use is the one to go on with: what differs is free in it, or some of it, and no other
+        is better."""
+        live = place.live
+        active, differing = live.ready.basis, set(live.differing())
+        if active is None or differing.isdisjoint(active.moves):
+            return False
+        if self._images.operator(place.material, live) is None:
+            return False
+        return differing <= set(active.moves) or basis is None or not differing <= set(basis.moves)
+
+    def _touched(self, hand: Hand) -> Job | None:
+        """The operator that a hand must wait for before it can move what it has touched.
+
+        A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, exact.
+        """
+        touched = hand.touched
+        if touched is None or touched.basis is None or not touched.place.material.num_samples:
+            return None
+        live, basis, active = touched.place.live, touched.basis, touched.place.live.ready.basis
+        if live.differing() or not self._fits(touched.place, basis):
+            return None
+        has_operator = active is not None and self._images.operator(touched.place.material, live) is not None
+        is_enough = active is not None and (active == basis or (active.is_complete and active.moves == basis.moves))
+        return None if has_operator and is_enough else Freeze.of(touched.place, basis)
+
+    def _refining(self) -> Job | None:
+        """What makes an image exact that is near it already."""
+        for place in self._places():
+            live = place.live
+            if live.ready.fidelity == Fidelity.NEAR and not live.differing():
+                return Shade.of(place, self._images.light, refines=True)
+            if live.ready.rounding > 0 and live.is_exact() and (settling := self._settling(place)) is not None:
+                return settling
+        return None
+
+    def _settling(self, place: Place) -> Job | None:
+        """What sums an image once that was summed from steps: from where they came, or by shading, where nothing is
+        there to sum it from and they have left too much."""
+        ready = place.live.ready
+        settled = self._mix.settle_job(place) if ready.basis is None else operator.settle_job(place)
+        if settled is None and operator.is_worn(ready):
+            return Shade.of(place, self._images.light, refines=True)
+        return settled
+
+    def _ahead(self, hand: Hand, look: Look) -> Job | None:
+        """What can be made ahead for what a hand is on, when nothing else is lacking."""
+        if hand.moves_light and self._follow.has_room():
+            rows = self._rows()
+            if rows is not None:
+                return rows
+        return self._elements_of_held(hand, look)
+
+    def _rows(self) -> Job | None:
+        """The next rows to be made, those of few samples first; None where there are all.
+
+        A term whose own curve moves would want other rows after every edit, and could not add them to anything.
+        """
+        able = (p for p in self._places() if p.live.is_firm or p.live.lacks_only_light())
+        return _first_lacking(self._follow, able, self._images.light)
+
+    def _elements_of_held(self, hand: Hand, look: Look) -> Job | None:
+        """An image of the light that a hand is on, of a material with few samples first; it can wait for all else.
+
+        What comes straight from it is taken off as soon as it moves; all that comes from it is what it is dimmed by.
+        None where that light is elsewhere by now, or where the memory has no room to spare.
+        """
+        images = self._images
+        held = hand.held_light(look)
+        if held is None or all(source.geometry != held for source in images.light.local):
+            return None
+        elements = list(vector_of(of_source(images.light, held)))  # what comes straight is first
+        places = list(self._places())
+        lacking = [(e, p) for e in elements for p in places if images.image_in(p.material, p.live, e) is None]
+        num_bytes = sum(shaded_bytes(place.material.num_samples) for _, place in lacking)
+        if not lacking or num_bytes > images.cache.budget_bytes - images.cache.used_bytes:
+            return None
+        element, place = min(lacking, key=lambda item: (elements.index(item[0]), item[1].material.num_samples))
+        return Shade.of(place, element, refines=True)
+
+    def _places(self) -> Iterator[Place]:
+        """All terms that this view sees anything of."""
+        return (Place(self._images, material, live) for material, live in self._images.terms())
+
+    def _unlit(self) -> list[Place]:
+        """Those that show nothing firm in the light that is wanted."""
+        return [place for place in self._places() if not place.live.is_firm]
+
+
+def _first_lacking(route: LightRoute, places: Iterable[Place], light: Light) -> Job | None:
+    """The first thing that a route lacks to bring places to a light, of a material with few samples first."""
+    lacking = [(place, jobs[0]) for place in places if (jobs := route.needs(place, light))]
+    return min(lacking, key=lambda item: item[0].material.num_samples)[1] if lacking else None
+
+
+def _cost(place: Place, basis: EditBasis | None, hand: Hand) -> tuple[bool, bool, int]:
+    """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
+    live, touched = place.live, hand.touched
+    is_flat = basis is None and contract(live.term, live.target, None).kinds.size == 0
+    is_other = touched is None or touched.place.material is not place.material
+    return is_other, not is_flat, place.material.num_samples

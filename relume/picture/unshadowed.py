@@ -1,0 +1,58 @@
+"""What would arrive at the samples of a material if nothing else were there: nothing hidden, nothing reflected."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.look import BAKED_ENVIRONMENT, LightGeometry
+from relume.operators.shade import shade
+from relume.picture.light import Light
+from relume.picture.material_image import MaterialImage
+from relume.picture.view_images import ViewImages
+
+F32 = NDArray[np.float32]
+
+
+class Unshadowed:
+    """Of a material whose samples face few ways, as those of a level ground do.
+
+    Attributes:
+        directions: unit, in which the camera sees its samples. (n, 3)
+    """
+
+    def __init__(self, images: ViewImages, material: MaterialImage) -> None:
+        self._images, self._transfer, self._material = images, images.transfer, material
+        self._points = images.view.points(material.index)
+        self.directions = images.view.directions_to(material.index)
+        _, first, of_normal = np.unique(self._points.normal, axis=0, return_index=True, return_inverse=True)
+        self._facing = self._points.rows(first)
+        self._of_normal = of_normal.ravel()
+
+    def image(self, light: Light, *, is_preview: bool) -> F32:
+        """The image of the material's first term, which is diffuse, under a light whose way is free.
+
+        Surfaces that shine are among what is not there.
+
+        Args:
+            is_preview: from a small map where another environment than the baked one must be weighed.
+        Returns:
+            (n, 3) float32
+        """
+        is_weighed = is_preview and light.environment != BAKED_ENVIRONMENT
+        image = self._from_triangles(light, is_preview=is_weighed)[self._of_normal]
+        for geometry, gain in light.local:
+            if geometry.kind != "mesh":
+                image += np.outer(self._unhidden(geometry), np.array(gain, np.float32) / np.float32(np.pi))
+        return np.asarray(image, np.float32)
+
+    def _unhidden(self, geometry: LightGeometry) -> F32:
+        transfer, view = self._transfer, self._images.view
+        key = transfer.key, "unhidden light", view.name, self._material.index, geometry
+        return self._images.cache.passing.keep(key, lambda: transfer.local.unhidden(geometry, self._points))
+
+    def _from_triangles(self, light: Light, *, is_preview: bool) -> F32:
+        """Of the environment, for each of the normals. (normals, 3) float32"""
+        term = self._material.terms[0]
+        sky = self._transfer.open_sky(light, self._facing, is_preview=is_preview)
+        return shade(term.term, term.target, *sky, lambda share: None, lambda: False).rows(self._facing.num_points)

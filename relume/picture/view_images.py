@@ -1,0 +1,164 @@
+"""The live terms of all materials in one view, and what the memory knows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.document import complete_term
+from relume.errors import ParameterError
+from relume.light.triangles import TriangleLights
+from relume.look import Look, TermLook, validate
+from relume.memory import Memory
+from relume.operators.edit_basis import CurveBasis, EditBasis
+from relume.operators.frozen import Frozen
+from relume.operators.nodes import linearise
+from relume.operators.shade import Shaded, shaded_bytes
+from relume.picture.light import Light, Solo, emission_of, gain_of, light_of
+from relume.picture.live_term import LiveTerm
+from relume.picture.material_image import MaterialImage
+from relume.picture.pointer import CurvePointer, ParameterPointer
+from relume.picture.transfer import Axis, Transfer
+from relume.project.receivers import Receivers
+
+F64 = NDArray[np.float64]
+
+_WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
+
+
+def documents_of(look: Look, material: str) -> Sequence[TermLook]:
+    """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
+    chosen = look.materials[material]
+    return (cast(TermLook, _WHITE),) if chosen.catcher else chosen.terms
+
+
+class ViewImages:
+    """Found by name, by pointer, and by what the cache knows them as.
+
+    Attributes:
+        default: the scene's own look. by_name: the materials in the scene's order.
+        light: what arrives at them. default_light: what does under the scene's own look.
+        gain: what multiplies the finished picture.
+    """
+
+    def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
+        self.transfer, self.cache = transfer, cache
+        self.view = transfer.views[view_name]
+        self.default = validate(transfer.default_look, transfer.default_look)
+        self.light = self.default_light = self._light_of(self.default)
+        self.by_name = {
+            name: MaterialImage(self.view, index, documents_of(self.default, name), self.light)
+            for index, name in enumerate(transfer.material_names)
+        }
+        self.gain = gain_of(self.default)
+
+    def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
+        """All that this view sees anything of."""
+        materials = self.by_name.values()
+        return ((material, image) for material in materials if material.num_samples for image in material.terms)
+
+    def image_bytes(self) -> int:
+        """Memory of one image of every term."""
+        return sum(shaded_bytes(material.num_samples) for material, _ in self.terms())
+
+    def set_look(self, look: Look, solo: Solo = None) -> None:
+        """A new target for every term, in the light of some sources alone where `solo` names them.
+
+        Raises what `Transfer.radiance_of` raises; then nothing has changed.
+        """
+        light = self._light_of(look, solo)
+        if light != self.light:
+            if light.environment.map is not None:
+                self.transfer.radiance_of(light.environment.map)
+            self.light = light
+            for material in self.by_name.values():
+                material.set_light(light)
+        for name, material in self.by_name.items():
+            material.set_documents(documents_of(look, name))
+        self.gain = gain_of(look, solo)
+
+    def shine_in(self, light: Light) -> None:
+        """Surfaces send out themselves what they do in this light."""
+        for name, material in self.by_name.items():
+            material.set_emission(emission_of(light, name), self._shines)
+
+    def arriving(self, material: MaterialImage, light: Light) -> tuple[TriangleLights, Receivers]:
+        """What arrives at the samples of a material in a light; shadows that the memory lacks are traced."""
+        return self.transfer.arriving(self.view, material.index, light, self.cache)
+
+    def is_default(self, material: MaterialImage, live: LiveTerm, light: Light) -> bool:
+        """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
+        name = self.transfer.material_names[material.index]
+        return light == self.default_light and live.document in documents_of(self.default, name)
+
+    def _light_of(self, look: Look, solo: Solo = None) -> Light:
+        has_bounces = Axis.BOUNCES in self.transfer.axes
+        return light_of(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
+
+    def _shines(self, material: int) -> NDArray[np.bool_]:
+        """Which samples of a material show a side that shines, where it does."""
+        return self.transfer.shines_at(self.view, material)
+
+    def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
+        """The material and the term of a pointer in the look as it is now.
+
+        Raises:
+            ParameterError: there is no such curve or parameter.
+        """
+        material = self.by_name.get(pointer.material)
+        if material is None or not pointer.term < len(material.terms):
+            raise ParameterError(str(pointer), pointer.material, "a material and term of this look")
+        term = material.terms[pointer.term]
+        declared = term.term.curves if isinstance(pointer, CurvePointer) else term.term.parameters
+        names = [item.name for item in declared]
+        if pointer.name not in names:
+            raise ParameterError(str(pointer), pointer.name, ", ".join(names))
+        return material, term
+
+    def basis(self, pointer: CurvePointer | ParameterPointer) -> EditBasis | None:
+        """What must be free for what a pointer means to be moved; None where light has no part in it.
+
+        Raises:
+            ParameterError: there is no such curve or parameter.
+        """
+        _, term = self.find(pointer)
+        if isinstance(pointer, ParameterPointer):
+            return linearise(term.document, pointer.name)
+        curve = term.term.curve(pointer.name)
+        return None if curve.outgoing else CurveBasis.of(curve)
+
+    def _place(self, material: MaterialImage) -> tuple[Hashable, ...]:
+        return self.transfer.key, self.view.name, material.index  # the store comes first: a memory asks whose it is
+
+    def key_of_operator(
+        self, material: MaterialImage, live: LiveTerm, basis: EditBasis, bands: Mapping[str, F64]
+    ) -> tuple[Hashable, ...]:
+        """Name of the operator of a material's live term along a basis in the memory.
+
+        Args:
+            bands: of the term's curves, (3, J) each; those that it moves are free.
+        """
+        return *self._place(material), live.key_of_operator(basis, bands)
+
+    def key_of_image(self, material: MaterialImage, live: LiveTerm, light: Light) -> tuple[Hashable, ...]:
+        """Name of the image of a material's live term, of its target in some light."""
+        return *self._place(material), live.key_of_image(light)
+
+    def image_in(self, material: MaterialImage, live: LiveTerm, light: Light) -> Shaded | None:
+        """The image of a material's live term, of its target in some light, where the memory has it."""
+        return self.cache.find(self.key_of_image(material, live, light), Shaded)
+
+    def is_at_hand(self, material: MaterialImage, live: LiveTerm) -> bool:
+        """Whether the image of a term's target need not be made: it is in the memory, or was kept with the store."""
+        key = self.key_of_image(material, live, self.light)
+        return self.cache.find(key, Shaded) is not None or self.transfer.has_image(key[1:])
+
+    def operator(self, material: MaterialImage, live: LiveTerm) -> Frozen | None:
+        """The operator that a term follows now, unless the memory has dropped it."""
+        ready = live.ready
+        if ready.basis is None or not live.is_firm:
+            return None
+        return self.cache.find(self.key_of_operator(material, live, ready.basis, ready.bands), Frozen)

@@ -1,0 +1,36 @@
+"""Points on surfaces, whoever owns them: a pixel's samples, a gather cell, a vertex or a texel."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+
+
+class Points(NamedTuple):
+    """n points on surfaces, as the kernels want them.
+
+    Attributes:
+        position: off the surface already, so that rays may begin there; metres. (n, 3) float32
+        normal: unit shading normals, on the side that the points are seen from. (n, 3) float32
+        tangent: unit, across the normals; n × t completes the shading frame. (n, 3) float32
+        seed: number of each point in what owns it; decides how patterns of rays are shifted there. (n,) uint32
+    """
+
+    position: F32
+    normal: F32
+    tangent: F32
+    seed: NDArray[np.uint32]
+
+    @property
+    def num_points(self) -> int:
+        """Their number n."""
+        return len(self.position)
+
+    def rows(self, chosen: slice | NDArray[np.integer] | NDArray[np.bool_]) -> Points:
+        """Choose some of the points, which keep their seeds."""
+        position, normal, tangent = (np.ascontiguousarray(array[chosen]) for array in self[:3])
+        return Points(position, normal, tangent, np.ascontiguousarray(self.seed[chosen]))

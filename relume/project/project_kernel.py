@@ -1,0 +1,400 @@
+"""The projector's kernels: the angles of the listed lights, their division into leaves, their sharing out.
+
+A leaf is a triangle over which every angle is linear: a light triangle, or a part of one near an angle's pole
+(appendix A, Ben-Artzi 2006). All triangles of a level are divided together and leaves are gathered in arrays and spent
+together, so that each loop is short enough for the compiler to keep in registers and long enough to fill them; arrays
+handed to a helper inside a hot loop would be counted as references there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from relume.brdf.angles import angles_into
+from relume.project.eight_bands import NUM as EIGHT
+from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight
+from relume.project.overlap import overlap_of
+
+_QUARTER = np.float32(0.25)
+_HALF = np.float32(0.5)
+_BELOW_ONE = np.float32(1 - 2**-24)
+# An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
+# away from the pole, where curves are wider, a share of the angle more.
+_TOLERANCE_BANDS = np.float32(0.04)
+_TOLERANCE_SHARE = np.float32(0.015)
+_QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
+_MAX_DEPTH = 6
+# corners of the four children among the nodes a, b, c, ab, bc, ca
+_CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
+_CULLED = np.float32(-1)
+_BATCH = 16  # lights divided together
+# Loops run to a multiple of this many triangles: the compiler's vector code rounds otherwise than its code for the
+# rest, and what a triangle gives must not depend on which others are left out.
+_LANES = 32
+_MOST_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
+_MOST_LEAVES = _BATCH * 4**_MAX_DEPTH
+_LEAVES_AT_ONCE = 64  # multiplied by the settings of a curve
+
+
+@nb.njit(nogil=True, cache=True)
+def _padded(num):  # type: ignore[no-untyped-def]
+    """Round a number of triangles up to whole vectors."""
+    return (num + _LANES - 1) // _LANES * _LANES
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _bend_of(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
+    """Compute how far an angle at the edges' midpoints is from linear between the corners, over what is tolerated."""
+    bend = max(abs(ab - _HALF * (a + b)), max(abs(bc - _HALF * (b + c)), abs(ca - _HALF * (c + a))))
+    return bend / (_TOLERANCE_BANDS + _TOLERANCE_SHARE * min(a, min(b, c)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
+    """Turn the nodes of the listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    for node in range(6):
+        for entry in range(begin, end):
+            m = np.uint64(light[entry])
+            x, y, z = nodes[0, node, m], nodes[1, node, m], nodes[2, node, m]
+            local[0, node, entry - begin] = t[0] * x + t[1] * y + t[2] * z
+            local[1, node, entry - begin] = bx * x + by * y + bz * z
+            local[2, node, entry - begin] = n[0] * x + n[1] * y + n[2] * z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
+    """Find the largest bend over all angles of each light, or `_CULLED` where a dormant curve is nothing all over it.
+
+    gamma: angles at the nodes, in bands. (C, 6, …). bend: (…), written.
+    """
+    num = _padded(num)
+    bend[:num] = 0
+    for k in range(gamma.shape[0]):
+        a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
+        limit = support[k]
+        for e in range(num):
+            of_curve = _bend_of(a[e], b[e], c[e], ab[e], bc[e], ca[e])
+            low = min(a[e], min(b[e], min(c[e], min(ab[e], min(bc[e], ca[e])))))
+            high = max(a[e], max(b[e], max(c[e], max(ab[e], max(bc[e], ca[e])))))
+            # a pole may lie inside by as much as the nodes are apart
+            is_nothing = low - (high - low) > limit or bend[e] < 0
+            bend[e] = _CULLED if is_nothing else max(bend[e], of_curve)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _append(gamma, which, count, nodes, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
+    """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves."""
+    for k in range(gamma.shape[0]):
+        for corner in range(3):
+            node = nodes[corner]
+            for n in range(count):
+                leaves[k, corner, num + n] = gamma[k, node, which[n]]
+    for n in range(count):
+        of_entry[num + n] = origin[which[n]]
+    shares[num : num + count] = share
+    return num + count
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _sort_out(gamma, bend, num_triangles, level, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
+    """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
+
+    Args:
+        origin: light that each triangle is a part of.
+        lists: scratch for the numbers of triangles; those that must be divided further are left in lists[2].
+    Returns:
+        The new number of leaves, and how many must be divided.
+    """
+    num_whole = num_quartered = num_divided = 0
+    is_last = level == _MAX_DEPTH - 1
+    for n in range(num_triangles):
+        lists[0, num_whole] = n
+        lists[1, num_quartered] = n
+        lists[2, num_divided] = n
+        is_whole, is_simple = bend[n] <= 1, bend[n] <= _QUARTERED_BEND or is_last
+        num_whole += (bend[n] >= 0) & is_whole
+        num_quartered += is_simple & (not is_whole)
+        num_divided += (not is_simple) & (not is_whole)
+    share = _QUARTER**level
+    num = _append(gamma, lists[0], num_whole, (0, 1, 2), origin, share, leaves, shares, of_entry, num)
+    for child in range(4):
+        nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
+        part = _QUARTER * share
+        num = _append(gamma, lists[1], num_quartered, nodes, origin, part, leaves, shares, of_entry, num)
+    return num, num_divided
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _children(local, gamma, origin, which, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
+    """Make the four children of the listed triangles: corners, and midpoints of edges. Returns their number."""
+    for child in range(4):
+        begin = child * count
+        for corner in range(3):
+            node = _CHILDREN[child, corner]
+            for n in range(count):
+                for axis in range(3):
+                    child_local[axis, corner, begin + n] = local[axis, node, which[n]]
+                for k in range(gamma.shape[0]):
+                    child_gamma[k, corner, begin + n] = gamma[k, node, which[n]]
+        for n in range(count):
+            child_origin[begin + n] = origin[which[n]]
+    for edge in range(3):
+        following = (edge + 1) % 3
+        for n in range(_padded(4 * count)):
+            x = child_local[0, edge, n] + child_local[0, following, n]
+            y = child_local[1, edge, n] + child_local[1, following, n]
+            z = child_local[2, edge, n] + child_local[2, following, n]
+            inverse = np.float32(1) / math.sqrt(x * x + y * y + z * z)
+            child_local[0, 3 + edge, n] = x * inverse
+            child_local[1, 3 + edge, n] = y * inverse
+            child_local[2, 3 + edge, n] = z * inverse
+    return 4 * count
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
+    """Compute the angles of all curves at nodes [first_node, 6) of the first triangles, in bands.
+
+    wo: times `Curve.axes`, one for each curve. (C, 3). gamma: (C, 6, …), written.
+    """
+    num = _padded(num)
+    for k in range(kinds.shape[0]):
+        for node in range(first_node, 6):
+            angles_into(
+                kinds[k], scale[k], local[0, node, :num], local[1, node, :num], local[2, node, :num],
+                wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node],
+            )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
+    """Find `overlap_of` leaves, angles held below the last band's end. corner: (3, n), overlap: (5, n), written."""
+    end = np.float32(num_bands) * _BELOW_ONE
+    for n in range(num):
+        low, middle, high, rise, fall = overlap_of(
+            min(corner[0, n], end), min(corner[1, n], end), min(corner[2, n], end)
+        )
+        overlap[0, n], overlap[1, n], overlap[2, n] = low, middle, high
+        overlap[3, n], overlap[4, n] = rise, fall
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _multiply_means(overlap, bands, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
+    """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
+
+    Args:
+        overlap: from `_overlaps`. bands: of the curve, padded. (≥ num_rows, ≥ num_bands + 8)
+        num_rows: 1 where the channels are alike, else 3.
+    """
+    last = num_bands - 1
+    for n in range(num):
+        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
+        red = green = blue = np.float32(0)
+        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
+            red += mean_of_eight(bands, 0, band, low, middle, high, rise, fall)
+            if num_rows == 3:
+                green += mean_of_eight(bands, 1, band, low, middle, high, rise, fall)
+                blue += mean_of_eight(bands, 2, band, low, middle, high, rise, fall)
+        weight[0, n] *= red
+        weight[1, n] *= green if num_rows == 3 else red
+        weight[2, n] *= blue if num_rows == 3 else red
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
+    """Share leaves out to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
+    last = num_bands - 1
+    for n in range(num):
+        first_band, last_band = min(np.int64(overlap[0, n]), last), min(np.int64(overlap[2, n]), last)
+        for band in range(first_band, last_band + 1, EIGHT):
+            deposit_eight(
+                out, band,
+                overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n],
+                weight[0, n], weight[1, n], weight[2, n],
+            )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _multiply_settings(overlap, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
+    """Multiply each leaf's product (n, rows) by the means of a dormant curve at all its settings over that leaf.
+
+    Args:
+        overlap: from `_overlaps`. settings: of the curve, padded. (≥ num_bands + 8, rows)
+        mean: scratch. (rows,)
+    """
+    last = num_bands - 1
+    for n in range(num):
+        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
+        mean[:] = 0
+        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
+            for row in range(0, mean.shape[0], EIGHT):
+                add_means_of_eight(mean, settings, row, band, low, middle, high, rise, fall)
+        for row in range(mean.shape[0]):
+            product[n, row] *= mean[row]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out):  # type: ignore[no-untyped-def]
+    """Add the leaves' weights (3, n) times their curves at all settings. out: (3, N)
+
+    A handful of leaves at a time, whose products stay in a core's first-level cache.
+    """
+    num_settings = out.shape[1]
+    offset = num_settings if mean.shape[0] > num_settings else 0
+    for begin in range(0, num, product.shape[0]):
+        count = min(product.shape[0], num - begin)
+        product[:count] = 1
+        for k in range(leaves.shape[0]):
+            if setting_of[k] >= 0:
+                _overlaps(leaves[k, :, begin : begin + count], num_bands[k], count, overlap)
+                _multiply_settings(overlap, settings[setting_of[k]], num_bands[k], count, mean, product)
+        for n in range(count):
+            for channel in range(3):
+                of_channel = weight[channel, begin + n]
+                for row in range(num_settings):
+                    out[channel, row] += of_channel * product[n, offset * channel + row]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
+    """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle. weight: (3, n), written."""
+    blue_row = shading.shape[0] - 1
+    for n in range(num):
+        entry = begin + of_entry[n]
+        m = np.uint64(light[entry])
+        weight[0, n] = irradiance[m, 0] * (shading[0, entry] * shares[n])
+        weight[1, n] = irradiance[m, 1] * (shading[blue_row // 2, entry] * shares[n])
+        weight[2, n] = irradiance[m, 2] * (shading[blue_row, entry] * shares[n])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _spend(  # type: ignore[no-untyped-def]
+    leaves, num, num_bands, bands, num_rows, settings, setting_of, active, overlap, weight, mean, product, out
+):  # fmt: skip
+    """Weigh the leaves by the dormant curves and share them out."""
+    for k in range(leaves.shape[0]):
+        if k != active and setting_of[k] < 0:
+            _overlaps(leaves[k], num_bands[k], num, overlap)
+            _multiply_means(overlap, bands[k], num_bands[k], num_rows[k], num, weight)
+    if active >= 0:
+        _overlaps(leaves[active], num_bands[active], num, overlap)
+        _deposit(overlap, num_bands[active], num, weight, out)
+    elif settings.shape[0] > 0:
+        _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out)
+    else:
+        for channel in range(3):
+            total = np.float32(0)
+            for n in range(num):
+                total += weight[channel, n]
+            out[channel, 0] += total
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _divide(  # type: ignore[no-untyped-def]
+    kinds, scale, wo, support, local, gamma, origin, count, parts, lists, bend, leaves, shares, of_entry, num
+):  # fmt: skip
+    """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
+
+    Args:
+        parts: local, gamma and origin of two generations of divided triangles, written in turns.
+    Returns:
+        The new number of leaves.
+    """
+    part_local, part_gamma, part_origin = parts
+    for level in range(1, _MAX_DEPTH):
+        to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
+        num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
+        _angles(kinds, scale, wo, to_local, 3, num_parts, to_gamma)
+        _bends(to_gamma, support, num_parts, bend)
+        num, count = _sort_out(to_gamma, bend, num_parts, level, to_origin, leaves, shares, of_entry, num, lists)
+        local, gamma, origin = to_local, to_gamma, to_origin
+    return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
+    """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends."""
+    room = _padded(num_lights)
+    widest = max(room, _MOST_DIVIDED)
+    local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
+    parts = (
+        np.zeros((2, 3, 6, _MOST_DIVIDED), np.float32),
+        np.zeros((2, num_curves, 6, _MOST_DIVIDED), np.float32),
+        np.empty((2, _MOST_DIVIDED), np.int64),
+    )
+    lists, bend = np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
+    return local, gamma, parts, np.arange(widest), lists, bend, np.empty(num_lights, np.int64)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
+    """Make room for leaves: corners, shares, entries, overlaps, weights, and means and products of settings."""
+    leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
+    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
+    mean, product = np.empty(num_settings, np.float32), np.empty((_LEAVES_AT_ONCE, num_settings), np.float32)
+    return leaves, shares, np.empty(capacity, np.int64), overlap, weight, mean, product
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def project_points(  # type: ignore[no-untyped-def]
+    normal, tangent, first, light, shading, local_wo, nodes, irradiance,
+    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, start, stop, out,
+):  # fmt: skip
+    """Project the listed lights of points [start, stop).
+
+    Args:
+        normal, tangent: shading frames of all points. (n, 3) float32. start, stop: points to be projected.
+        first, light, local_wo: from `list_lights`.
+        shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
+        nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
+        kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active: see `Contraction`.
+        out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
+            others.
+    """
+    num_curves, num_lights = kinds.shape[0], nodes.shape[2]
+    scale = np.empty(num_curves, np.float32)
+    for k in range(num_curves):
+        scale[k] = num_bands[k] / (np.pi / 2)
+    local, gamma, parts, origin, lists, bend, divided = _scratch_of_lights(num_curves, num_lights)
+    capacity = 4 * num_lights + _MOST_LEAVES
+    leaves, shares, of_entry, overlap, weight, mean, product = _scratch_of_leaves(
+        num_curves, capacity, settings.shape[2]
+    )  # fmt: skip
+    scaled_wo = np.empty((num_curves, 3), np.float32)
+    for p in range(start, stop):
+        row = p - start
+        begin, num_entries = first[row], first[row + 1] - first[row]
+        if num_entries == 0:
+            continue
+        for k in range(num_curves):
+            for axis in range(3):
+                scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
+        if num_curves > 0:
+            _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
+        _angles(kinds, scale, scaled_wo, local, 0, num_entries, gamma)
+        _bends(gamma, support, num_entries, bend)
+        num, num_divided = _sort_out(gamma, bend, num_entries, 0, origin, leaves, shares, of_entry, 0, lists)
+        divided[:num_divided] = lists[2, :num_divided]
+        for batch in range(0, num_divided, _BATCH):
+            if num + _MOST_LEAVES > capacity:
+                _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight)
+                _spend(
+                    leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+                    overlap, weight, mean, product, out[row],
+                )  # fmt: skip
+                num = 0
+            count = min(_BATCH, num_divided - batch)
+            lists[2, :count] = divided[batch : batch + count]
+            num = _divide(
+                kinds, scale, scaled_wo, support, local, gamma, origin, count, parts, lists, bend,
+                leaves, shares, of_entry, num,
+            )  # fmt: skip
+        _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight)
+        _spend(
+            leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+            overlap, weight, mean, product, out[row],
+        )  # fmt: skip

@@ -1,0 +1,220 @@
+"""The kernels of `relume.project.ray_projector`: rays listed with their light, weighed, put into bands.
+
+A ray is a direction, where a light triangle has an extent: it falls into one band of every curve.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from relume.brdf.angles import angles_into
+from relume.light.gather_rays import local_ray, shift_of, small_shifts_of, weight_of
+from relume.light.local import light_sample
+from relume.trace.cell_tree import NO_CELL
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _in_frame(n, t, o):  # type: ignore[no-untyped-def]
+    """Find the bitangent n × t of a shading frame, and direction o in the frame."""
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
+    oy = bx * o[0] + by * o[1] + bz * o[2]
+    oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    return (bx, by, bz), (ox, oy, oz)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_gathered(  # type: ignore[no-untyped-def]
+    points, wo, links, pattern, radiance, start, stop, first, wi, out, irradiance
+):
+    """List the rays of points [start, stop) that hit a cell, in the points' local frames.
+
+    Args:
+        points: `Points`. wo: towards the viewer. (n, 3) float32
+        links: cell that each ray hits. (n, rays) uint16. pattern: the rays' directions.
+        radiance: of cells. (NO_CELL + 1, 3) float32
+        start, stop: the points.
+        first: written, where the rays of each point begin. (points + 1,) int64
+        wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
+        irradiance: written, w · L of each ray. (3, K) float32
+    Returns:
+        K, the number of rays.
+    """
+    _, normal, tangent, seed = points
+    end = 0
+    for p in range(start, stop):
+        first[p - start] = end
+        _, (ox, oy, oz) = _in_frame(normal[p], tangent[p], wo[p])
+        shifts = small_shifts_of(pattern, seed[p])
+        for ray in range(links.shape[1]):
+            cell = links[p, ray]
+            if cell == NO_CELL:
+                continue
+            x, y, z = local_ray(pattern, ray, shifts, ox, oy, oz)
+            weight = weight_of(pattern, x, y, z, ox, oy, oz)
+            wi[0, end], wi[1, end], wi[2, end] = x, y, z
+            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            for channel in range(3):
+                irradiance[channel, end] = weight * radiance[cell, channel]
+            end += 1
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_local(  # type: ignore[no-untyped-def]
+    points, wo, light, pattern, gain, visible, start, stop, first, wi, out, irradiance
+):
+    """List the samples of a local light that points [start, stop) see.
+
+    Args:
+        points: `Points`. wo: towards the viewer. (n, 3) float32
+        light, pattern, gain, visible: as in `LocalRays`.
+        start, stop: the points.
+        first, wi, out, irradiance: written, as by `list_gathered`; the irradiance of a ray is w · cos θi · gain.
+    Returns:
+        K, the number of rays.
+    """
+    position, normal, tangent, seed = points
+    end = 0
+    for p in range(start, stop):
+        first[p - start] = end
+        n, t = normal[p], tangent[p]
+        (bx, by, bz), (ox, oy, oz) = _in_frame(n, t, wo[p])
+        shift_u, shift_v = shift_of(pattern, seed[p])
+        for sample in range(pattern.uv.shape[0]):
+            if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
+                continue
+            dx, dy, dz, _, weight, _, _, _ = light_sample(
+                light, pattern, sample, shift_u, shift_v, position[p, 0], position[p, 1], position[p, 2]
+            )
+            z = n[0] * dx + n[1] * dy + n[2] * dz
+            weight *= z
+            if weight <= 0:
+                continue
+            wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
+            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            for channel in range(3):
+                irradiance[channel, end] = weight * gain[channel]
+            end += 1
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
+    """Multiply the weights of rays by a dormant curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
+    for channel in range(3):
+        row = channel if num_rows == 3 else 0
+        for n in range(num):
+            weight[channel, n] *= bands[row, band[n]]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _spread(settings, setting_of, band, weight, num, out):  # type: ignore[no-untyped-def]
+    """Add rays to all settings of the curves that have several. band: of each curve and ray. out: (3, ≥ N)"""
+    num_padded = out.shape[1]
+    blue = settings.shape[2] // num_padded - 1
+    product = np.empty(settings.shape[2], np.float32)
+    for n in range(num):
+        product[:] = 1
+        for k in range(setting_of.shape[0]):
+            if setting_of[k] >= 0:
+                product *= settings[setting_of[k], band[k, n]]
+        for channel in range(3):
+            begin = (blue * channel // 2) * num_padded
+            out[channel] += weight[channel, n] * product[begin : begin + num_padded]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _contract(  # type: ignore[no-untyped-def]
+    begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
+    gamma, band, weight,
+):  # fmt: skip
+    """Weigh rays [begin, end) of a point by all its curves but the free one and those with several settings.
+
+    Writes band (curves, ≥ rays) and weight (3, ≥ rays).
+    """
+    num, blue_row = end - begin, shading.shape[0] - 1
+    for channel in range(3):
+        weight[channel, :num] = irradiance[channel, begin:end] * shading[blue_row * channel // 2, begin:end]
+    for k in range(kinds.shape[0]):
+        scale = np.float32(num_bands[k] / (math.pi / 2))
+        angles_into(
+            kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
+            axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
+        )  # fmt: skip
+        for n in range(num):
+            band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
+        if k != active and setting_of[k] < 0:
+            _multiply(bands[k], num_rows[k], band[k], weight, num)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def weigh_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, out):  # type: ignore[no-untyped-def]
+    """Weigh what each listed ray brings to its point, all curves contracted.
+
+    Args:
+        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of: as in `project_rays`.
+        out: written. (3, K) float32
+    """
+    most = np.diff(first).max()
+    gamma, band = np.empty(most, np.float32), np.empty((kinds.shape[0], most), np.int64)
+    for p in range(first.shape[0] - 1):
+        if first[p + 1] > first[p]:
+            _contract(
+                first[p], first[p + 1], wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows,
+                setting_of, -1, gamma, band, out[:, first[p] : first[p + 1]],
+            )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
+    """Sum listed rays where no curve is listed: all that is left of a term is its quotient.
+
+    Args:
+        first, irradiance, shading: as in `project_rays`. out: added to. (points, 3, ≥ 1) float32
+    """
+    blue_row = shading.shape[0] - 1
+    for p in range(out.shape[0]):
+        for n in range(first[p], first[p + 1]):
+            for channel in range(3):
+                out[p, channel, 0] += irradiance[channel, n] * shading[blue_row * channel // 2, n]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def project_rays(  # type: ignore[no-untyped-def]
+    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
+):
+    """Add listed rays to their points.
+
+    Args:
+        first, wi, wo, irradiance: from `list_gathered` or `list_local`; wo is their `out`.
+        shading: quotients, one row for all channels, or three. (1 or 3, K) float32
+        kinds, axes, num_bands, bands, num_rows, settings, setting_of, active: see `Contraction`.
+        out: added to: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
+    """
+    most = np.diff(first[: out.shape[0] + 1]).max()
+    gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
+    band = np.zeros((kinds.shape[0], most), np.int64)
+    for p in range(out.shape[0]):
+        begin, end = first[p], first[p + 1]
+        num = end - begin
+        if num == 0:
+            continue
+        _contract(
+            begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
+            gamma, band, weight,
+        )  # fmt: skip
+        if active >= 0:
+            for n in range(num):
+                for channel in range(3):
+                    out[p, channel, band[active, n]] += weight[channel, n]
+        elif settings.shape[0] > 0:
+            _spread(settings, setting_of, band, weight, num, out[p])
+        else:
+            for channel in range(3):
+                out[p, channel, 0] += weight[channel, :num].sum()

@@ -1,0 +1,142 @@
+"""Points that light arrives at, and the rays along which it comes from other surfaces and from local lights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.gather_rays import Pattern
+from relume.light.local import LocalLight
+from relume.points import Points
+from relume.project.ray_kernel import list_gathered, list_local
+
+F32 = NDArray[np.float32]
+
+
+class Listed(NamedTuple):
+    """Memory that rays of a range of points are listed in; see `relume.project.ray_kernel`."""
+
+    first: NDArray[np.int64]
+    wi: F32
+    wo: F32
+    irradiance: F32
+
+
+class Rays(Protocol):
+    """Rays of n points, at most the same number for each."""
+
+    @property
+    def rays_a_point(self) -> int:
+        """The most rays that any point has."""
+        ...
+
+    def times(self, factor: F32) -> Rays:
+        """Multiply their light in every channel. factor: (3,) float32"""
+        ...
+
+    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
+        """List the rays of points [start, stop) that bring light; returns their number.
+
+        Args:
+            listed: memory for them, written. receivers: all points that the rays belong to.
+            start, stop: those whose rays are listed.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class GatherRays:
+    """Rays that bring the light of cells.
+
+    Attributes:
+        links: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
+        radiance: of cells, from `CellLight.radiance`. (NO_CELL + 1, 3) float32
+        sharing: weights of the points for each other, from `relume.views.sharing`, (n, n) sparse; None: each alone.
+    """
+
+    links: NDArray[np.uint16]
+    pattern: Pattern
+    radiance: F32
+    sharing: Any = None
+
+    @property
+    def rays_a_point(self) -> int:
+        """The most rays that any point has."""
+        return int(self.links.shape[1])
+
+    def times(self, factor: F32) -> GatherRays:
+        """Multiply their light in every channel; see `Rays`."""
+        return replace(self, radiance=self.radiance * factor)
+
+    def alone(self, chosen: NDArray[np.integer]) -> GatherRays:
+        """Choose those of some points, which do not share them."""
+        return replace(self, links=self.links[chosen], sharing=None)
+
+    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
+        arriving = self.links, self.pattern, self.radiance
+        return int(list_gathered(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+
+
+@dataclass(frozen=True)
+class LocalRays:
+    """Rays that bring a local light.
+
+    Attributes:
+        light: of unit emission. pattern: its samples, shifted by the points' seeds.
+        gain: times the light's unit emission. (3,) float32
+        visible: sample k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
+    """
+
+    light: LocalLight
+    pattern: Pattern
+    gain: F32
+    visible: NDArray[np.uint8]
+
+    @property
+    def rays_a_point(self) -> int:
+        """The most rays that any point has."""
+        return len(self.pattern.uv)
+
+    def times(self, factor: F32) -> LocalRays:
+        """Multiply their light in every channel; see `Rays`."""
+        return replace(self, gain=self.gain * factor)
+
+    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
+        arriving = self.light, self.pattern, self.gain, self.visible
+        return int(list_local(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+
+
+@dataclass(frozen=True)
+class Receivers:
+    """Points that light arrives at, each seen from one direction.
+
+    Attributes:
+        points: where it arrives. wo: towards the viewer, unit, world space. (n, 3) float32
+        visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon. (n, bytes) uint8
+        rays: light that arrives along rays; none where only the environment's triangles are meant.
+    """
+
+    points: Points
+    wo: F32
+    visible: NDArray[np.uint8]
+    rays: Sequence[Rays] = ()
+
+    @property
+    def normal(self) -> F32:
+        """The points' normals. (n, 3) float32"""
+        return self.points.normal
+
+    @property
+    def tangent(self) -> F32:
+        """The points' tangents. (n, 3) float32"""
+        return self.points.tangent
+
+    def places(self, chosen: NDArray[np.integer]) -> Receivers:
+        """Choose some of them, without their light."""
+        return Receivers(self.points.rows(chosen), self.wo[chosen], np.empty((len(chosen), 0), np.uint8))

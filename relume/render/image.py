@@ -1,0 +1,72 @@
+"""One picture without a session: batch renders, `relume render`, thumbnails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import CancelledError, PlanError
+from relume.look import Look
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
+
+
+def render_image(
+    transfer: Transfer,
+    view_name: str,
+    look: Look,
+    size: tuple[int, int] | None = None,
+    progress: Callable[[float], object] = lambda share: None,
+    cancelled: Callable[[], bool] = lambda: False,
+    *,
+    for_display: bool = False,
+) -> NDArray[np.float32]:
+    """Render a look exactly; what is made for it is kept in passing in the memory that the bake was opened with.
+
+    Args:
+        transfer: an opened bake. view_name: one of its views.
+        size: width and height; only the baked one is possible, None means it.
+        progress: called with about the share done. cancelled: asked now and then.
+        for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
+    Returns:
+        Linear radiance; where the look's background is transparent, coverage as a fourth channel, which the others
+        are multiplied by already. (height, width, 3 or 4) float32
+    Raises:
+        PlanError: another size than the baked one.
+        CancelledError: `cancelled` said so.
+    """
+    view = transfer.views[view_name]
+    if size is not None and tuple(size) != (view.width, view.height):
+        raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
+    picture = Picture(transfer, view_name, transfer.memory.passing)
+    picture.set_look(look)
+    num_terms, made = sum(len(material.terms) for material in look.materials.values()), 0
+    while True:
+        if cancelled():
+            raise CancelledError("the picture was cancelled")
+        exact = picture.advance(None).exact
+        if picture.next_job() is None and exact:
+            progress(1.0)
+            image, alpha = picture.image(), picture.alpha(for_display=for_display)
+            return image if alpha is None else np.dstack([image, alpha])
+
+        def share_of_all(share: float, made: int = made) -> None:
+            progress(min(made + share, num_terms) / max(1, num_terms))  # seldom is more made than an image a term
+
+        picture.freeze(share_of_all, cancelled)
+        made += 1
+
+
+def render_small(transfer: Transfer, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
+    """Render a look at no more pixels than a small picture needs: whole steps of the baked ones are left out.
+
+    Args:
+        transfer: an opened bake. view_name: one of its views.
+        width: of the small picture.
+    Returns:
+        Linear radiance, at least `width` wide where the bake is. (h, w, 3) float32
+    """
+    step = transfer.views[view_name].width // width
+    return render_image(transfer if step < 2 else transfer.thinned(view_name, step), view_name, look)

@@ -1,0 +1,78 @@
+"""What objects and processes hold in memory, and how memory that nobody holds goes back to the system."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import mmap
+import os
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_OPEN_MODULES = ("builtins", "collections", "functools")
+_OPEN_PACKAGES = ("relume", "scipy")
+_COUNTS_ITSELF = "relume.memory"
+
+
+def held_bytes(*roots: object) -> int:
+    """Bytes of all NumPy arrays that can be reached from objects of relume's own, each counted once.
+
+    Other libraries' objects are not looked into but for SciPy's matrices, nor is the budgeted memory, which tells by
+    itself what it holds; files mapped into memory are the system's and count nothing.
+    """
+    seen: dict[int, object] = {}  # keeps what it has met: an id is one's own only while one lives
+    todo, total = list(roots), 0
+    while todo:
+        item = todo.pop()
+        if id(item) in seen or isinstance(item, type):
+            continue
+        seen[id(item)] = item
+        if isinstance(item, np.ndarray):
+            if isinstance(item.base, np.ndarray):
+                todo.append(item.base)
+            else:
+                total += _own_bytes(item)
+        elif isinstance(item, FunctionType):
+            todo.extend(item.__closure__ or ())
+        elif _is_open(type(item).__module__):
+            todo.extend(gc.get_referents(item))
+    return total
+
+
+def _is_open(module: str) -> bool:
+    return module in _OPEN_MODULES or (module.partition(".")[0] in _OPEN_PACKAGES and module != _COUNTS_ITSELF)
+
+
+def _own_bytes(array: NDArray[Any]) -> int:
+    return 0 if isinstance(array.base, mmap.mmap) else array.nbytes
+
+
+def resident_bytes(pid: int) -> int:
+    """Resident memory of a process; 0 where it has ended, or the system does not tell."""
+    try:
+        num_pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except (OSError, IndexError):
+        return 0
+    return num_pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def give_back() -> None:
+    """Free what only reference cycles hold, and return free memory to the system; some tenths of a second."""
+    gc.collect()
+    if _malloc_trim is not None:
+        _malloc_trim(0)
+
+
+def _find_malloc_trim() -> Any:
+    """glibc keeps what is freed for the next to ask, all the more the more threads there are; others do not."""
+    try:
+        return ctypes.CDLL(None).malloc_trim
+    except (AttributeError, OSError, TypeError):
+        return None
+
+
+_malloc_trim = _find_malloc_trim()

@@ -1,0 +1,84 @@
+"""From term images to the radiance of view samples: colours, textures, outgoing curves multiply finished terms."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
+    """Add planes [start, stop) of one term, a plane being a channel of a tile, to radiance (3, samples of the view).
+
+    first: the material's first sample in the view.
+    """
+    samples = image.shape[2]
+    num = texture.shape[0]
+    for plane in range(start, stop):
+        tile, channel = plane // 3, plane % 3
+        begin = tile * samples
+        c = color[channel]
+        for s in range(min(samples, num - begin)):
+            row = begin + s
+            value = c * image[tile, channel, s]
+            if has_texture:
+                value *= texture[row, channel]
+            if has_outgoing:
+                value *= outgoing[channel, row]
+            if replace:
+                radiance[channel, first + row] = value
+            else:
+                radiance[channel, first + row] += value
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_even(arriving, factor, start, stop, image):  # type: ignore[no-untyped-def]
+    """Add samples [start, stop) in all channels."""
+    samples = image.shape[2]
+    for tile in range(start // samples, (stop - 1) // samples + 1):
+        first = tile * samples
+        begin, end = max(start, first), min(stop, first + samples)
+        for channel in range(3):
+            for s in range(begin, end):
+                image[tile, channel, s - first] += factor[channel] * arriving[s]
+
+
+def add_even(arriving: F32, factor: NDArray[np.floating], image: F32) -> None:
+    """Add light that a term scatters alike wherever it comes from and goes to.
+
+    Args:
+        arriving: E of each sample, of a light of unit emission. (n,) float32
+        factor: what the term makes of it, per channel. (3,). image: added to. (tiles, 3, samples) float32
+    """
+    args = (np.ascontiguousarray(arriving, np.float32), np.asarray(factor, np.float32).reshape(3))
+    for_shares(lambda start, stop: _add_even(*args, start, stop, image), len(arriving))
+
+
+def add_term(
+    image: F32,
+    color: F32,
+    texture: F32,
+    outgoing: F32 | None,
+    has_texture: bool,
+    first: int,
+    replace: bool,
+    radiance: F32,
+) -> None:
+    """Add one term of a material to the view's radiance, or begin with it.
+
+    Args:
+        image: Σ_j c_j T_j. (tiles, 3, samples) float32
+        color: (3,) float32. texture: per sample, used where `has_texture`. (n, 3) float32
+        outgoing: product of the curves of the outgoing angle. (3, n) float32, None for 1
+        has_texture: whether the texture multiplies the term.
+        first: the material's first sample in the view. replace: overwrite instead of adding.
+        radiance: (3, samples of the view) float32, written.
+    """
+    factor = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
+    args = (image, color, texture, factor, has_texture, outgoing is not None, first, replace)
+    for_shares(lambda start, stop: _add(*args, start, stop, radiance), 3 * len(image))

@@ -1,0 +1,76 @@
+"""Cameras, view samples and their gather rays as a store keeps them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.errors import SceneError, StoreError
+from relume.light.gather_rays import Pattern, make_pattern
+from relume.points import Points
+from relume.project.receivers import GatherRays
+from relume.scene.checks import check_camera
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+
+
+def read_camera(store: StoreReader, k: int) -> Camera:
+    """Read the camera of the k-th view. Raises StoreError where there is no usable one."""
+    try:
+        found = store.attributes["views"][k]
+        to_world = np.array(found["to_world"], np.float64).reshape(4, 4)
+        camera = Camera(str(found["name"]), to_world, float(found["yfov"]))
+        check_camera(camera)
+    except (KeyError, TypeError, ValueError, SceneError) as error:
+        raise StoreError(f"view {k} of the store has no camera ({error}); delete the bake, bake again") from error
+    return camera
+
+
+def pattern_of_material(store: StoreReader, k: int, material: int) -> Pattern:
+    """Make the pattern of the gather rays of a material's samples in the k-th view of a store again."""
+    num_cosine, num_glossy = store.attributes["gather_rays"][material]
+    return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
+
+
+def read_gather_rays(store: StoreReader, k: int, material: int, start: int, stop: int, radiance: F32) -> GatherRays:
+    """Read the gather rays of samples of one material.
+
+    Args:
+        store: an open store. k: number of the view. material: index of the material.
+        start, stop: rows of the view's arrays. radiance: of cells. (NO_CELL + 1, 3) float32
+    """
+    links = store.read(f"views/{k}/links", start, stop)
+    return GatherRays(links, pattern_of_material(store, k, material), radiance)
+
+
+def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.uint32]:
+    """Read the seeds of samples: those that their gather rays were traced with, else their rows.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+    Returns:
+        (stop - start,) uint32
+    """
+    if "gather_rays" in store.attributes:
+        return np.asarray(store.read(f"views/{k}/number", start, stop), np.uint32)
+    return np.arange(start, stop, dtype=np.uint32)
+
+
+def read_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray[np.uint32]) -> Points:
+    """Read samples of a view on surfaces as points.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+        seed: of these points. (stop - start,) uint32
+    """
+    names = "position", "normal", "tangent"
+    position, normal, tangent = (store.read(f"views/{k}/{name}", start, stop) for name in names)
+    return Points(position, normal, tangent, seed)
+
+
+def towards_eye(camera: Camera, position: F32) -> F32:
+    """Find the unit directions from places (n, 3) to a camera: the wo of what it sees there. (n, 3) float32"""
+    towards = camera.to_world[:3, 3].astype(np.float32) - position
+    return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float32)

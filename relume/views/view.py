@@ -1,0 +1,218 @@
+"""A baked view opened for rendering: its samples by material, and how they make pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.errors import ChunkDamagedError
+from relume.memory import Memory
+from relume.points import Points
+from relume.project.receivers import GatherRays, LocalRays, Receivers
+from relume.scene.model import Camera
+from relume.trace.view_samples import BACKGROUND
+from relume.views.sharing import sharing
+from relume.views.store_io import read_camera, read_gather_rays, read_points, read_seeds, towards_eye
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+
+TILE_PIXELS = 64
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's samples, sorted by material.
+
+    Attributes:
+        bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
+        key: of the bake in `memory`.
+        first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int64
+        order: (n,) int32. weight: share of its pixel, in that order. (n,) float32
+        cos_theta_o: of the samples on surfaces. (surface samples,) float64
+    """
+
+    camera: Camera
+    index: int
+    width: int
+    height: int
+    store: StoreReader = field(repr=False)
+    memory: Memory = field(repr=False)
+    key: str
+    bounds: NDArray[np.int64]
+    pixel: NDArray[np.uint32]
+    first: NDArray[np.int64]
+    order: NDArray[np.int32]
+    weight: F32
+    textures: dict[str, F32]
+    cos_theta_o: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """The name of its camera."""
+        return self.camera.name
+
+    @property
+    def num_view_samples(self) -> int:
+        """The number of samples, background included."""
+        return len(self.pixel)
+
+    @property
+    def num_surface_samples(self) -> int:
+        """The number of samples on surfaces, which come first."""
+        return int(self.bounds[-1])
+
+    def rows(self, material: int) -> slice:
+        """Find the samples of a material."""
+        return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
+
+    def points(self, material: int) -> Points:
+        """Read a material's samples from the store as points."""
+        return self._points(self.rows(material))
+
+    def all_points(self) -> Points:
+        """Read all samples on surfaces from the store as points, material after material."""
+        return self._points(slice(0, self.num_surface_samples))
+
+    def _points(self, rows: slice) -> Points:
+        seed = read_seeds(self.store, self.index, rows.start, rows.stop)
+        return read_points(self.store, self.index, rows.start, rows.stop, seed)
+
+    def receivers(
+        self,
+        material: int,
+        reflected: F32 | None = None,
+        local: Sequence[LocalRays] = (),
+        *,
+        is_lit: bool = True,
+    ) -> Receivers:
+        """Read a material's samples from the store as points that light arrives at.
+
+        Args:
+            material: its index.
+            reflected: radiance of gather cells, whose light arrives too; from `Transfer.reflected_in`.
+            local: of lights that the samples see.
+            is_lit: whether light comes from the environment itself; else no bits are read.
+        """
+        rows = self.rows(material)
+        if is_lit:
+            visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
+        else:
+            visible = np.empty((rows.stop - rows.start, 0), np.uint8)
+        points = self.points(material)
+        gathered = () if reflected is None else (self.gather_rays(material, reflected),)
+        return Receivers(points, towards_eye(self.camera, points.position), visible, (*gathered, *local))
+
+    def gather_rays(self, material: int, reflected: F32) -> GatherRays:
+        """Read from the store the rays of a material's samples that bring the radiance of gather cells."""
+        rows = self.rows(material)
+        alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
+        return replace(alone, sharing=self._sharing(material))
+
+    def _sharing(self, material: int) -> Any:
+        def found() -> Any:
+            points = self.points(material)
+            return sharing(self.pixel[self.rows(material)], self.width, points.position, points.normal)
+
+        return self.memory.keep((self.key, "sharing", self.name, material), found)
+
+    def background(self) -> F32:
+        """Read the radiance of the samples after the surfaces. (n, 3) float32"""
+        return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
+
+    def background_directions(self) -> NDArray[np.float64]:
+        """Read the unit directions in which the samples after the surfaces look. (n, 3)"""
+        return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
+
+    def directions_to(self, material: int) -> NDArray[np.float64]:
+        """Find the unit directions in which the camera sees a material's samples, from the store. (n, 3)"""
+        rows = self.rows(material)
+        towards = self.store.read(f"views/{self.index}/position", rows.start, rows.stop) - self.camera.to_world[:3, 3]
+        return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float64)
+
+    def surface_at(self, sample: int) -> tuple[F32, F32]:
+        """Read position and unit normal of a sample on a surface, world space. (3,) float32 each"""
+        position, normal = (
+            self.store.read(f"views/{self.index}/{name}", sample, sample + 1)[0] for name in ("position", "normal")
+        )
+        return position, normal
+
+    def material_ids(self) -> NDArray[np.uint16]:
+        """Find what material covers most of each pixel, 65535 for the background. (height, width) uint16"""
+        material = np.full(self.num_view_samples, BACKGROUND, np.uint16)
+        for index in range(len(self.bounds) - 1):
+            material[self.rows(index)] = index
+        ids = np.full(self.width * self.height, BACKGROUND, np.uint16)
+        by_weight = np.argsort(self.weight, kind="stable")  # the heaviest of a pixel is written last
+        pixel_of = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        ids[pixel_of[by_weight]] = material[self.order[by_weight]]
+        return ids.reshape(self.height, self.width)
+
+    @cached_property
+    def all_tiles(self) -> list[Tile]:
+        """The tiles that cover the picture: x, y, width, height in pixels."""
+        return [
+            (x, y, min(TILE_PIXELS, self.width - x), min(TILE_PIXELS, self.height - y))
+            for y in range(0, self.height, TILE_PIXELS)
+            for x in range(0, self.width, TILE_PIXELS)
+        ]
+
+    @cached_property
+    def tiles_of_material(self) -> list[list[Tile]]:
+        """The tiles with at least one pixel of each material."""
+        columns = -(-self.width // TILE_PIXELS)
+        touched = []
+        for index in range(len(self.bounds) - 1):
+            pixel = self.pixel[self.rows(index)]
+            codes = pixel // self.width // TILE_PIXELS * columns + pixel % self.width // TILE_PIXELS
+            touched.append([self.all_tiles[code] for code in np.unique(codes)])
+        return touched
+
+
+def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
+    """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
+
+    Args:
+        store: of the bake. index: of the view in it.
+        memory: where what neighbouring samples share is kept. key: of the bake in it.
+    Raises:
+        ChunkDamagedError: arrays of the store do not fit each other.
+    """
+    width, height = store.attributes["size"]
+    camera = read_camera(store, index)
+    prefix = f"views/{index}"
+    pixel = store.read(f"{prefix}/pixel")
+    material = store.read(f"{prefix}/material")
+    weight = store.read(f"{prefix}/weight")
+    num_materials = len(store.attributes["materials"])
+    surface = int(np.searchsorted(material, BACKGROUND))
+    if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(np.diff(material.astype(np.int64)) < 0):
+        raise ChunkDamagedError(prefix, "its samples do not fit its size")
+    if surface and int(material[surface - 1]) >= num_materials:
+        raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
+    order = np.argsort(pixel, kind="stable").astype(np.int32)
+    towards = camera.to_world[:3, 3] - store.read(f"{prefix}/position", 0, surface)
+    normal = store.read(f"{prefix}/normal", 0, surface)
+    cosine = np.einsum("nc,nc->n", normal, towards) / np.linalg.norm(towards, axis=1)
+    return View(
+        camera=camera,
+        index=index,
+        width=width,
+        height=height,
+        store=store,
+        memory=memory,
+        key=key,
+        bounds=np.searchsorted(material[:surface], np.arange(num_materials + 1)).astype(np.int64),
+        pixel=pixel,
+        first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
+        order=order,
+        weight=np.ascontiguousarray(weight[order], np.float32),
+        textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
+        cos_theta_o=np.clip(cosine, 0, 1),
+    )

@@ -1,0 +1,1 @@
+"""Files that come in and go out: uploads and their import, downloads, small pictures."""

@@ -1,0 +1,185 @@
+"""Imports an uploaded file in a process of its own, with limits: a hostile file can end that process, not the server.
+
+`python -m server.files.importing` reads one `ImportRequest` as JSON from stdin and writes one line of JSON to stdout:
+{"id": id} or {"problem": sentence}.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from relume.errors import RelumeError, SceneError
+
+if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
+    from relume.scene.model import Scene
+    from server.settings import Settings
+
+MAX_OUTPUT_BYTES = 64 * 1024
+DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
+UPLOAD_PREFIX = "upload-"
+Kind = Literal["scene", "environment", "built_in", "grounded"]
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """What to import.
+
+    Attributes:
+        kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
+            is kept in.
+        environment: path of a scene's environment map, or None.
+        name: what people will call it; of a built-in scene, which one it is.
+        scene: the name that a scene's file had, folders included. companions: paths of the files that came with it, by
+            theirs.
+        ground: whether a scene is put on one.
+        seconds: of processor and wall. max_bytes: of address space.
+    """
+
+    data: str
+    database: str
+    kind: Kind
+    file: str
+    environment: str | None
+    name: str
+    seconds: int
+    max_bytes: int
+    ground: bool = False
+    scene: str = ""
+    companions: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        settings: Settings,
+        kind: Kind,
+        file: Path | None,
+        name: str,
+        environment: Path | None = None,
+        scene: str = "",
+        companions: Mapping[str, Path] | None = None,
+    ) -> ImportRequest:
+        """A request within a server's limits."""
+        return cls(
+            data=str(settings.data.resolve()),
+            database=settings.database_url,
+            kind=kind,
+            file="" if file is None else str(file),
+            environment=None if environment is None else str(environment),
+            name=name,
+            seconds=settings.import_seconds,
+            max_bytes=settings.import_bytes,
+            scene=scene,
+            companions={named: str(path) for named, path in (companions or {}).items()},
+        )
+
+
+def import_in_process(request: ImportRequest) -> str:
+    """Import and register; returns the id. Blocks.
+
+    Raises:
+        SceneError: the file cannot be used, or reading it took too much.
+    """
+    command = [sys.executable, "-m", "server.files.importing"]
+    # No thread pools in a short-lived process: each thread would reserve address space that counts against the limit.
+    environ = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    told = json.dumps(asdict(request)).encode()
+    limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"
+    try:
+        done = subprocess.run(  # noqa: S603
+            command, input=told, capture_output=True, timeout=request.seconds, check=False, env=environ
+        )
+        if -done.returncode in DAMAGED:
+            raise SceneError("the file made its reader fail, it is damaged; export it again")
+        answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
+    except (subprocess.TimeoutExpired, ValueError, IndexError):
+        raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file") from None
+    if "problem" in answer:
+        raise SceneError(answer["problem"])
+    return str(answer["id"])
+
+
+def remove_stray_uploads(data: Path, older_than_s: float) -> None:
+    """Delete uploads that a killed server left behind; younger ones may be another server's."""
+    for folder in data.glob(f"{UPLOAD_PREFIX}*"):
+        with suppress(OSError):
+            if time.time() - folder.stat().st_mtime > older_than_s:
+                shutil.rmtree(folder)
+
+
+def main() -> int:
+    """The process itself."""
+    request = ImportRequest(**json.loads(sys.stdin.buffer.read()))
+    resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        answer = {"id": _import(request)}
+    except RelumeError as error:
+        answer = {"problem": str(error)}
+    except MemoryError:
+        answer = {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
+    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+    return 0
+
+
+def _import(request: ImportRequest) -> str:
+    if request.kind == "grounded":
+        return _put_on_ground(request)
+    return _import_environment(request) if request.kind == "environment" else _import_scene(request)
+
+
+def _import_environment(request: ImportRequest) -> str:
+    from relume.environments.asset_store import keep
+    from worker.paths import environments_path
+
+    return keep(environments_path(Path(request.data)), Path(request.file), request.name).id
+
+
+def _import_scene(request: ImportRequest) -> str:
+    from relume.scene.built_in import built_in
+    from relume.scene.ground import with_ground
+    from worker.database import open_database
+    from worker.ledger import Ledger
+    from worker.scenes import register_scene
+
+    scene = built_in(request.name) if request.kind == "built_in" else _read_scene(request)
+    scene = with_ground(scene) if request.ground else scene
+    return register_scene(Path(request.data), Ledger(open_database(request.database)), scene)
+
+
+def _put_on_ground(request: ImportRequest) -> str:
+    from relume.scene.archive import load_scene
+    from relume.scene.ground import with_ground
+    from worker.database import open_database
+    from worker.ledger import Ledger
+    from worker.scenes import register_scene
+
+    scene = with_ground(load_scene(request.file), request.name)
+    return register_scene(Path(request.data), Ledger(open_database(request.database)), scene)
+
+
+def _read_scene(request: ImportRequest) -> Scene:
+    from relume.environments.reading import read_environment
+    from relume.scene.companions import Sent
+    from relume.scene.importer import import_scene, read_file
+
+    environment = None if request.environment is None else read_environment(request.environment, "Environment")
+    sent = Sent({name: Path(path) for name, path in request.companions.items()}, request.scene)
+    # bytes: what lies beside the file on this disk is not its own
+    return import_scene(read_file(request.file), request.name, environment, sent)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""What a session needs of the library: a transfer, a picture, and how to get them. Tests put stand-ins here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.memory import Holder
+from relume.picture.fidelity import Word
+from relume.picture.transfer import Transfer
+
+if TYPE_CHECKING:
+    from relume.picture.jobs import Job
+
+Tile = tuple[int, int, int, int]
+F32 = NDArray[np.float32]
+
+
+class Advance(Protocol):
+    """What one step changed."""
+
+    @property
+    def tiles(self) -> Sequence[Tile]: ...
+    @property
+    def exact(self) -> bool: ...
+    @property
+    def fidelity(self) -> Word: ...
+    @property
+    def complete(self) -> bool:
+        """Whether something of every term is shown."""
+        ...
+
+    @property
+    def changed(self) -> bool: ...
+
+
+class Picture(Protocol):
+    """One live picture; used from one thread at a time."""
+
+    def set_look(self, look: Any, *, hand: str | None, solo: frozenset[str] | None) -> None: ...
+    def check(self, look: Any) -> None: ...
+    def next_job(self) -> Job | None: ...
+    def install(self, job: Any, made: Any) -> None: ...
+    def touch(self, pointer: str) -> None: ...
+    def advance(self, max_coefficients: int | None) -> Advance: ...
+    def all_tiles(self) -> Sequence[Tile]: ...
+    def encode(self, tiles: Sequence[Tile], form: Any, /) -> bytes: ...
+    def encode_alpha(self, tiles: Sequence[Tile], /) -> bytes | None: ...
+    def image(self) -> F32: ...
+    def probe(self, x: int, y: int) -> Mapping[str, Any]: ...
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
+
+
+@dataclass(frozen=True)
+class Library:
+    """How transfers are opened and pictures made; one per app.
+
+    Attributes:
+        open_transfer: path of a published store -> transfer; heavy.
+        open_in_passing: the same for work that nobody watches: what it makes is the first to be forgotten.
+        make_picture: (transfer, view name) -> picture, its caches shared; heavy.
+        render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
+            where the look's background is transparent; `progress`, `cancelled` and `for_display` as of `render_image`;
+            heavy.
+        render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
+            columns where the bake has them.
+        reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,
+            reflects=whether surfaces light each other) -> the same by brute force; heavy.
+        held_bytes: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
+        cache_used_bytes: all of it, and what is being made.
+        shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
+    """
+
+    open_transfer: Callable[[Path], Transfer]
+    open_in_passing: Callable[[Path], Transfer]
+    make_picture: Callable[[Any, str], Picture]
+    render: Callable[..., F32]
+    render_small: Callable[[Any, str, Any, int], F32]
+    reference: Callable[..., F32]
+    held_bytes: Callable[[], Mapping[Holder, int]]
+    cache_used_bytes: Callable[[], int]
+    shrink_cache: Callable[[Collection[Path]], None]

@@ -1,0 +1,56 @@
+"""Tells a session that a finer bake of its scene goes on or is ready, so that the editor can swap it in."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from server.live.state.client_socket import ClientSocket
+from server.wire.protocol import BakeMessage
+from worker.status import BakeStatus
+
+log = logging.getLogger(__name__)
+POLL_S = 0.5
+
+
+class BakeNews:
+    """Looks into the ledger, which other processes write too."""
+
+    def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]]) -> None:
+        self._list_bakes = list_bakes
+
+    async def tell(self, socket: ClientSocket, bake: str, scene: str) -> None:
+        """Run for as long as the session does; says each change once."""
+        told: dict[str, BakeMessage] = {}
+        while True:
+            for news in self._news(bake, await self._look_up(scene)):
+                if told.get(news.bake) != news:
+                    told[news.bake] = news
+                    await socket.send(news)
+            await asyncio.sleep(POLL_S)
+
+    async def _look_up(self, scene: str) -> Sequence[BakeStatus]:
+        try:
+            return await asyncio.to_thread(self._list_bakes, scene)
+        except SQLAlchemyError as error:  # the database may be away for a while; the picture needs it not
+            log.warning("bakes cannot be listed: %s", type(error).__name__)
+            return ()
+
+    @staticmethod
+    def _news(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:
+        own = next((status for status in statuses if status.id == bake), None)
+        return [
+            BakeMessage(
+                bake=status.id,
+                replaces=bake,
+                state=status.state,
+                progress=round(status.progress, 3),
+                phase=status.phase,
+                seconds_left=None if status.seconds_left is None else round(status.seconds_left, 1),
+            )
+            for status in statuses
+            if own is not None and status.state in ("running", "ready") and status.rank > own.rank
+        ]

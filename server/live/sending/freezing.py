@@ -1,0 +1,104 @@
+"""The freeze of a session: at most one runs, in a thread of its own, and the pictures go on being painted."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from relume.errors import CancelledError
+from server.library.threads import Threads
+from server.live.sending.viewport import Viewport
+from server.live.state.client_socket import ClientSocket
+from server.metrics import Metrics
+from server.wire.protocol import StatusMessage
+
+if TYPE_CHECKING:
+    from relume.picture.jobs import Job
+
+STATUS_S = 0.100
+
+
+@dataclass(frozen=True)
+class _Running:
+    """A freeze from its start until its result is taken."""
+
+    viewport: Viewport
+    job: Job
+    future: asyncio.Future[Any]
+    telling: asyncio.Task[None]
+    start_s: float
+
+
+class Freezer:
+    """Starts a job, says how far it is, and hands out what it made; `news` is set when there is something to take."""
+
+    def __init__(self, socket: ClientSocket, threads: Threads, metrics: Metrics, news: asyncio.Event) -> None:
+        self._socket, self._threads, self._metrics, self._news = socket, threads, metrics, news
+        self._running: _Running | None = None
+        self._cancel = threading.Event()
+
+    @property
+    def running(self) -> tuple[Viewport, Job] | None:
+        """What is being made, and for which view."""
+        return None if self._running is None else (self._running.viewport, self._running.job)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is something to take."""
+        return self._running is not None and self._running.telling.done()
+
+    def start(self, viewport: Viewport, job: Job) -> None:
+        """Begin; nothing may be running."""
+        self._cancel = cancel = threading.Event()
+        progress = [0.0]
+        future = asyncio.wrap_future(
+            self._threads.long.submit(job.make, lambda share: progress.__setitem__(0, share), cancel.is_set)
+        )
+        telling = asyncio.create_task(self._tell(future, viewport.name, job, progress))
+        telling.add_done_callback(lambda _: self._news.set())
+        self._running = _Running(viewport, job, future, telling, time.perf_counter())
+
+    def cancel(self) -> None:
+        """What runs is not wanted any more: it ends soon."""
+        self._cancel.set()
+
+    async def take(self) -> tuple[Viewport, Job, Any] | None:
+        """What was made, when `is_done`; None where it was cancelled. Raises what making it raised."""
+        running = self._running
+        if running is None:
+            return None
+        await running.telling  # where the client is gone, `end` still has a thread to wait for
+        self._running = None
+        error = running.future.exception()
+        if isinstance(error, CancelledError):
+            return None
+        if error is not None:
+            raise error
+        self._metrics.freeze.observe(time.perf_counter() - running.start_s)
+        return running.viewport, running.job, running.future.result()
+
+    async def end(self) -> None:
+        """Cancel what runs and wait for its thread; nobody asks for its result any more."""
+        self._cancel.set()
+        if self._running is None:
+            return
+        running, self._running = self._running, None
+        running.telling.cancel()
+        await asyncio.wait({running.telling, running.future})
+        for part in (running.telling, running.future):
+            if not part.cancelled():
+                part.exception()
+
+    async def _tell(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
+        """Say how far it is, each per cent once."""
+        told = -1.0
+        while not future.done():
+            shown = round(min(1.0, max(0.0, progress[0])), 2)
+            if shown != told:
+                told = shown
+                await self._socket.send(StatusMessage(state=job.state, view=view, what=job.what, progress=shown))
+            await asyncio.wait({future}, timeout=STATUS_S)
+        await self._socket.send(StatusMessage(state="ready", view=view, what=job.what, progress=progress[0]))

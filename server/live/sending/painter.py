@@ -1,0 +1,167 @@
+"""What runs in a thread for a frame: bring the picture on, encode what the client lacks, pack the message."""
+
+from __future__ import annotations
+
+import io
+import struct
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.imageio import to_bytes, tone_map
+from relume.imageio.shrink import shrink
+from server.library.ports import Advance, Picture, Tile
+from server.live.state.target import Target
+from server.wire.protocol import FrameHeader, FrameTimes
+
+if TYPE_CHECKING:
+    from relume.picture.jobs import Job
+
+Format = Literal["rgb9e5", "jpeg"]
+
+
+@dataclass(frozen=True)
+class FrameRequest:
+    """What a turn of the frame loop asks of a picture.
+
+    Attributes:
+        target: the look that the frame will show.
+        accepting: pictures that have not got that look yet; all take it, or none.
+        lacking: tiles that the client has not got in HDR, besides those that this step changes.
+        only_exact: send nothing unless the step makes the picture exact.
+        is_due: there is something to send even where this step changes nothing.
+        is_told: the client knows that what it has is exact.
+        size: of the picture. jpeg_size: of a JPEG of it, no larger.
+        received_s: when the edit came in that no frame has answered yet, if there is one.
+    """
+
+    target: Target
+    accepting: Sequence[Picture]
+    max_coefficients: int | None
+    lacking: frozenset[Tile]
+    form: Format
+    quality: int
+    only_exact: bool
+    is_due: bool
+    is_told: bool
+    received_s: float | None
+    frame: int
+    view: str
+    size: tuple[int, int]
+    jpeg_size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Painted:
+    """What came of a request.
+
+    Attributes:
+        job: what must be made before the picture can go on to where it should, or None.
+        advance: what the step changed, and what the picture shows since.
+        message: the packed frame, or None where none is to be sent.
+    """
+
+    job: Job | None
+    advance: Advance
+    message: bytes | None
+    update_ms: float
+    encode_ms: float = 0.0
+
+
+def accept(pictures: Iterable[Picture], target: Target) -> None:
+    """Give pictures a look. Raises what they say where they cannot follow it, or where it needs too much memory."""
+    found = list(pictures)
+    for picture in found:
+        picture.check(target.look)
+    for picture in found:
+        picture.set_look(target.look, hand=target.hand, solo=target.solo)
+
+
+def touch(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
+    """Tell pictures which curve or slider the user has in hand; what each of them needs now."""
+    found = list(pictures)
+    for picture in found:
+        picture.touch(pointer)
+    return [picture.next_job() for picture in found]
+
+
+def install(picture: Picture, job: Job, made: Any) -> Job | None:
+    """Hand over what was made; what the picture needs next."""
+    picture.install(job, made)
+    return picture.next_job()
+
+
+def paint(picture: Picture, request: FrameRequest) -> Painted:
+    """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
+    start_s = time.perf_counter()
+    accept(request.accepting, request.target)
+    advance = picture.advance(request.max_coefficients)
+    job = picture.next_job()
+    updated_s = time.perf_counter()
+    update_ms = (updated_s - start_s) * 1e3
+    has_news = bool(advance.tiles) or request.is_due
+    is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not request.only_exact)
+    if not is_sent:
+        return Painted(job, advance, None, update_ms)
+    tiles, payload, alpha = _payload(picture, request, advance.tiles)
+    encode_ms = (time.perf_counter() - updated_s) * 1e3
+    wait_ms = 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
+    header = FrameHeader(
+        frame=request.frame,
+        revision=request.target.revision,
+        view=request.view,
+        width=request.size[0],
+        height=request.size[1],
+        tiles=tiles,
+        format=request.form,
+        exact=advance.exact,
+        fidelity=advance.fidelity,
+        complete=advance.complete,
+        kind="picture",
+        alpha=alpha is not None,
+        ms=times(wait_ms, update_ms, encode_ms),
+    )
+    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
+
+
+def _payload(
+    picture: Picture, request: FrameRequest, changed: Sequence[Tile]
+) -> tuple[list[Tile], bytes, bytes | None]:
+    """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
+    if request.form == "jpeg":
+        return [(0, 0, *request.size)], _jpeg(picture, request), None
+    tiles = sorted(request.lacking.union(changed), key=lambda tile: (tile[1], tile[0]))
+    return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
+
+
+def _jpeg(picture: Picture, request: FrameRequest) -> bytes:
+    display = request.target.look.display
+    shown = tone_map(shrink(picture.image(), request.jpeg_size), display.exposure, display.tone_map)
+    buffer = io.BytesIO()
+    Image.fromarray(to_bytes(shown)).save(buffer, "JPEG", quality=request.quality)
+    return buffer.getvalue()
+
+
+def encode_brush(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
+    """The payload of a brush frame: how much of each pixel comes from that stretch of the curve, 0…255."""
+    return to_bytes(picture.brush(pointer, from_degrees, to_degrees)).tobytes()
+
+
+def pack(header: FrameHeader, payload: bytes) -> bytes:
+    """A frame as it goes over the wire."""
+    head = header.model_dump_json().encode()
+    return b"".join((struct.pack("<I", len(head)), head, payload))
+
+
+def rounded(bands: NDArray[Any]) -> list[list[float]]:
+    """Band values with six digits, as lists: what a plot needs, in half the bytes."""
+    return [[float(f"{value:.6g}") for value in channel] for channel in bands.tolist()]
+
+
+def times(wait_ms: float, update_ms: float, encode_ms: float) -> FrameTimes:
+    """Milliseconds, rounded for the header."""
+    return FrameTimes(wait=round(wait_ms, 3), update=round(update_ms, 3), encode=round(encode_ms, 3))

@@ -1,0 +1,59 @@
+"""The look of a session: where its edits are applied, checked and counted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from relume import look as looks
+from relume.errors import EditError
+from relume.look import Look, MaterialLook
+from server.live.state.pointers import check_hand
+from server.live.state.target import Target
+from server.wire.protocol import EditMessage
+
+
+class LookState:
+    """The newest accepted look, its revision, and which sources of light alone are shown (None: all)."""
+
+    def __init__(
+        self, default: dict[str, Any], document: dict[str, Any], revision: int, solo: frozenset[str] | None = None
+    ) -> None:
+        self.default, self.document, self.revision, self.solo = default, document, revision, solo
+        self._materials: dict[str, tuple[Any, MaterialLook]] = {}
+
+    def target(self) -> Target:
+        """The look as something to show."""
+        return Target(self._read(self.document), self.document, self.revision, None, solo=self.solo)
+
+    def apply(self, message: EditMessage, received_s: float) -> Target:
+        """Apply an edit that came at `received_s`, whole or not at all.
+
+        Raises:
+            EditError, ParameterError: the look stays as it was.
+        """
+        if message.revision <= self.revision:
+            raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; count on from there")
+        patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
+        document = looks.apply_patch(self.document, patch, self.default)
+        if message.hand is not None:
+            check_hand(message.hand, document)
+        look = self._read(document)
+        self.document, self.revision = document, message.revision
+        if message.says_solo:
+            self.solo = None if message.solo is None else frozenset(message.solo)
+        return Target(look, document, message.revision, received_s, message.hand, self.solo)
+
+    def revert(self, shown: Target) -> None:
+        """Go back to the look that is shown; the revision stays, so that the client counts on."""
+        self.document, self.solo = shown.document, shown.solo
+
+    def _read(self, document: dict[str, Any]) -> Look:
+        """A complete document as a look; long curves of materials that did not change are not read again."""
+        known, self._materials = self._materials, {}
+        for name, part in document["materials"].items():
+            before, material = known.get(name, (None, None))
+            if material is None or before is not part:
+                material = MaterialLook.model_validate(part)
+            self._materials[name] = part, material
+        materials = {name: material for name, (_, material) in self._materials.items()}
+        return Look.model_validate({**document, "materials": materials})

@@ -1,0 +1,26 @@
+"""What the two halves of a session have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from relume.picture.transfer import Transfer
+from server.live.state.client_socket import ClientSocket
+from server.live.state.frame_window import FrameWindow
+from server.live.state.look_state import LookState
+from server.live.state.pending_requests import PendingRequests
+from server.live.state.shown_views import ShownViews
+from server.metrics import Metrics
+
+
+@dataclass(frozen=True)
+class SessionState:
+    """The receiving half fills them, the sending half follows; all on the event loop."""
+
+    socket: ClientSocket
+    pending: PendingRequests
+    shown: ShownViews
+    window: FrameWindow
+    look: LookState
+    transfer: Transfer
+    metrics: Metrics

@@ -1,0 +1,25 @@
+"""What a session is to show: a look, and since when it is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Target:
+    """A look that shall be shown.
+
+    Attributes:
+        look: validated. document: the same as JSON.
+        received_s: when the edit came in; None for a look that no edit asked for.
+        hand: pointer to what the hand was on that made it, where the client said so.
+        solo: names of sources of light that alone are shown; None: all.
+    """
+
+    look: Any
+    document: dict[str, Any]
+    revision: int
+    received_s: float | None
+    hand: str | None = None
+    solo: frozenset[str] | None = None

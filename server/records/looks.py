@@ -1,0 +1,136 @@
+"""Saved looks: named JSON documents in the database, changed only by who knows the version they change."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+import unicodedata
+from dataclasses import dataclass
+from typing import Any, NoReturn, cast
+
+from sqlalchemy import CursorResult, delete, func, select, update
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.errors import NotFoundError, ParameterError
+from relume.look import Look
+from server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
+from server.records.tables import LookRow
+
+MAX_LOOK_BYTES = 256 * 1024
+MAX_LOOKS = 10_000
+PARTS = tuple(Look.model_fields)
+
+
+@dataclass(frozen=True)
+class SavedLook:
+    """A look as it was saved; `etag` is quoted, as in the header."""
+
+    name: str
+    document: str
+    etag: str
+    modified: float
+
+
+def check_name(name: str) -> str:
+    """The name as it is stored. Raises ParameterError unless it is 1 to 80 printable characters."""
+    name = unicodedata.normalize("NFC", name)
+    is_plain = name.isprintable() and name == name.strip() and not set("/\\") & set(name) and name not in (".", "..")
+    if not is_plain or not 1 <= len(name) <= 80:
+        raise ParameterError("name", name, "1 to 80 printable characters without slashes")
+    return name
+
+
+def parse_document(body: bytes) -> str:
+    """A look document as canonical JSON. Raises TooLargeError, ParameterError."""
+    if len(body) > MAX_LOOK_BYTES:
+        raise TooLargeError(f"a look has at most {MAX_LOOK_BYTES:,} bytes; simplify its curves")
+    try:
+        document: Any = json.loads(body, parse_constant=_refuse_constant)
+        text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    except (ValueError, RecursionError):
+        raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
+    if not isinstance(document, dict) or not set(document) <= set(PARTS):
+        raise ParameterError("look", document, "an object with some of " + ", ".join(PARTS))
+    for part, value in document.items():
+        if not isinstance(value, dict):
+            raise ParameterError(f"/{part}", value, "an object")
+    return text
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(name)
+
+
+class LookStore:
+    """Saved looks by name."""
+
+    def __init__(self, sessions: sessionmaker[Session]) -> None:
+        self._sessions = sessions
+
+    def list(self) -> list[SavedLook]:
+        """All of them, newest first."""
+        with self._sessions() as session:
+            rows = session.scalars(select(LookRow).order_by(LookRow.modified.desc(), LookRow.name))
+            return [_saved(row) for row in rows]
+
+    def get(self, name: str) -> SavedLook:
+        """One look. Raises NotFoundError."""
+        with self._sessions() as session:
+            row = session.get(LookRow, name)
+        if row is None:
+            raise NotFoundError(f"there is no look {name!r}; save it first")
+        return _saved(row)
+
+    def put(self, name: str, document: str, if_match: str | None, if_none_match: str | None) -> tuple[SavedLook, bool]:
+        """Save a look; whether it is new.
+
+        Raises:
+            PreconditionRequiredError: it exists and the caller does not say which version it replaces.
+            PreconditionFailedError: it is not at that version.
+        """
+        etag = '"' + hashlib.sha256(document.encode()).hexdigest()[:32] + '"'
+        saved = SavedLook(name, document, etag, time.time())
+        if if_match is None:
+            if self._insert(saved):
+                return saved, True
+            if if_none_match is not None:
+                raise PreconditionFailedError(f"there is a look {name!r} already; take another name")
+            raise PreconditionRequiredError(f"look {name!r} exists; send If-Match with the version that you replace")
+        values = {"document": document, "etag": etag, "modified": saved.modified}
+        self._change(name, if_match, update(LookRow).values(**values))
+        return saved, False
+
+    def delete(self, name: str, if_match: str | None) -> None:
+        """Delete a look. Raises as `put` does."""
+        if if_match is None:
+            self.get(name)
+            raise PreconditionRequiredError("send If-Match with the version of the look that you delete")
+        self._change(name, if_match, delete(LookRow))
+
+    def _insert(self, saved: SavedLook) -> bool:
+        try:
+            with self._sessions.begin() as session:
+                if (session.scalar(select(func.count()).select_from(LookRow)) or 0) >= MAX_LOOKS:
+                    raise BusyError(f"{MAX_LOOKS:,} looks are saved; delete some first")
+                session.add(LookRow(**vars(saved)))
+        except IntegrityError:
+            return False
+        return True
+
+    def _change(self, name: str, if_match: str, statement: Any) -> None:
+        """Update or delete the row if it is still at one of those versions, in one statement."""
+        statement = statement.where(LookRow.name == name)
+        etags = [etag.strip() for etag in if_match.split(",")]
+        if etags != ["*"]:
+            statement = statement.where(LookRow.etag.in_(etags))
+        with self._sessions.begin() as session:
+            result = cast("CursorResult[Any]", session.execute(statement))
+            num_changed = result.rowcount
+        if num_changed == 0:
+            raise PreconditionFailedError(f"look {name!r} was changed or deleted in the meantime; read it again")
+
+
+def _saved(row: LookRow) -> SavedLook:
+    return SavedLook(row.name, row.document, row.etag, row.modified)

@@ -1,0 +1,55 @@
+"""Tables that belong to the server, in the same database as the ledger's."""
+
+from __future__ import annotations
+
+from sqlalchemy import Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from worker.models import Base
+
+
+class LookRow(Base):
+    """A saved look. `modified` in seconds since 1970."""
+
+    __tablename__ = "looks"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    etag: Mapped[str]
+    modified: Mapped[float]
+
+
+class ShareRow(Base):
+    """What a link carries; never changed. `document` is JSON of so many bytes, `created` in seconds since 1970."""
+
+    __tablename__ = "shares"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    bytes: Mapped[int]
+    created: Mapped[float]
+
+
+class WorkRow(Base):
+    """A long work of the server, see `server.queues.work_queue`. `request` is the body as JSON."""
+
+    __abstract__ = True
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    request: Mapped[str] = mapped_column(Text)
+    state: Mapped[str] = mapped_column(index=True)
+    done: Mapped[int]
+    problem: Mapped[str | None] = mapped_column(Text)
+    created: Mapped[float]
+
+
+class RenderRow(WorkRow):
+    """A batch of renders; `done` frames are finished."""
+
+    __tablename__ = "renders"
+
+
+class ComparisonRow(WorkRow):
+    """A comparison with brute force; `done` passes are finished."""
+
+    __tablename__ = "truths"

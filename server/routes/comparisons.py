@@ -1,0 +1,81 @@
+"""/api/truths: a frame against brute force, pass by pass."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Literal
+
+from fastapi import APIRouter, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from relume.picture.transfer import Transfer
+from server.errors import NotReadyError
+from server.queues.comparisons import Comparing
+from server.routes.bakes import ready_bake
+from server.routes.renders import baked_view, check_look
+from server.services import Services, Shared
+from server.wire.bodies import Id, TruthBody, TruthFigures, TruthPlanBody, TruthRequest
+
+router = APIRouter(prefix="/api/truths", tags=["truths"])
+
+
+@router.post("", status_code=202, responses={200: {"model": TruthPlanBody, "description": "A dry run's answer"}})
+async def submit_comparison(request: TruthRequest, services: Shared, response: Response) -> TruthBody | TruthPlanBody:
+    """Queue a comparison, or say how long it would take; the look is checked first."""
+    await run_in_threadpool(ready_bake, services, request.bake)
+    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        await run_in_threadpool(_check, request, transfer)
+        if request.dry_run:
+            response.status_code = 200
+            seconds = await run_in_threadpool(services.comparisons.seconds, request, transfer)
+            return TruthPlanBody(passes=request.passes, seconds=seconds)
+    identity = await run_in_threadpool(services.comparisons.submit, request)
+    response.headers["Location"] = f"/api/truths/{identity}"
+    return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
+
+
+def _check(request: TruthRequest, transfer: Transfer) -> None:
+    baked_view(request.view, transfer)
+    check_look(request.look, transfer, "/look")
+
+
+@router.get("/{truth}")
+def get_comparison(truth: Id, services: Shared) -> TruthBody:
+    """State, progress, and what was found so far."""
+    return _body(services.comparisons.get(truth), services)
+
+
+@router.delete("/{truth}", status_code=204)
+def stop_comparison(truth: Id, services: Shared, forget: bool = False) -> Response:
+    """Stop a comparison; what was found so far is kept, unless `forget` says that nobody needs it."""
+    (services.comparisons.delete if forget else services.comparisons.stop)(truth)
+    return Response(status_code=204)
+
+
+@router.post("/{truth}/resume", status_code=202)
+def resume_comparison(truth: Id, services: Shared) -> TruthBody:
+    """Go on with a comparison that was stopped, after its last finished pass."""
+    services.comparisons.resume(truth)
+    return _body(services.comparisons.get(truth), services)
+
+
+@router.get("/{truth}/{name}.png", response_class=FileResponse)
+def get_picture(truth: Id, name: Literal["error", "reference"], services: Shared) -> FileResponse:
+    """Where the frame differs, or the brute force so far; from the second pass on."""
+    comparing = services.comparisons.get(truth)
+    path = services.comparisons.picture_path(truth, name)
+    if not path.exists():
+        raise NotReadyError(f"two passes are needed, {comparing.done} are done; wait a little")
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-store"})
+
+
+def _body(comparing: Comparing, services: Services) -> TruthBody:
+    found, request = services.comparisons.found(comparing.id), comparing.request
+    return TruthBody.of(
+        comparing,
+        bake=request.bake,
+        view=request.view,
+        passes=comparing.done,
+        found=None if found is None else TruthFigures(**asdict(found)),
+    )

@@ -1,0 +1,396 @@
+"""Bodies of the REST calls: what is accepted and what is answered."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from relume.look.document import MAX_BOUNCES
+from relume.look.model import Show
+from relume.remarks import Effect
+from server.wire.protocol import MAX_VIEWS_SHOWN
+from worker.status import Phase
+
+Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
+MAX_NAME = 256
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+Side = Annotated[int, Field(ge=1, le=16384)]
+Preset = Literal["preview", "good", "final"]
+ImageFormat = Literal["exr", "png", "webp"]
+MAX_LOOKS = 1000
+
+
+def moment(posix_s: float) -> str:
+    """A time as all bodies write it: ISO 8601, UTC."""
+    return datetime.fromtimestamp(posix_s, UTC).isoformat()
+
+
+class Body(BaseModel):
+    """The base of all bodies."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @classmethod
+    def of(cls, status: object, **more: Any) -> Self:
+        """A body whose fields are the attributes of `status` with the same names, and `more`."""
+        own = {name: getattr(status, name) for name in cls.model_fields if name not in more}
+        return cls(**own, **more)
+
+
+class SceneView(Body):
+    """A camera; `aspect` is width ÷ height."""
+
+    name: str
+    aspect: float
+
+
+class SceneMaterial(Body):
+    """A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its
+    shadows alone."""
+
+    name: str
+    terms: list[dict[str, Any]]
+    catcher: bool
+
+
+class SceneVariant(Body):
+    """A look that came with the scene's file; partial, in look-document form."""
+
+    name: str
+    look: dict[str, Any]
+
+
+class SceneRemark(Body):
+    """What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it."""
+
+    text: str
+    effect: Effect
+
+
+class SceneBody(Body):
+    """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
+
+    `remarks` are the `warnings` with what each does to the picture, the worst first.
+    """
+
+    id: str
+    name: str
+    created: str
+    views: list[SceneView]
+    materials: list[SceneMaterial]
+    lights: list[str]
+    variants: list[SceneVariant]
+    warnings: list[str]
+    remarks: list[SceneRemark]
+    triangles: int
+    thumbnail: str | None
+    bakes: list[str]
+
+
+class BuiltInBody(Body):
+    """A scene made by code; `size` and `method` of a bake show it well."""
+
+    name: str
+    label: str
+    description: str
+    size: tuple[int, int]
+    method: str
+
+
+class ParameterBody(Body):
+    """A number that generates curves; `scale` says how a slider moves.
+
+    One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze.
+    """
+
+    name: str
+    label: str
+    minimum: float
+    maximum: float
+    default: float
+    unit: str
+    scale: Literal["linear", "log"]
+    help: str
+    fixed: bool
+
+
+class CurveBody(Body):
+    """An editable factor of a term; an outgoing one multiplies the finished pixel."""
+
+    name: str
+    label: str
+    angle: str
+    parameters: list[str]
+    bands: int
+    outgoing: bool
+
+
+class MaterialBody(Body):
+    """A library material under one model: what stands in a look, and how a list shows it.
+
+    `id` is "table/material", `group` what it is made of, `model` that of its highlight, `swatch` its colour "#rrggbb".
+    """
+
+    id: str
+    name: str
+    group: str
+    model: str
+    source: str
+    swatch: str
+    terms: list[dict[str, Any]]
+
+
+class MapPoint(Body):
+    """A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry."""
+
+    id: str
+    f0: float
+    sigma: float
+
+
+class MaterialMapBody(Body):
+    """Sun's navigation map; `triangles` are indices of points, counter-clockwise where x is f0 and y is log sigma."""
+
+    points: list[MapPoint]
+    triangles: list[tuple[int, int, int]]
+
+
+class ModelBody(Body):
+    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`)."""
+
+    model: str
+    label: str
+    help: str
+    source: str
+    texture: str
+    needs_data: bool
+    parameters: list[ParameterBody]
+    curves: list[CurveBody]
+
+
+class MeasuredBody(Body):
+    """A measured material; looks name it by `data`, `terms` is how it begins.
+
+    `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel.
+    """
+
+    id: str
+    data: str
+    name: str
+    created: str
+    terms: list[dict[str, Any]]
+    thumbnail: str
+    lobes_error: tuple[float, float, float]
+    homomorphic_error: tuple[float, float, float]
+
+
+class EnvironmentBody(Body):
+    """An environment that looks may name, by `map`, in place of the scene's own; `created` is null for a built-in one.
+
+    `warnings`: what was changed when its file was read.
+    """
+
+    id: str
+    map: str
+    name: str
+    created: str | None
+    warnings: list[str]
+    thumbnail: str
+
+
+class BakeRequest(Body):
+    """What to bake. A preset gives size and lights; what is named beside it wins.
+
+    `relightable`: divide the light so that turning or exchanging the environment errs little.
+    """
+
+    scene: Id
+    method: Name = "direct"
+    views: Annotated[list[Name], Field(min_length=1, max_length=64)] | None = None
+    preset: Preset | None = None
+    size: tuple[Side, Side] | None = None
+    lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    relightable: bool = False
+    dry_run: bool = False
+
+
+class PlanBody(Body):
+    """What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none."""
+
+    view_samples: int
+    rays: int
+    store_bytes: int
+    peak_bytes: int
+    seconds: float | None
+
+
+class RecipeBody(Body):
+    """What was asked for, complete."""
+
+    method: str
+    views: list[str]
+    size: tuple[int, int]
+    lights: int
+    relightable: bool
+
+
+class BakeBody(Body):
+    """A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again.
+
+    `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for.
+    `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might
+    come out otherwise if it were baked again.
+    """
+
+    id: str
+    scene: str
+    state: Literal["queued", "running", "ready", "failed", "cancelled"]
+    progress: float
+    phase: Phase | None
+    phase_seconds: float | None
+    ahead: int
+    rays_per_second: float | None
+    seconds_left: float | None
+    bytes: int
+    problem: str | None
+    code: str | None
+    is_current: bool
+    recipe: RecipeBody
+    plan: PlanBody | None
+
+
+class DryRunBody(Body):
+    """The answer to a dry run: nothing was queued."""
+
+    id: str
+    recipe: RecipeBody
+    plan: PlanBody
+
+
+class RenderRequest(Body):
+    """A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default.
+
+    `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and
+    each kind of light path beside the picture, and `precision` of the values.
+    """
+
+    bake: Id
+    view: Name
+    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
+    format: ImageFormat
+    size: tuple[Side, Side] | None = None
+    name: Name | None = None
+    layers: bool = False
+    precision: Literal["half", "float"] = "half"
+
+
+class RenderBody(Body):
+    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too."""
+
+    id: str
+    bake: str
+    view: str
+    format: ImageFormat
+    size: tuple[int, int] | None
+    state: Literal["queued", "running", "ready", "failed"]
+    done: int
+    total: int
+    progress: float
+    problem: str | None
+
+
+class LookEntry(Body):
+    """A saved look in the list of them."""
+
+    name: str
+    etag: str
+    modified: str
+    bytes: int
+
+
+class SharedPaths(Body):
+    """Light paths that are looked at; as a look's `transport`."""
+
+    show: Show
+    bounces: Annotated[int, Field(ge=0, le=MAX_BOUNCES)]
+
+
+class ShareRequest(Body):
+    """What a link shows: a look of a bake, the views beside each other and the one in hand.
+
+    `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
+    paths that are looked at; null: those of the look.
+    """
+
+    bake: Id
+    view: Name
+    views: Annotated[list[Name], Field(min_length=1, max_length=MAX_VIEWS_SHOWN)]
+    look: dict[str, Any]
+    solo: Name | None = None
+    solo_light: Annotated[str, Field(max_length=256)] | None = None
+    paths: SharedPaths | None = None
+
+
+class ShareEntry(Body):
+    """A link that was made; `url` is relative to the server."""
+
+    id: str
+    url: str
+
+
+class ShareBody(ShareRequest):
+    """What a link shows; `lacking`: what of it is not here any more, one sentence each."""
+
+    id: str
+    created: str
+    scene: str
+    lacking: list[str]
+
+
+class TruthRequest(Body):
+    """Compare a look with brute force, in so many passes; figures come from the second on."""
+
+    bake: Id
+    view: Name
+    look: dict[str, Any] = {}
+    passes: Annotated[int, Field(ge=2, le=1024)] = 16
+    dry_run: bool = False
+
+
+class TruthPlanBody(Body):
+    """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn."""
+
+    passes: int
+    seconds: float
+
+
+class TruthFigures(Body):
+    """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
+
+    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off: null where that
+    cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the
+    noise does not explain, at most a hundredth of them by chance.
+    """
+
+    rmse: float
+    noise: float
+    error: float | None
+    limit: float
+    significant: float
+
+
+class TruthBody(Body):
+    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet."""
+
+    id: str
+    bake: str
+    view: str
+    state: Literal["queued", "running", "ready", "failed", "stopped"]
+    passes: int
+    total: int
+    progress: float
+    seconds_left: float | None
+    found: TruthFigures | None
+    problem: str | None

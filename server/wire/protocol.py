@@ -1,0 +1,300 @@
+"""Every message of a live session (subprotocol relume.v1), typed once; the editor's TypeScript is generated from here.
+
+Text messages are JSON, at most `MAX_MESSAGE_BYTES`. A binary message is one frame: uint32 little-endian header length,
+JSON header (`FrameHeader`), payload. The payload holds the header's tiles one after another, row-major, top row first:
+"rgb9e5" 4 bytes a pixel, "f32" 12 bytes a pixel, "jpeg" one image of the whole picture, perhaps of fewer pixels, "r8"
+one byte a pixel (frames of kind "brush": 0…255 stands for 0…1). Where the header says `alpha`, a byte for each pixel of
+the same tiles follows all that: how much it hides of what is put behind it, which its light has been multiplied by
+already.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+
+from relume.look.patch import MAX_OPERATIONS
+from relume.picture.fidelity import Word
+from relume.scene.checks import MAX_LIGHTS
+from worker.status import Phase
+
+SUBPROTOCOL = "relume.v1"
+MAX_MESSAGE_BYTES = 64 * 1024
+MAX_FRAMES_IN_FLIGHT = 2
+MAX_VIEWS_SHOWN = 4
+
+Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
+Name = Annotated[str, Field(min_length=1, max_length=256)]
+Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
+Revision = Annotated[int, Field(ge=0, le=2**53)]
+Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
+Pixel = Annotated[int, Field(ge=0, le=65535)]
+
+
+class Message(BaseModel):
+    """The base of all messages: immutable, nothing beyond what is declared."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PatchOperation(Message):
+    """One operation of a JSON Patch (RFC 6902) on the look."""
+
+    op: Literal["replace", "add", "remove", "test"]
+    path: Annotated[str, Field(max_length=512)]
+    value: Any = None
+
+
+class EditMessage(Message):
+    """client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve,
+    or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources
+    of light, local lights and "environment", that alone are shown from now on, without being part of the look; null:
+    all. Left out, it stays as it was. An edit that says `solo` may have an empty patch."""
+
+    type: Literal["edit"]
+    revision: Revision
+    patch: Annotated[list[PatchOperation], Field(max_length=MAX_OPERATIONS)]
+    hand: Pointer | None = None
+    solo: Sources | None = None
+
+    @property
+    def says_solo(self) -> bool:
+        """Whether it changes what is alone."""
+        return "solo" in self.model_fields_set
+
+    @model_validator(mode="after")
+    def _is_edit(self) -> EditMessage:
+        if not self.patch and not self.says_solo:
+            raise ValueError("an edit has a patch of one operation at least, or says what is solo")
+        return self
+
+
+class ViewMessage(Message):
+    """client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down
+    to fit into it, until views are shown otherwise; all other frames come in the baked size."""
+
+    type: Literal["view"]
+    name: Name
+    size: tuple[Pixel, Pixel] | None = None
+
+
+class ViewsMessage(Message):
+    """client → server: show these views side by side; every edit changes all of them."""
+
+    type: Literal["views"]
+    names: Annotated[list[Name], Field(min_length=1, max_length=MAX_VIEWS_SHOWN)]
+
+
+class FocusMessage(Message):
+    """client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first."""
+
+    type: Literal["focus"]
+    view: Name
+
+
+class AckMessage(Message):
+    """client → server: this frame was received and shown."""
+
+    type: Literal["ack"]
+    frame: Annotated[int, Field(ge=0, le=2**53)]
+
+
+class StreamMessage(Message):
+    """client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it."""
+
+    type: Literal["stream"]
+    format: Literal["hdr", "jpeg", "auto"]
+    quality: Annotated[int, Field(ge=1, le=95)] = 80
+
+
+class ProbeMessage(Message):
+    """client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`."""
+
+    type: Literal["probe"]
+    view: Name | None = None
+    x: Pixel
+    y: Pixel
+
+
+class BrushMessage(Message):
+    """client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush"."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
+
+    type: Literal["brush"]
+    curve: Pointer
+    from_degrees: Degrees = Field(alias="from")
+    to_degrees: Degrees = Field(alias="to")
+
+
+class TouchMessage(Message):
+    """client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now
+    on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the
+    environment: prepare for it, the open curve stays open."""
+
+    type: Literal["touch"]
+    curve: Pointer | None = None
+    parameter: Pointer | None = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> TouchMessage:
+        if (self.curve is None) == (self.parameter is None):
+            raise ValueError("a touch names a curve or a parameter, one of them")
+        return self
+
+
+ClientMessage = Annotated[
+    EditMessage
+    | ViewMessage
+    | ViewsMessage
+    | FocusMessage
+    | AckMessage
+    | StreamMessage
+    | ProbeMessage
+    | BrushMessage
+    | TouchMessage,
+    Field(discriminator="type"),
+]
+CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
+
+
+class Problem(BaseModel):
+    """RFC 9457. `type` names the kind, `detail` says what happened and what to do."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    type: str
+    title: str
+    status: int
+    detail: str
+
+
+class CameraInfo(Message):
+    """Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians."""
+
+    to_world: list[float]
+    yfov: float
+
+
+class ViewInfo(Message):
+    """A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere."""
+
+    name: str
+    width: int
+    height: int
+    camera: CameraInfo
+    eye: Literal["baked", "free"]
+
+
+class HelloMessage(Message):
+    """server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null.
+
+    `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
+    light of the bake; `axes`: what can be changed in its pictures.
+    """
+
+    type: Literal["hello"] = "hello"
+    session: str
+    bake: str
+    method: str
+    axes: list[Literal["curve", "parameter", "light", "environment", "bounces", "eye"]]
+    scene: str
+    look: dict[str, Any]
+    solo: list[str] | None
+    revision: int
+    resumed: bool
+    view: str
+    shown: list[str]
+    views: list[ViewInfo]
+    materials: list[str]
+    resume: str
+
+
+class StatusMessage(Message):
+    """server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded
+    because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile."""
+
+    type: Literal["status"] = "status"
+    state: Literal["freezing", "shading", "ready"]
+    view: str
+    what: str
+    progress: float
+
+
+class ProblemMessage(Message):
+    """server → client: a message was refused; the look stays as it was."""
+
+    type: Literal["problem"] = "problem"
+    revision: int | None
+    problem: Problem
+
+
+class ProbeAnswer(Message):
+    """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel.
+
+    `position` and `normal` are of the surface that covers most of it, world space; null for background.
+    """
+
+    type: Literal["probe"] = "probe"
+    view: str
+    x: int
+    y: int
+    material: str | None
+    position: tuple[float, float, float] | None
+    normal: tuple[float, float, float] | None
+    radiance: tuple[float, float, float]
+    curve: str | None
+    bands: list[list[float]] | None
+
+
+class CurveMessage(Message):
+    """server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`."""
+
+    type: Literal["curve"] = "curve"
+    curve: str
+    revision: int
+    bands: list[list[float]]
+    generated: list[list[float]]
+    max_degrees: float = 90.0
+
+
+class BakeMessage(Message):
+    """server → client: another bake of the same scene goes on or is ready; open a session on it and send the look."""
+
+    type: Literal["bake"] = "bake"
+    bake: str
+    replaces: str
+    state: str
+    progress: float
+    phase: Phase | None
+    seconds_left: float | None
+
+
+ServerMessage = HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage
+
+
+class FrameTimes(Message):
+    """Milliseconds spent on a frame: edit waiting, updating the picture, encoding."""
+
+    wait: float
+    update: float
+    encode: float
+
+
+class FrameHeader(Message):
+    """Header of a binary frame."""
+
+    frame: int
+    revision: int
+    view: str
+    width: int
+    height: int
+    tiles: list[tuple[int, int, int, int]]
+    format: Literal["rgb9e5", "jpeg", "f32", "r8"]
+    exact: bool
+    fidelity: Word
+    complete: bool
+    kind: Literal["picture", "brush"]
+    alpha: bool = False
+    ms: FrameTimes

@@ -1,0 +1,74 @@
+"""A scene, and for every registered method its bake, opened."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from furnace_method import FurnaceMethod
+
+from relume.bake import Recipe
+from relume.memory import Memory
+from relume.methods.base import TransferMethod
+from relume.methods.registry import METHODS, open_transfer
+from relume.picture.transfer import Transfer
+from relume.scene.archive import make_scene
+from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.store import bake_here
+
+SIZE, NUM_LIGHTS = (48, 36), 100
+
+
+def _quad(name: str, corners: list[list[float]], material: int) -> Mesh:
+    positions = np.array(corners, np.float32)
+    normal = np.cross(positions[1] - positions[0], positions[2] - positions[0])
+    normals = np.tile((normal / np.linalg.norm(normal)).astype(np.float32), (4, 1))
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    return Mesh(name, positions, normals, np.zeros((4, 4), np.float32), np.zeros((4, 2), np.float32), faces, material)
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    """A floor and a wall that shadows it, a name that is hard on file names, two views, light from one side."""
+    floor = _quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
+    wall = _quad("wall", [[-0.5, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]], 1)
+    glossy = {"model": "blinn_phong", "color": [0.4, 0.4, 0.4], "params": {"exponent": 20.0}}
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.6, 0.5, 0.4]},)),
+        Material("Wall", ({"model": "lambert", "color": [0.2, 0.3, 0.5]}, glossy)),
+    ]
+    cosine, sine = np.cos(-0.5), np.sin(-0.5)
+    front = np.eye(4)
+    front[:3, :3] = [[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]]
+    front[:3, 3] = [0, 1.8, 3]
+    side = front.copy()
+    side[0, 3] = 0.7
+    cameras = [Camera("front", front, 0.9), Camera("Seite nº 2: ../c", side, 0.9)]
+    radiance = np.random.default_rng(7).random((16, 32, 3), np.float32)
+    radiance[:6, 3:7] += 20
+    return make_scene("contract", [floor, wall], materials, cameras, Environment("side", radiance))
+
+
+@pytest.fixture(scope="session", params=[*sorted(METHODS), FurnaceMethod.name])
+def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
+    """Every registered method, and the tests' own, which joins by the same one line."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(METHODS, FurnaceMethod.name, FurnaceMethod())
+        yield METHODS[request.param]
+
+
+@pytest.fixture(scope="session")
+def recipe(method: TransferMethod, scene: Scene) -> Recipe:
+    return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS)
+
+
+@pytest.fixture(scope="session")
+def baked(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An undisturbed bake."""
+    return bake_here(method, scene, recipe, tmp_path_factory.mktemp("contract") / "store.zarr")
+
+
+@pytest.fixture(scope="session")
+def transfer(baked: Path) -> Transfer:
+    """The bake, opened."""
+    return open_transfer(baked, Memory(1 << 30))

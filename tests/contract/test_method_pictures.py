@@ -1,0 +1,268 @@
+"""What every transfer method's pictures promise, however it stores transport: clauses for freeze and frame.
+
+Whatever way a picture has come to rest, it shows what shading from nothing shows; light adds up, and none is black;
+what is refused or undone leaves no trace.
+"""
+
+import numpy as np
+import pytest
+from oracle import exact_image
+from sessions import BUDGET, is_waiting, look_of, reflects, relative_rmse, settle
+
+from relume.brdf.registry import TERMS
+from relume.errors import MemoryBudgetError, NotFoundError, ParameterError
+from relume.memory import Memory
+from relume.operators.frozen import frozen_bytes
+from relume.operators.shade import shaded_bytes
+from relume.picture.picture import Picture
+from relume.picture.transfer import Axis
+from relume.reference import reference_image
+
+LAMP = {"kind": "point", "position": [0.6, 0.8, 0.9], "emission": [2.0, 1.5, 1.0]}
+PANEL = {
+    "kind": "rectangle", "position": [-0.8, 1.2, 0.8], "direction": [1, -1, -1], "size": [0.5, 0.4],
+    "emission": [4.0, 4.0, 6.0],
+}  # fmt: skip
+LIGHTS = {"Lamp": LAMP, "Panel": PANEL}
+LOBE, EXPONENT = "/materials/Wall/terms/1/curves/theta_h", "/materials/Wall/terms/1/params/exponent"
+UNIT = 2.0**-24  # the relative error of one operation in float32
+ADDED = 1000  # lights, rays and columns that a sample's radiance is summed of, at most
+ROUNDED = np.sqrt(ADDED) * UNIT  # error of a sum whose roundings are independent, relative, root mean square
+
+
+def lit(*changes):
+    """A change of the look: two lamps beside the environment, and what else is given."""
+
+    def change(document):
+        document["lights"].update(LIGHTS)
+        for other in changes:
+            other(document)
+
+    return change
+
+
+def exponent(value):
+    def change(document):
+        document["materials"]["Wall"]["terms"][1]["params"]["exponent"] = float(value)
+
+    return change
+
+
+def drawn(document):
+    curve = {"points": [[0, 30], [10, 12], [40, 0.5], [90, 0]], "channels": "rb"}
+    document["materials"]["Wall"]["terms"][1]["curves"] = {"theta_h": curve}
+
+
+def painted(document):
+    document["materials"]["Floor"]["terms"][0]["color"] = [0.1, 0.7, 0.3]
+
+
+def replaced(document):
+    document["materials"]["Wall"]["terms"] = [{"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3}}]
+
+
+def light(name, **fields):
+    return lambda document: document["lights"].update({name: LIGHTS[name] | fields})
+
+
+def environment(**fields):
+    return lambda document: document["environment"].update(fields)
+
+
+def transport(**fields):
+    return lambda document: document["transport"].update(fields)
+
+
+def everything(document):
+    for change in (drawn, painted, light("Panel", scale=0.5), environment(rotation=80.0), transport(bounces=1)):
+        change(document)
+
+
+EDITS = {  # what a hand has touched before, and what it then does
+    "a curve drawn": (LOBE, drawn),
+    "a curve drawn that nobody has touched": (None, drawn),
+    "a parameter, its curve open": (LOBE, exponent(60)),
+    "a parameter held": (EXPONENT, exponent(60)),
+    "a diffuse colour": ("/materials/Floor/terms/0/color", painted),
+    "another model": (LOBE, replaced),
+    "brightness of a lamp": ("/lights/Lamp", light("Lamp", scale=0.3)),
+    "a lamp moved": ("/lights/Lamp", light("Lamp", position=[-0.4, 0.9, 0.7])),
+    "a lamp switched off": (None, light("Panel", on=False)),
+    "tint of the environment": (None, environment(scale=0.5, color=[1.0, 0.6, 0.4])),
+    "the environment turned": ("/environment/rotation", environment(rotation=40.0)),
+    "fewer paths": (None, transport(bounces=1)),
+    "all at once": (LOBE, everything),
+}
+
+
+def live(transfer, *changes, cache=None, **options):
+    """A picture at rest."""
+    picture = Picture(transfer, "front", cache or Memory(BUDGET), **options)
+    picture.set_look(look_of(transfer, lit(*changes)))
+    return settle(picture)
+
+
+def edited(picture, transfer, pointer, *changes):
+    """What a hand touches is made ready; then it edits, and rests."""
+    if pointer is not None:
+        picture.touch(pointer)
+        settle(picture)
+    picture.set_look(look_of(transfer, lit(*changes)))
+    picture.advance(8)
+    return settle(picture)
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_any_way_to_rest_is_shading_from_nothing(transfer, edit):
+    pointer, change = EDITS[edit]
+    picture = edited(live(transfer), transfer, pointer, change)
+    assert relative_rmse(picture.image(), exact_image(transfer, look_of(transfer, lit(change)))) < ROUNDED
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_an_edit_undone_leaves_no_trace(transfer, edit):
+    pointer, change = EDITS[edit]
+    picture = live(transfer)
+    before = picture.image()
+    during = edited(picture, transfer, pointer, change).image()
+    after = edited(picture, transfer, None).image()
+    np.testing.assert_allclose(after, before, rtol=0, atol=ROUNDED * max(before.max(), during.max()))
+
+
+def test_a_watched_picture_comes_to_rest_like_any_other(transfer):
+    look = look_of(transfer, lit(environment(rotation=77.0)))
+    found = live(transfer, environment(rotation=77.0), is_watched=True)
+    np.testing.assert_array_equal(found.image(), exact_image(transfer, look))
+
+
+def test_no_light_is_black(transfer):
+    picture = live(transfer)
+    before = picture.image()
+    dark = lit(environment(scale=0.0), light("Lamp", on=False), light("Panel", scale=0.0))
+    picture.set_look(look_of(transfer, dark))
+    assert not settle(picture).image().any()
+    picture.set_look(look_of(transfer, lit()))
+    np.testing.assert_array_equal(settle(picture).image(), before)
+
+
+def test_twice_the_light_is_twice_the_picture(transfer):
+    picture = live(transfer)
+    before = picture.image()
+    twice = (environment(scale=2.0), light("Lamp", scale=2.0), light("Panel", scale=2.0))
+    np.testing.assert_array_equal(edited(picture, transfer, None, *twice).image(), 2 * before)
+    np.testing.assert_array_equal(exact_image(transfer, look_of(transfer, lit(*twice))), 2 * before)
+
+
+def test_solos_of_all_sources_sum_to_the_whole(transfer):
+    picture = live(transfer)
+    whole, total = picture.image(), np.zeros_like(picture.image())
+    for source in (*LIGHTS, None) if Axis.LIGHT in transfer.axes else (None,):
+        off = [light(name, on=False) for name in LIGHTS if name != source]
+        alone = edited(picture, transfer, None, *off, environment(scale=float(source is None))).image()
+        assert alone.any()
+        total += alone
+    np.testing.assert_allclose(total, whole, rtol=ADDED * UNIT)
+
+
+NUM_STEPS, A_STEP = 200, 32  # of the drag, and coefficients of each
+
+
+def test_a_highlight_dragged_to_both_ends_and_back_leaves_no_trace(transfer):
+    picture = live(transfer)
+    picture.touch(LOBE)
+    settle(picture)
+    (declared,) = TERMS["blinn_phong"].parameters
+    down = np.geomspace(declared.maximum, declared.minimum, NUM_STEPS // 2)
+    for value in (*down, *down[::-1]):
+        picture.set_look(look_of(transfer, lit(exponent(value))))
+        picture.advance(A_STEP)
+    picture.set_look(look_of(transfer, lit()))
+    rounded = np.sqrt(NUM_STEPS * A_STEP) * UNIT
+    assert relative_rmse(settle(picture).image(), exact_image(transfer, look_of(transfer, lit()))) < rounded
+
+
+@pytest.mark.parametrize(
+    "pointer",
+    [
+        "/materials/Nowhere/terms/0/curves/theta_h",
+        "/materials/Wall/terms/7/curves/theta_h",
+        "/materials/Wall/terms/1/curves/nonsense",
+        "/materials/Wall/terms/1/params/nonsense",
+        "nonsense",
+    ],
+)
+def test_what_points_to_nothing_is_refused_and_changes_nothing(transfer, pointer):
+    picture = live(transfer)
+    before = picture.image()
+    with pytest.raises(ParameterError):
+        picture.touch(pointer)
+    assert not is_waiting(picture)
+    assert not picture.advance(None).changed
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def many_terms(document):
+    for material in document["materials"].values():
+        material["terms"] = [{"model": "lambert", "color": [0.1, 0.1, 0.1], "texture": None}] * 16
+
+
+def test_what_fits_no_budget_is_refused_and_changes_nothing(transfer):
+    rows = [transfer.views["front"].rows(k) for k in range(len(transfer.material_names))]
+    picture = live(transfer, cache=(cache := Memory(12 * sum(shaded_bytes(r.stop - r.start) for r in rows))))
+    before, used = picture.image(), cache.used_bytes
+    with pytest.raises(MemoryBudgetError):
+        picture.check(look_of(transfer, lit(many_terms)))
+    assert (is_waiting(picture), cache.used_bytes) == (False, used)
+    assert not picture.advance(None).changed
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+@pytest.mark.parametrize("pointer", [LOBE, EXPONENT])
+def test_where_no_operator_fits_a_picture_is_shaded(transfer, pointer):
+    views, index = transfer.views["front"], transfer.material_names.index("Wall")
+    rows = views.rows(index)
+    picture = live(transfer, cache=Memory(frozen_bytes(rows.stop - rows.start, 64)))
+    found = edited(picture, transfer, pointer, drawn).image()
+    assert relative_rmse(found, exact_image(transfer, look_of(transfer, lit(drawn)))) < ROUNDED
+
+
+def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(transfer):
+    picture = live(transfer)
+    before = picture.image()
+    look = look_of(transfer, lit(painted))
+    gone = look.environment.model_copy(update={"map": "env:0123456789abcdef"})
+    with pytest.raises(NotFoundError):
+        picture.set_look(look.model_copy(update={"environment": gone}))
+    assert not is_waiting(picture)
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def brute_force_knows(transfer):
+    """Skip where a method's light is its own, as that of the tests' furnace is."""
+    if Axis.LIGHT not in transfer.axes:
+        pytest.skip(f"brute force follows light from its sources; {transfer.method} has none")
+
+
+def test_straight_light_is_that_of_brute_force(scene, transfer, recipe):
+    """Every texel at exact angles; a hundred triangles for the environment, and curves in bands, are two per cent."""
+    brute_force_knows(transfer)
+    look = look_of(transfer, lit(light("Panel", on=False), transport(show="direct")))
+    truth = reference_image(scene, "front", look, recipe.size, 0)
+    assert relative_rmse(exact_image(transfer, look), truth) < 0.03
+
+
+@pytest.mark.parametrize("off", [environment(scale=0.0), light("Lamp", on=False)], ids=["of a lamp", "of the map"])
+def test_light_between_surfaces_is_that_of_brute_force(scene, transfer, recipe, off):
+    """The mean of the picture by a percent and the noise of paths; none where the method has none."""
+    brute_force_knows(transfer)
+    look = look_of(transfer, lit(light("Panel", on=False), off, transport(show="first_bounce")))
+    found = exact_image(transfer, look).mean(axis=(0, 1))
+    assert np.all((found > 0) == reflects(transfer))
+    passes = [
+        reference_image(scene, "front", look, recipe.size, 64, pass_index=k, reflects=reflects(transfer))
+        for k in range(8)
+    ]
+    means = np.mean(passes, axis=(1, 2))
+    expected, deviation = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(means))
+    assert np.all(deviation <= 0.05 * expected)
+    assert np.all(np.abs(found - expected) <= 4 * deviation + 0.01 * expected)

@@ -1,0 +1,78 @@
+"""Plans are upper bounds, also where a scene is made to break them: blades, large environments, large textures.
+
+The figures of ordinary scenes are by `relume bench plan`.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foliage import tuft
+from tiny_scenes import quad
+
+from bench.plan import taken
+from relume.bake import Recipe
+from relume.methods.base import TransferMethod
+from relume.methods.registry import METHODS
+from relume.scene.archive import make_scene
+from relume.scene.model import Environment, Material, Scene, Texture
+
+linux = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells the most memory held")
+BLUE = {"model": "lambert", "color": [0.2, 0.3, 0.5], "texture": "diffuse"}
+
+
+@pytest.fixture(scope="module")
+def blades() -> Scene:
+    return tuft()
+
+
+def large_environment() -> Scene:
+    """A quad below 8 million texels."""
+    radiance = np.random.default_rng(1).random((2048, 4096, 3), np.float32)
+    return _lit_by(radiance, Material("Plain", (BLUE,)))
+
+
+def large_textures() -> Scene:
+    """A quad with 100 MB of textures and normals."""
+    pixels = np.random.default_rng(2).random((2, 2048, 2048, 3), np.float32)
+    maps = {"diffuse": Texture(pixels[0])}
+    return _lit_by(np.ones((8, 16, 3), np.float32), Material("Mapped", (BLUE,), maps, Texture(2 * pixels[1] - 1)))
+
+
+def _lit_by(radiance: np.ndarray, material: Material) -> Scene:
+    floor = quad("floor", [[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], 0)
+    return make_scene("Floor", [floor], [material], tuft(1).cameras, Environment("sky", radiance))
+
+
+def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int]:
+    plan, took = method.plan(scene, recipe), taken(scene, recipe)
+    assert took["view_samples"] <= plan.num_view_samples
+    assert took["rays"] <= plan.num_rays
+    assert took["store_bytes"] <= plan.store_bytes
+    assert took["peak_bytes"] <= plan.peak_bytes
+    return took
+
+
+@linux
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
+    took = check(METHODS[name], blades, Recipe(name, ("front",), (48, 48), 40))
+    assert took["view_samples"] > 3 * 48 * 48  # nearly every pixel is an edge
+
+
+@linux
+@pytest.mark.parametrize("make", [large_environment, large_textures])
+def test_what_a_scene_brings_is_planned(make: object) -> None:
+    check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_what_a_scene_brings_is_in_the_plan(name: str, blades: Scene) -> None:
+    recipe = Recipe(name, ("front",), (32, 32), 40)
+    plan = METHODS[name].plan
+    larger = replace(blades, environment=Environment("sky", np.ones((512, 1024, 3), np.float32)))
+    assert plan(larger, recipe).peak_bytes > plan(blades, recipe).peak_bytes + 512 * 1024 * 12
+    mapped = replace(blades.materials[0], normal_map=Texture(np.ones((512, 512, 3), np.float32)))
+    assert plan(replace(blades, materials=(mapped,)), recipe).peak_bytes > plan(blades, recipe).peak_bytes + 512**2 * 12
+    assert plan(tuft(80_000), recipe).peak_bytes > plan(blades, recipe).peak_bytes + 40_000 * 100

@@ -1,0 +1,77 @@
+"""The limits that docs/operations.md names are those of the code."""
+
+import re
+from pathlib import Path
+
+from relume.brdf import document as terms
+from relume.environments import asset_store as environments
+from relume.environments import reading as environment
+from relume.light import tiles
+from relume.look import document, patch
+from relume.measured import asset_store as materials
+from relume.methods import bounds
+from relume.methods import sampled_views as direct
+from relume.scene import checks, companions, importer, zipped
+from relume.scene.gltf import images
+from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
+from relume.trace.view_samples import POSITIONS_A_PIXEL
+from server.queues.work_queue import MAX_QUEUED
+from server.records import looks, shares
+from server.wire import bodies, protocol
+
+KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
+OPERATIONS = Path(__file__).resolve().parents[2] / "docs" / "operations.md"
+
+
+def most(field: str) -> int:
+    """The upper bound of a number in a comparison's request."""
+    return int(bodies.TruthRequest.model_json_schema()["properties"][field]["maximum"])
+
+
+ROWS = {
+    "triangles of a scene": f"{checks.MAX_TRIANGLES // MILLION} million",
+    "materials of a scene; terms of a material": f"{checks.MAX_MATERIALS:,}; {document.MAX_TERMS}",
+    "local lights of a scene": f"{checks.MAX_LIGHTS}",
+    "scene file; companions of it together; files of a `.zip`": (
+        f"{importer.MAX_FILE_BYTES // MIB} MiB; {companions.MAX_BYTES // MIB} MiB; {zipped.MAX_ENTRIES:,}"
+    ),
+    "side of an image in a scene; texels of all; of what materials make of them": (
+        f"{images.MAX_SIDE:,} pixels; {images.MAX_TEXELS // MILLION} million; {MAX_TEXTURE_TEXELS // MILLION} million"
+    ),
+    "environment; its file": (
+        f"{environment.MAX_WIDTH:,} × {environment.MAX_HEIGHT:,}; {environment.MAX_FILE_BYTES // MILLION} MB"
+    ),
+    "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
+    "imported measured materials": f"{materials.STORE.max_entries}",
+    "pixels of a baked view; light triangles of a bake": f"{direct.MAX_PIXELS:,}; {tiles.MAX_LIGHTS:,}",
+    "points of a drawn curve": f"{terms.MAX_POINTS:,}",
+    "operations of a patch; text message of a session": (
+        f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
+    ),
+    "views shown at once; frames that are not acknowledged": (
+        f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
+    ),
+    "saved look; number of them": f"{looks.MAX_LOOK_BYTES // KIB} KiB; {looks.MAX_LOOKS:,}",
+    "shared look; number of them; all together": (
+        f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"
+    ),
+    "looks of one batch render; passes of a comparison; of each kind waiting": (
+        f"{bodies.MAX_LOOKS:,}; {most('passes'):,}; {MAX_QUEUED}"
+    ),
+}
+
+
+def test_the_table_of_limits_says_what_the_code_checks() -> None:
+    section = OPERATIONS.read_text(encoding="utf-8").split("## Limits")[1].split("\n## ")[0]
+    told = dict(re.findall(r"^\| (?!what)(.+?) \| (.+?) \|$", section, re.MULTILINE))
+    assert {what: at_most for what, at_most in told.items() if what in ROWS} == ROWS
+    assert set(told) - set(ROWS) == {"images of edited looks kept beside a bake"}
+
+
+def test_what_is_said_of_plans_is_what_plans_count() -> None:
+    text = " ".join(OPERATIONS.read_text(encoding="utf-8").split())
+    assert POSITIONS_A_PIXEL == 8
+    assert "eight view samples a pixel" in text
+    assert f"the process ({bounds.PROGRAM_BYTES // MILLION} MB)" in text
+    assert f"({bounds.LIGHT_BYTES_A_TEXEL} bytes a texel)" in text
+    assert f"({bounds.BYTES_A_RAY} bytes each, nine a pixel)" in text

@@ -1,0 +1,333 @@
+"""Reflected light in pictures: its kernel against plain NumPy, its pictures against path tracing and against bakes."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import twins
+from analytic_terms import ANALYTIC
+from oracle import rendered_afresh
+from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
+from tiny_scenes import scene_of
+
+from relume.brdf.albedo import diffuse_reflectance, reflectances_of
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
+from relume.light.triangles import subdivide
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.cell_light import CellLight
+from relume.methods.registry import open_transfer
+from relume.picture.light import light_of
+from relume.picture.picture import Picture
+from relume.picture.routes.preview import Preview
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+from relume.project.receivers import GatherRays, Receivers
+from relume.reference import Points, texels_of
+from relume.reference.indirect import reference_indirect
+from relume.render.image import render_image
+from relume.scene.model import Material
+from relume.trace.cell_tree import NO_CELL
+from relume.trace.geometry import merge
+
+NUM_CELLS = 90
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
+REFLECTANCES = ((0.5, 0.4, 0.3, 0, 0, 0, 0, 0, 0), (0.1, 0.1, 0.1, 0.6, 0.2, 0.4, 0, 0, 0))
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return subdivide(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
+
+
+@pytest.fixture(scope="module")
+def cells(lights):
+    rng = np.random.default_rng(4)
+    normal = twins.unit(rng.normal(size=(NUM_CELLS, 4, 3))).astype(np.float32)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
+    links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
+    material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
+    return CellLight(normal, visible, links, material, rng.random((2, NUM_CELLS, 3), np.float32))
+
+
+@pytest.fixture(scope="module")
+def receivers(cells, lights):
+    """Points in the dark but for reflected light; a tenth of the rays finds nothing."""
+    rng = np.random.default_rng(5)
+    dark = twins.make_receivers(30, lights.num_lights, seed=6)
+    pattern = make_pattern(20, 13, 7)
+    links = rng.integers(0, NUM_CELLS, (30, 33)).astype(np.uint16)
+    for p in range(30):
+        wo = twins.frames(dark)[p] @ dark.wo[p]
+        for ray in range(33):
+            below = local_ray(pattern, ray, small_shifts_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
+            if below or rng.random() < 0.1:
+                links[p, ray] = NO_CELL
+    reflected = cells.radiance(cells.irradiance(lights), cells.reflectance(REFLECTANCES), 1, 24)
+    rays = GatherRays(links, pattern, reflected)
+    points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
+    return Receivers(points, dark.wo, np.zeros_like(dark.visible), (rays,))
+
+
+def bands_of(model):
+    rng = np.random.default_rng(1)
+    bands = {}
+    for curve in TERMS[model].curves:
+        x = np.linspace(0, 1, curve.num_bands)
+        bands[curve.name] = rng.uniform(0.2, 1, (3, 1)) + 0.15 * np.sin(rng.uniform(3, 12, (3, 1)) * x)
+    return bands
+
+
+def image(model, bands, active, lights, receivers):
+    term = TERMS[model]
+    found = Projector(term, contract(term, bands, active), lights, receivers).project(0, len(receivers.normal))
+    return found[:, 0] if active is None else np.einsum("njc,cj->nc", found.astype(float), bands[active])
+
+
+def image_numpy(model, bands, receivers):
+    """Ray by ray, float64."""
+    term, (rays,) = TERMS[model], receivers.rays
+    radiance = rays.radiance.astype(float)
+    out = np.zeros((len(receivers.normal), 3))
+    for p, frame in enumerate(twins.frames(receivers)):
+        wo = frame @ receivers.wo[p].astype(float)
+        shift = small_shifts_of(rays.pattern, receivers.points.seed[p])
+        for ray, cell in enumerate(rays.links[p]):
+            if cell == NO_CELL:
+                continue
+            wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
+            value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * radiance[cell]
+            value = value * term.quotients(*wi.astype(float), *wo)
+            for curve in term.curves:
+                if not curve.outgoing:
+                    value = value * bands[curve.name][:, twins.band_of(curve, wi.astype(float)[None], wo)[0]]
+            out[p] += value
+    return out
+
+
+@pytest.mark.parametrize("model", list(ANALYTIC))
+def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
+    bands = bands_of(model)
+    expected = image_numpy(model, bands, receivers)
+    found = image(model, bands, None, lights, receivers)
+    # an angle within rounding of a band's edge may fall to either side
+    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max())
+    assert np.median(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("model", "curve"), CURVES)
+def test_any_curve_may_be_the_free_one(model, curve, lights, receivers):
+    bands = bands_of(model)
+    none = image(model, bands, None, lights, receivers)
+    np.testing.assert_allclose(image(model, bands, curve, lights, receivers), none, rtol=1e-4, atol=2e-6 * none.max())
+
+
+def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
+    bands = bands_of("cook_torrance")
+    name = TERMS["cook_torrance"].curves[0].name
+    several = np.stack([bands[name] * k for k in (1.0, 2.0, 0.5)], axis=1)
+    term = TERMS["cook_torrance"]
+    together = Projector(term, contract(term, {**bands, name: several}, None), lights, receivers).project(0, 30)
+    for k in range(3):
+        alone = image("cook_torrance", {**bands, name: several[:, k]}, None, lights, receivers)
+        np.testing.assert_allclose(together[:, k], alone, rtol=1e-4, atol=1e-6 * alone.max())
+
+
+def test_reflected_light_adds_to_the_lights_own(lights, receivers):
+    lit = twins.only_above(twins.make_receivers(30, lights.num_lights, seed=6), lights)
+    both = replace(receivers, visible=lit.visible)
+    bands = bands_of("blinn_phong")
+    parts = [image("blinn_phong", bands, None, lights, r) for r in (lit, receivers)]
+    np.testing.assert_allclose(image("blinn_phong", bands, None, lights, both), sum(parts), rtol=1e-5)
+
+
+def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
+    arriving = cells.irradiance(lights)
+    black = cells.radiance(arriving, cells.reflectance(((0.0,) * 9,) * 2), 1, 5)
+    assert not black.any()
+    by_bounces = [cells.radiance(arriving, cells.reflectance(REFLECTANCES), 1, n).sum() for n in (1, 2, 3, 25, 26)]
+    assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
+    assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
+
+
+def test_first_and_further_reflections_are_all_of_them(cells, lights):
+    arriving = cells.irradiance(lights)
+    first, further, both = (
+        cells.radiance(arriving, cells.reflectance(REFLECTANCES), *which) for which in ((1, 1), (2, 6), (1, 6))
+    )
+    np.testing.assert_allclose(first + further, both, rtol=1e-5)
+    assert np.all(further.sum(axis=0) > 0)
+
+
+def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
+    found = cells.reflectance(REFLECTANCES)
+    expected = np.array([[0.5, 0.4, 0.3], [0.1, 0.1, 0.1]])[cells.material]
+    expected[cells.material == 1] += np.array([0.6, 0.2, 0.4]) * cells.textures[0][cells.material == 1]
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_reflectance_of_diffuse_terms():
+    lambert = {"model": "lambert", "color": [0.2, 0.5, 0.9], "texture": None, "params": {}, "curves": {}}
+    np.testing.assert_allclose(diffuse_reflectance(lambert), [0.2, 0.5, 0.9], rtol=1e-6)
+    rough = {**lambert, "model": "oren_nayar", "params": {"sigma": 0.5}}
+    assert 0.5 < diffuse_reflectance(rough)[1] / 0.5 < 1.0
+    glossy = {**lambert, "model": "blinn_phong", "params": {"exponent": 20.0}}
+    assert reflectances_of([lambert, glossy]) == reflectances_of([lambert])
+
+
+def default_look(transfer):
+    return validate(transfer.default_look, transfer.default_look)
+
+
+def test_gathered_light_is_that_of_path_tracing(corner, gathered):
+    """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
+    view, look = gathered.views["front"], default_look(gathered)
+    geometry, texels = merge(corner), texels_of(corner.environment)
+    reflected = gathered.reflected_in(light_of(look, gathered.material_names, has_bounces=True))
+    found, expected, variance = [], [], []
+    for index, name in enumerate(gathered.material_names):
+        rows = view.rows(index)
+        chosen = np.arange(0, rows.stop - rows.start, 12)
+        lit = view.receivers(index, reflected)
+        dark = replace(lit, visible=0 * lit.visible)
+        radiance = np.zeros((len(lit.normal), 3))
+        for document in look.materials[name].terms:
+            bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
+            radiance += image(document["model"], bands, None, gathered.lights, dark) * document["color"]
+        found.append(radiance[chosen])
+        position = view.store.read("views/0/position", rows.start, rows.stop)
+        ones = np.ones_like(position)
+        points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}).rows(chosen)
+        material = np.full(len(chosen), index)
+        truth = reference_indirect(corner, geometry, texels, look, points, material, 4, 48, 24, seed=index)
+        expected.append(truth[0])
+        variance.append(truth[1])
+    found, expected, variance = map(np.concatenate, (found, expected, variance))
+    deviation = np.sqrt(variance.sum(axis=0)) / len(found)  # of the mean
+    assert np.all(np.abs(found.mean(axis=0) - expected.mean(axis=0)) < 4 * deviation + 0.01 * expected.mean(axis=0))
+    square, noise = ((found - expected) ** 2).mean(), variance.mean()
+    assert np.sqrt(max(0.0, square - noise) / (expected**2).mean()) < 0.12
+
+
+def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp_path):
+    """The wall made green in the editor: what it throws onto the floor is what a bake of a green wall gives."""
+
+    def green(document):
+        document["materials"]["Red"]["terms"][0]["color"] = [0.1, 0.7, 0.2]
+
+    edited = render_image(gathered, "front", look_of(gathered, green))
+    terms = copy.deepcopy(corner.materials[1].terms)
+    terms[0]["color"] = [0.1, 0.7, 0.2]
+    materials = [corner.materials[0], Material("Red", terms), corner.materials[2]]
+    other = scene_of(
+        *corner.meshes, camera=corner.cameras[0], environment=corner.environment.radiance, materials=materials
+    )
+    green_bake = bake_corner(other, "gather", tmp_path)
+    expected = render_image(green_bake, "front", default_look(green_bake))
+    before = render_image(gathered, "front", default_look(gathered))
+    assert np.abs(edited - before).mean() > 0.05 * before.mean()
+    # other seeds, other cells: what is compared is the light, not its noise
+    assert np.abs(edited - expected).mean() < 0.02 * expected.mean()
+
+
+def test_without_reflection_a_picture_is_the_direct_one(corner, gathered, tmp_path):
+    """All diffuse terms black: what is left has the lights' own light only."""
+
+    def black(document):
+        for material in document["materials"].values():
+            material["terms"][0]["color"] = [0.0, 0.0, 0.0]
+
+    direct = bake_corner(corner, "direct", tmp_path)
+    expected = render_image(direct, "front", look_of(direct, black))
+    np.testing.assert_allclose(render_image(gathered, "front", look_of(gathered, black)), expected, rtol=1e-5)
+    brighter = render_image(gathered, "front", default_look(gathered)) - render_image(
+        direct, "front", default_look(direct)
+    )
+    assert brighter.min() > -1e-5
+    assert brighter.mean() > 0.02
+
+
+def showing(transfer, show, bounces=24):
+    """The picture of some paths only."""
+
+    def change(document):
+        document["transport"] = {"show": show, "bounces": bounces}
+
+    return rendered_afresh(transfer, look_of(transfer, change))
+
+
+def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
+    whole = render_image(gathered, "front", default_look(gathered))
+    parts = [showing(gathered, show) for show in ("direct", "first_bounce", "further_bounces")]
+    np.testing.assert_allclose(sum(parts), whole, rtol=1e-4, atol=1e-6)
+    assert all(part.mean() > 0.005 * whole.mean() for part in parts)
+
+
+def test_bounces_are_counted_from_direct_light(corner, gathered, tmp_path):
+    direct = showing(gathered, "direct")
+    np.testing.assert_array_equal(showing(gathered, "all", 0), direct)
+    other = bake_corner(corner, "direct", tmp_path)
+    np.testing.assert_array_equal(direct, render_image(other, "front", default_look(other)))
+    one = showing(gathered, "all", 1)
+    np.testing.assert_allclose(one - direct, showing(gathered, "first_bounce"), atol=2e-5)
+    assert not showing(gathered, "further_bounces", 1).any()
+    assert not showing(gathered, "first_bounce", 0).any()
+    for show in ("first_bounce", "further_bounces"):
+        assert not showing(other, show).any()
+    np.testing.assert_array_equal(showing(other, "all", 3), direct)
+
+
+def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
+    """From reflected light alone, glimpsed before there is any other, to all light."""
+    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 300)
+    picture = Picture(gathered, "front", Memory(BUDGET))
+    for show in ("first_bounce", "all", "direct"):
+
+        def change(document, show=show):
+            document["transport"]["show"] = show
+
+        picture.set_look(look_of(gathered, change))
+        if show == "all":
+            picture.advance(None)
+            need = picture.next_job()
+            assert isinstance(need, Preview)
+            picture.install(need, need.make(lambda share: None, lambda: False))
+            picture.advance(None)
+            glimpse = picture.image()
+            exact = settle(picture).image()
+            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
+        np.testing.assert_array_equal(settle(picture).image(), showing(gathered, show))
+
+
+def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
+    """Its samples keep the rays that were traced for them; its neighbours are others."""
+    monkeypatch.setattr("relume.views.view.sharing", lambda *of_samples: None)
+    transfer, step = open_transfer(Path(gathered.key), Memory(1 << 30)), 3
+    whole = Picture(transfer, "front", Memory(BUDGET))
+    few = Picture(transfer.thinned("front", step), "front", Memory(BUDGET))
+    for picture in (whole, few):  # no look whose images are kept beside the store
+        picture.set_look(look_of(transfer, lambda document: document["transport"].update(bounces=5)))
+    np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
+
+
+def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
+    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 300)
+    picture = settle(Picture(gathered, "front", Memory(BUDGET)))
+
+    def turn(document):
+        document["environment"]["rotation"] = 90.0
+
+    picture.set_look(look_of(gathered, turn))
+    picture.advance(None)
+    still, need = picture.image(), picture.next_job()
+    assert isinstance(need, Preview)
+    picture.install(need, need.make(lambda share: None, lambda: False))
+    assert not picture.advance(None).exact
+    glimpse, exact = picture.image(), settle(picture).image()
+    assert relative_rmse(glimpse, exact) < 0.7 * relative_rmse(still, exact)

@@ -1,0 +1,263 @@
+"""Streaming, freezing and the cache of frozen operators, against NumPy and direct projection."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import twins
+from tiny_scenes import studio
+
+from relume.basis.daubechies import analysis, matrix, synthesis
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.errors import CancelledError, MemoryBudgetError
+from relume.light.triangles import subdivide
+from relume.memory import Memory
+from relume.operators.frozen import Frozen, freeze, frozen_bytes
+from relume.operators.stream import columns_of, stream
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+
+RNG = np.random.default_rng(0)
+
+
+@pytest.mark.parametrize(
+    "counts", [(0, 0, 0), (1, 1, 1), (4, 4, 4), (5, 5, 5), (3, 0, 7), (64, 1, 2), (0, 0, 6), (64, 64, 64)]
+)
+@pytest.mark.parametrize("shape", [(1, 16), (3, 48), (2, 1040)])
+def test_streamed_columns_are_the_product(counts, shape):
+    tiles, samples = shape
+    transport = RNG.normal(size=(tiles, 3, 64, samples)).astype(np.float32)
+    image = RNG.normal(size=(tiles, 3, samples)).astype(np.float32)
+    change = np.zeros((3, 64))
+    for channel, count in enumerate(counts):
+        change[channel, RNG.permutation(64)[:count]] = RNG.normal(size=count)
+    expected = twins.stream(transport, change, image)
+    stream(transport, columns_of(change), image)
+    np.testing.assert_allclose(image, expected, atol=1e-4)
+
+
+def test_columns_list_what_changes_and_nothing_else():
+    change = np.zeros((3, 16))
+    change[0, [3, 9]], change[2, 15] = [1.5, -2], 1e-20
+    columns = columns_of(change)
+    assert columns.count.tolist() == [2, 0, 1]
+    assert columns.index[0, :2].tolist() == [3, 9]
+    assert columns.change[0, :2].tolist() == [1.5, -2]
+    assert columns.index[2, 0] == 15
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return subdivide(studio(), 120)
+
+
+def frozen_of(model, active, lights, receivers, **options):
+    document = {"model": model, "params": {}}
+    bands = {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
+    progress = options.get("progress", lambda share: None)
+    cancelled = options.get("cancelled", lambda: False)
+    return bands, freeze(TERMS[model], bands, active, lights, receivers, progress, cancelled)
+
+
+def rows_of(frozen, count):
+    """Coefficients of each receiver, in order. (count, 3, J)"""
+    tiles, _, num_bands, samples = frozen.transport.shape
+    return frozen.transport.transpose(0, 3, 1, 2).reshape(tiles * samples, 3, num_bands)[:count].astype(float)
+
+
+@pytest.mark.parametrize("count", [1, 15, 16, 17, 513, 1500])
+@pytest.mark.parametrize(
+    ("model", "active"), [("lambert", "theta_i"), ("cook_torrance", "theta_h"), ("ggx", "theta_d")]
+)
+def test_frozen_transport_is_the_projection_times_the_wavelet_matrix(count, model, active, lights):
+    receivers = twins.only_above(twins.make_receivers(count, lights.num_lights, seed=count), lights)
+    bands, frozen = frozen_of(model, active, lights, receivers)
+    term = TERMS[model]
+    boxes = Projector(term, contract(term, bands, active), lights, receivers).project(0, count).astype(float)
+    expected = np.einsum("kj,njc->nck", matrix(boxes.shape[1]).astype(float), boxes)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(rows_of(frozen, count), expected, atol=2e-6 * scale)
+    padding = frozen.transport.transpose(0, 3, 1, 2).reshape(-1, 3, boxes.shape[1])[count:]
+    assert not padding.any()
+    np.testing.assert_allclose(
+        frozen.importance, np.sqrt((expected**2).sum(axis=0)), atol=1e-4 * np.sqrt(count) * scale
+    )
+    assert frozen.num_bytes == frozen_bytes(count, boxes.shape[1])
+    assert frozen.transport.flags.c_contiguous
+
+
+def test_more_samples_than_a_tile_holds(monkeypatch, lights):
+    monkeypatch.setattr("relume.operators.frozen.TILE_SAMPLES", 128)
+    receivers = twins.only_above(twins.make_receivers(700, lights.num_lights, seed=9), lights)
+    bands, frozen = frozen_of("blinn_phong", "theta_h", lights, receivers)
+    assert len(frozen.transport) > 1
+    term = TERMS["blinn_phong"]
+    boxes = Projector(term, contract(term, bands, "theta_h"), lights, receivers).project(0, 700)
+    expected = analysis(boxes.transpose(0, 2, 1).astype(float))
+    np.testing.assert_allclose(rows_of(frozen, 700), expected, atol=2e-6 * np.abs(expected).max())
+
+
+def test_wavelet_product_is_the_product_in_bands(lights):
+    receivers = twins.only_above(twins.make_receivers(50, lights.num_lights, seed=3), lights)
+    bands, frozen = frozen_of("cook_torrance", "theta_h", lights, receivers)
+    image = np.zeros((1, 3, frozen.transport.shape[3]), np.float32)
+    stream(frozen.transport, columns_of(analysis(bands["theta_h"])), image)
+    boxes = synthesis(rows_of(frozen, 50))
+    expected = np.einsum("ncj,cj->cn", boxes, bands["theta_h"])
+    np.testing.assert_allclose(image[0, :, :50], expected, rtol=2e-5, atol=1e-6 * expected.max())
+
+
+def test_progress_rises_to_one_and_cancelling_stops(lights):
+    receivers = twins.only_above(twins.make_receivers(3000, lights.num_lights, seed=4), lights)
+    told = []
+    frozen_of("lambert", "theta_i", lights, receivers, progress=told.append)
+    assert max(told) == pytest.approx(1.0)
+    assert min(told) > 0
+    with pytest.raises(CancelledError):
+        frozen_of("lambert", "theta_i", lights, receivers, cancelled=lambda: True)
+
+
+def operator(num_bytes):
+    transport = np.ones((1, 3, 4, num_bytes // 48), np.float32)
+    return Frozen(transport, np.ones((3, 4)))
+
+
+def test_cache_drops_the_least_recently_used_and_keeps_its_budget():
+    cache = Memory(4800)
+    for key in "abc":
+        cache.get(key, Frozen, 1440, lambda: operator(1440))
+    assert cache.used_bytes == 4320
+    cache.find("a", Frozen)
+    cache.get("d", Frozen, 1440, lambda: operator(1440))
+    assert [cache.find(key, Frozen) is not None for key in "abcd"] == [True, False, True, True]
+    assert cache.used_bytes == 4320 <= cache.budget_bytes
+    cache.get("all", Frozen, 4800, lambda: operator(4800))
+    assert cache.used_bytes == 4800
+    assert [cache.find(key, Frozen) for key in "abcd"] == [None] * 4
+
+
+def test_cache_returns_what_it_has():
+    cache = Memory(10_000)
+    first = cache.get("k", Frozen, 480, lambda: operator(480))
+    assert cache.get("k", Frozen, 480, lambda: pytest.fail("made twice")) is first
+    assert cache.find("k", Frozen) is first
+    assert cache.find("other", Frozen) is None
+
+
+def test_larger_than_the_budget_is_refused_before_anything_is_made_or_dropped():
+    cache = Memory(1000)
+    kept = cache.get("small", Frozen, 480, lambda: operator(480))
+    with pytest.raises(MemoryBudgetError) as refused:
+        cache.get("large", Frozen, 1001, lambda: pytest.fail("made"))
+    assert (refused.value.needed_bytes, refused.value.allowed_bytes) == (1001, 1000)
+    assert cache.find("small", Frozen) is kept
+
+
+@pytest.mark.parametrize("problem", [CancelledError("cancelled"), MemoryError(), KeyboardInterrupt()])
+def test_freeze_that_ends_early_leaves_nothing(problem):
+    cache = Memory(1000)
+
+    def fails():
+        raise problem
+
+    for _ in range(5):
+        with pytest.raises(type(problem)):
+            cache.get("k", Frozen, 960, fails)
+        assert cache.used_bytes == 0
+        assert cache.find("k", Frozen) is None
+    assert cache.get("k", Frozen, 960, lambda: operator(960)) is cache.find("k", Frozen)
+
+
+def test_two_who_want_the_same_thing_at_once_make_it_once():
+    cache, made, start = Memory(100_000), [], threading.Barrier(8)
+
+    def make():
+        made.append(1)
+        time.sleep(0.05)
+        return operator(480)
+
+    found = []
+
+    def want():
+        start.wait()
+        found.append(cache.get("k", Frozen, 480, make))
+
+    threads = [threading.Thread(target=want) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1
+    assert len({id(one) for one in found}) == 1
+    assert cache.used_bytes == found[0].num_bytes
+
+
+def test_one_who_gives_up_lets_the_others_make_it_once():
+    """The first is cancelled while a second waits; a third comes when the second is at it: made once, for both."""
+    cache, made, outcome = Memory(100_000), [], []
+    first_runs, go_on, second_runs = threading.Event(), threading.Event(), threading.Event()
+
+    def cancelled():
+        first_runs.set()
+        go_on.wait(60)
+        raise CancelledError("cancelled")
+
+    def make():
+        made.append(1)
+        second_runs.set()
+        time.sleep(0.1)
+        return operator(480)
+
+    def give_up():
+        with pytest.raises(CancelledError):
+            cache.get("k", Frozen, 480, cancelled)
+
+    def want():
+        outcome.append(cache.get("k", Frozen, 480, make))
+
+    first, second, third = (threading.Thread(target=target) for target in (give_up, want, want))
+    first.start()
+    assert first_runs.wait(60)
+    second.start()
+    time.sleep(0.05)  # until it waits
+    go_on.set()
+    first.join()
+    assert second_runs.wait(60)
+    third.start()
+    second.join()
+    third.join()
+    assert len(made) == 1
+    assert outcome[0] is outcome[1]
+    assert cache.used_bytes == 480
+
+
+def test_many_threads_and_keys_never_lose_count():
+    cache, errors = Memory(5000), []
+
+    def work(seed):
+        rng = np.random.default_rng(seed)
+        for _ in range(60):
+            key, size = int(rng.integers(12)), 480 * int(rng.integers(1, 5))
+            try:
+                if rng.random() < 0.2:
+                    with pytest.raises(CancelledError):
+                        cache.get(("never", key), Frozen, size, lambda: (_ for _ in ()).throw(CancelledError("no")))
+                else:
+                    cache.get((key, size), Frozen, size, lambda size=size: operator(size))
+            except Exception as error:
+                errors.append(error)
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    keys = [(key, size) for key in range(12) for size in range(480, 2401, 480)]
+    held = sum(entry.num_bytes for key in keys if (entry := cache.find(key, Frozen)) is not None)
+    assert cache.used_bytes == held
+    assert held > 0

@@ -1,0 +1,56 @@
+"""JSON Pointers to what a hand may hold."""
+
+import pytest
+
+from relume.errors import ParameterError
+from relume.picture.pointer import (
+    CurvePointer,
+    EnvironmentPointer,
+    LightPointer,
+    ParameterPointer,
+    parse_curve,
+    parse_pointer,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("/materials/a~1b~0c/terms/0/curves/theta_h", CurvePointer("a/b~c", 0, "theta_h")),
+        ("/materials/Teapot/terms/15/params/ior", ParameterPointer("Teapot", 15, "ior")),
+        ("/lights/Lamp ~1 2", LightPointer("Lamp / 2")),
+        ("/environment/rotation", EnvironmentPointer("rotation")),
+    ],
+)
+def test_a_pointer_is_read_and_written_alike(text, meant):
+    assert parse_pointer(text) == meant
+    assert str(meant) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "/materials/Teapot",
+        "/materials//terms/0/curves/theta_h",
+        "/materials/Teapot/terms/01/curves/theta_h",
+        "/materials/Teapot/terms/1000/curves/theta_h",
+        "/materials/Teapot/terms/\u0663/curves/theta_h",
+        "/materials/Teapot/terms/0/curves/theta_h\n",
+        "/materials/Teapot/terms/0/textures/diffuse",
+        "/lights",
+        "/lights/",
+        "/lights/Lamp/scale",
+        "/environment",
+        "/environment/radius",
+        "/environment/rotation/0",
+    ],
+)
+def test_what_points_to_nothing_is_refused(text):
+    with pytest.raises(ParameterError, match="pointer"):
+        parse_pointer(text)
+
+
+def test_only_a_curve_is_one():
+    with pytest.raises(ParameterError, match="curve"):
+        parse_curve("/lights/Lamp")

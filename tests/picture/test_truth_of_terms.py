@@ -1,0 +1,65 @@
+"""A small picture of every term, as a frame shows it, against brute force over every texel."""
+
+from __future__ import annotations
+
+import pytest
+from analytic_terms import ANALYTIC
+from sessions import BUDGET, relative_rmse, settle
+from tiny_scenes import still_life
+
+from relume.bake import Recipe
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.picture.picture import Picture
+from relume.reference import reference_image
+from relume.store import bake_here
+
+SIZE, NUM_LIGHTS = (40, 30), 1500
+# What 1,500 triangles with one shadow ray each leave over: shadow edges move by up to a triangle, for all terms alike
+# (SHADOWS); a highlight also sees quotient and cosine at one direction for a whole triangle (HIGHLIGHT), and a quotient
+# without masking grows towards the horizon, where it changes across the triangle (UNMASKED).
+SHADOWS, HIGHLIGHT, UNMASKED = 0.01, 0.02, 0.03
+CASES = {
+    "lambert": ({}, SHADOWS),
+    "oren_nayar": ({"sigma": 0.6}, SHADOWS),
+    "phong": ({"exponent": 30.0}, HIGHLIGHT),
+    "blinn_phong": ({"exponent": 120.0}, HIGHLIGHT),
+    "lafortune": ({"exponent": 20.0, "c_x": -0.9, "c_y": -0.6}, HIGHLIGHT),
+    "ward": ({"alpha": 0.2}, HIGHLIGHT),
+    "ward_duer": ({"alpha": 0.2}, UNMASKED),
+    "ward_anisotropic": ({"alpha_x": 0.15, "alpha_y": 0.4}, HIGHLIGHT),
+    "ashikhmin_shirley": ({"nu": 15.0, "nv": 120.0, "f0": 0.4}, HIGHLIGHT),
+    "cook_torrance": ({"sigma": 0.2}, HIGHLIGHT),
+    "schlick": ({"roughness": 0.05, "f0": 0.4}, UNMASKED),
+    "beard_maxwell": ({"sigma": 0.2, "tau": 20.0}, UNMASKED),
+    "ggx": ({"roughness": 0.45, "f0": 0.4}, HIGHLIGHT),
+}
+
+
+def test_every_term_has_a_case() -> None:
+    assert set(CASES) == set(ANALYTIC)  # measured ones: tests/measured
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return still_life()
+
+
+@pytest.fixture(scope="module")
+def picture(scene, tmp_path_factory):
+    recipe = Recipe("direct", ("front",), SIZE, NUM_LIGHTS)
+    store = bake_here(METHODS["direct"], scene, recipe, tmp_path_factory.mktemp("terms") / "s.zarr")
+    transfer = open_transfer(store, Memory(1 << 30))
+    return transfer, Picture(transfer, "front", Memory(BUDGET))
+
+
+@pytest.mark.parametrize("model", CASES)
+def test_picture_of_a_term_is_brute_force(model, scene, picture) -> None:
+    transfer, live = picture
+    params, bound = CASES[model]
+    term = {"model": model, "color": [0.8, 0.5, 0.3], "params": params, "texture": None}
+    look = validate({"materials": {m.name: {"terms": [term]} for m in scene.materials}}, transfer.default_look)
+    live.set_look(look)
+    found = settle(live).image()
+    assert relative_rmse(found, reference_image(scene, "front", look, SIZE, 0)) < bound

@@ -1,0 +1,117 @@
+"""The shares of a triangle in the bands, against a triangle cut into very many."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+import pytest
+
+from relume.project.eight_bands import NUM, deposit_eight, mean_of_eight
+from relume.project.overlap import overlap_of
+
+FINE = 250
+NUM_BANDS = 256
+
+
+@nb.njit
+def deposit_all(overlap, weight, out):
+    low, middle, high, rise, fall = overlap
+    for band in range(0, NUM_BANDS, NUM):
+        deposit_eight(out, band, low, middle, high, rise, fall, weight[0], weight[1], weight[2])
+
+
+@nb.njit
+def mean_of_all(overlap, bands, channel):
+    low, middle, high, rise, fall = overlap
+    mean = np.float32(0)
+    for band in range(0, NUM_BANDS, NUM):
+        mean += mean_of_eight(bands, channel, band, low, middle, high, rise, fall)
+    return mean
+
+
+def shares_of(corners, weight=(1, 1, 1)):
+    """The triangle shared out to all bands, three weights at once. (3, J)"""
+    out = np.zeros((3, NUM_BANDS + NUM), np.float32)
+    deposit_all(overlap_of(*np.float32(corners)), np.float32(weight), out)
+    assert not out[:, NUM_BANDS:].any()
+    return out[:, :NUM_BANDS].astype(float)
+
+
+def fine_values(a, b, c, fine=FINE):
+    """The linear angle at the middles of fine² congruent triangles."""
+    i, j = np.meshgrid(np.arange(fine), np.arange(fine), indexing="ij")
+    up = i + j < fine
+    down = i + j < fine - 1
+    u = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / fine
+    v = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / fine
+    return np.sort(a + (b - a) * u + (c - a) * v)
+
+
+def fine_below(corners):
+    """Share below the end of each band. (J,)"""
+    values = fine_values(*corners)
+    return np.searchsorted(values, np.arange(1, NUM_BANDS + 1)) / len(values)
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        (0.0, 1.0, 2.0),
+        (5.3, 1.1, 9.7),
+        (3.0, 3.0, 8.0),
+        (3.0, 8.0, 8.0),
+        (120.2, 120.9, 120.4),
+        (0.0, 255.0, 13.0),
+        (7.0, 7.001, 30.0),
+        (7.5, 30.2, 30.2),
+        (255.0, 256.0, 255.5),
+    ],
+)
+def test_shares_are_those_of_a_fine_division(corners):
+    np.testing.assert_allclose(np.cumsum(shares_of(corners)[0]), fine_below(corners), atol=2.5 / FINE)
+
+
+def test_random_triangles_in_any_order_of_corners():
+    rng = np.random.default_rng(1)
+    for extent in (1, 6, 40, 250):
+        for corners in rng.uniform(0, 256 - extent) + rng.uniform(0, extent, (25, 3)):
+            found = [shares_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
+            np.testing.assert_array_equal(found, np.broadcast_to(found[0], (4, NUM_BANDS)))
+            np.testing.assert_allclose(np.cumsum(found[0]), fine_below(corners), atol=2.5 / FINE)
+
+
+def test_shares_are_not_negative_and_sum_to_one():
+    for corners in np.random.default_rng(2).uniform(0, 256, (200, 3)):
+        shares = shares_of(corners)[0]
+        assert shares.min() > -1e-6
+        assert shares.sum() == pytest.approx(1, abs=1e-6)
+        inside = (np.arange(1, NUM_BANDS + 1) > corners.min()) & (np.arange(NUM_BANDS) < corners.max())
+        assert not shares[~inside].any()
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.0, 17.25, 128.0, 255.9, 255.99998])
+def test_triangle_at_one_angle_lies_in_its_band(value):
+    for corners in ([value] * 3, [value, value, value - 5e-5], [value, value - 5e-5, value - 5e-5]):
+        shares = shares_of(np.maximum(corners, 0))[0]
+        assert shares.min() >= 0
+        assert shares.sum() == pytest.approx(1, abs=1e-6)
+        near = [min(int(value), NUM_BANDS - 1), max(int(value) - 1, 0)]
+        assert shares[near].max() == pytest.approx(1, abs=1e-5) or value == int(value)
+        assert shares[sorted(set(near))].sum() == pytest.approx(1, abs=1e-6)
+
+
+def test_weights_of_three_channels_and_means_are_the_shares():
+    rng = np.random.default_rng(4)
+    for corners in rng.uniform(0, 256, (30, 3)):
+        shares = shares_of(corners)[0]
+        np.testing.assert_allclose(shares_of(corners, (2, 0.5, 0)), [2 * shares, 0.5 * shares, 0 * shares], rtol=1e-6)
+        bands = rng.uniform(0, 1, (3, NUM_BANDS + NUM)).astype(np.float32)
+        for channel in range(3):
+            mean = mean_of_all(overlap_of(*np.float32(corners)), bands, channel)
+            assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ shares), rel=2e-6)
+
+
+def test_middle_is_the_middle_whatever_the_size_of_the_angles():
+    for corners in np.random.default_rng(3).uniform(0, 256, (200, 3)):
+        low, middle, high, *_ = overlap_of(*np.float32(corners))
+        assert [low, middle, high] == sorted(np.float32(corners))

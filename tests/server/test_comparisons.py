@@ -1,0 +1,174 @@
+"""A frame compared with brute force over REST: figures, pictures, restart, deletion, bad requests."""
+
+import io
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from server_fakes import SIZE, Control, FakeTransfer
+from session_client import Baked
+
+from server.app import create_app
+from server.settings import Settings
+
+WAIT_S = 60.0
+
+
+def wait_until(client: TestClient, url: str, is_reached: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        body: dict[str, Any] = client.get(url).json()
+        if is_reached(body):
+            return body
+        time.sleep(0.02)
+    raise TimeoutError(url)
+
+
+def is_done(body: dict[str, Any]) -> bool:
+    return body["state"] in ("ready", "failed")
+
+
+def submit(client: TestClient, baked: Baked, passes: int) -> str:
+    queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes})
+    assert queued.status_code == 202, queued.text
+    return str(queued.headers["location"])
+
+
+def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 6)
+    body = wait_until(client, url, is_done)
+    assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
+    # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth
+    assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
+    assert body["found"]["error"] < body["found"]["limit"] < 0.11
+    assert body["found"]["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
+    assert body["found"]["significant"] > 0.99
+    error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/error.png").content)), int)
+    assert error.shape == (SIZE[1], SIZE[0], 3)
+    assert np.mean(error[..., 0] > error[..., 2] + 20) > 0.99  # too bright
+    assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE
+    assert client.get(f"{url}/other.png").status_code == 422
+
+
+@pytest.mark.parametrize(("is_upgraded", "asked"), [(False, [3, 4]), (True, [0, 1, 2, 3, 4])])
+def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
+    settings: Settings,
+    client: TestClient,
+    control: Control,
+    baked: Baked,
+    monkeypatch: pytest.MonkeyPatch,
+    is_upgraded: bool,
+    asked: list[int],
+) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 3)
+    assert wait_until(client, url, is_done)["state"] == "ready"
+    queue = client.app.state.services.comparisons
+    identity = url.rsplit("/", 1)[1]
+    request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
+    queue.close()  # or it might be the first to look
+    # as a kill after three passes leaves it
+    queue._update(identity, ("ready",), state="running", request=request)
+    if is_upgraded:
+        monkeypatch.setattr("server.queues.comparisons.truth_code", lambda: "0123456789abcdef")
+    later = Control()
+    later.may_trace.set()
+    with TestClient(create_app(settings, open_library=later.open_library)) as restarted:
+        assert wait_until(restarted, url, is_done)["passes"] == 5
+    assert later.passes_asked == asked
+
+
+def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, control: Control, baked: Baked) -> None:
+    url = submit(client, baked, 1000)
+    wait_until(client, url, lambda body: body["state"] == "running")
+    assert client.get(f"{url}/error.png").status_code == 409
+    assert client.delete(url, params={"forget": True}).status_code == 204
+    assert client.get(url).status_code == 404
+    control.may_trace.set()  # the next one is worked on
+    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
+    folder = client.app.state.services.settings.data / "truths"
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 1000)
+    wait_until(client, url, lambda body: body["passes"] >= 3 and body["found"] is not None)
+    assert client.delete(url).status_code == 204
+    stopped = client.get(url).json()
+    assert (stopped["state"], stopped["seconds_left"]) == ("stopped", None)
+    assert stopped["found"]["noise"] > 0
+    assert client.get(f"{url}/error.png").status_code == 200
+    assert client.delete(url).status_code == 204  # again: nothing more to stop
+    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next one has its turn
+    passes = client.get(url).json()["passes"]
+    resumed = client.post(f"{url}/resume")
+    assert (resumed.status_code, resumed.json()["state"]) == (202, "queued")
+    on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
+    assert on["seconds_left"] > 0
+    assert len(control.passes_asked) - len(set(control.passes_asked)) <= 3  # no finished pass was made again
+    assert client.delete(url, params={"forget": True}).status_code == 204
+    assert client.post(f"{url}/resume").status_code == 404
+
+
+def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    request = {"bake": baked.bake, "view": "front", "passes": 10, "dry_run": True}
+    planned = client.post("/api/truths", json=request)
+    assert planned.status_code == 200
+    assert planned.json()["passes"] == 10
+    assert planned.json()["seconds"] > 0
+    assert len(control.passes_asked) == 1  # a small picture; the second time its pace is known
+    again = client.post("/api/truths", json=request | {"passes": 20}).json()
+    assert again["seconds"] == pytest.approx(2 * planned.json()["seconds"])
+    assert len(control.passes_asked) == 1
+    assert client.post("/api/truths", json=request | {"view": "nowhere"}).status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({"bake": "0" * 16}, 404),
+        ({"view": "nowhere"}, 422),
+        ({"passes": 1}, 422),
+        ({"passes": 10**9}, 422),
+        ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
+        ({"spp": 5}, 422),
+    ],
+)
+def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[str, Any], status: int) -> None:
+    request = {"bake": baked.bake, "view": "front"} | change
+    answer = client.post("/api/truths", json=request)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize("method", ["direct", "gather"])
+def test_brute_force_has_the_light_paths_of_the_bake(
+    client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by(method, FakeTransfer.__init__))
+    control.may_trace.set()
+    wait_until(client, submit(client, baked, 2), is_done)
+    assert control.reflections_asked == [method == "gather"] * 2
+
+
+def _baked_by(method: str, init: Callable[..., None]) -> Callable[..., None]:
+    return lambda self, *args, **more: init(self, *args, **{**more, "method": method})
+
+
+def test_an_estimate_does_not_wait_behind_another(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
+    truths = client.app.state.services.comparisons  # type: ignore[attr-defined]
+    with truths._sampling:
+        refused = client.post("/api/truths", json=question)
+        assert (refused.status_code, refused.json()["title"]) == (503, "Too busy")
+    told = client.post("/api/truths", json=question).json()
+    with truths._sampling:  # what is known is told at once
+        assert client.post("/api/truths", json=question).json() == told

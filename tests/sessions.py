@@ -1,0 +1,127 @@
+"""What a person does in a session: edits at random, and waiting until the picture is exact."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from analytic_terms import ANALYTIC
+
+from relume.bake import Recipe
+from relume.brdf.registry import TERMS
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.picture.transfer import Axis
+from relume.store import bake_here
+
+BUDGET = 1 << 28
+
+
+def bake_corner(scene, method, folder):
+    """Its view "front" in 40×30 under 400 lights, opened."""
+    recipe = Recipe(method, ("front",), (40, 30), 400)
+    return open_transfer(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+
+
+def look_of(transfer, change=lambda document: None):
+    """The default look after `change` has edited a copy of its document in place."""
+    document = copy.deepcopy(transfer.default_look)
+    change(document)
+    return validate(document, transfer.default_look)
+
+
+def settle(picture):
+    """Freeze and advance until the picture is exact and nothing waits."""
+    for _ in range(200):
+        advance = picture.advance(None)
+        if picture.next_job() is None and advance.exact:
+            return picture
+        picture.freeze(lambda share: None, lambda: False)
+    raise AssertionError(f"the picture still waits for {picture.next_job()}")
+
+
+def make_next(picture):
+    """Make what waits, whatever it is; returns it."""
+    need = picture.next_job()
+    picture.install(need, need.make(lambda share: None, lambda: False))
+    return need
+
+
+def is_waiting(picture):
+    """Whether anything is lacking, for the look or for what is touched."""
+    return picture.next_job() is not None
+
+
+def reflects(transfer):
+    """Whether light between surfaces was baked."""
+    return Axis.BOUNCES in transfer.axes
+
+
+def relative_rmse(found, expected):
+    """Root mean square of the difference in units of that of what is expected."""
+    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+
+
+def random_term(rng):
+    """A term of any model with parameters in a lively range."""
+    model = list(ANALYTIC)[rng.integers(len(ANALYTIC))]
+    term = {"model": model, "color": rng.uniform(0, 1, 3).round(3).tolist(), "params": {}, "curves": {}}
+    fixed = TERMS[model].fixed
+    return term | {"params": {p.name: random_value(rng, p, p.name in fixed) for p in TERMS[model].parameters}}
+
+
+def random_value(rng, parameter, is_fixed):
+    """A number or, where it is not fixed at freeze, three, away from the ends of the parameter's range."""
+    low, high = parameter.minimum, parameter.maximum
+    at = rng.uniform(0.1, 0.9, 3 if rng.random() < 0.2 and not is_fixed else 1)
+    values = np.exp(np.log(low) + at * np.log(high / low)) if parameter.scale == "log" else low + at * (high - low)
+    return values.tolist() if len(values) == 3 else float(values[0])
+
+
+def random_curve(rng, num_bands):
+    """A curve drawn by hand, as points or bands, of one colour or several."""
+    angles = np.sort(rng.choice(np.arange(1, 90), rng.integers(2, 7), replace=False))
+    points = [[float(angle), float(value)] for angle, value in zip(angles, rng.uniform(0, 2, len(angles)), strict=True)]
+    drawn = {"points": points} if rng.random() < 0.7 else {"bands": rng.uniform(0, 2, num_bands).tolist()}
+    return drawn | ({"channels": "rgb"[rng.integers(3)]} if rng.random() < 0.3 else {})
+
+
+def random_edit(rng, document):
+    """Edit a complete look document in place, as an editor might; returns what was done."""
+    name = list(document["materials"])[rng.integers(len(document["materials"]))]
+    terms = document["materials"][name]["terms"]
+    kind = rng.choice(
+        ["params", "curve", "color", "reset", "model", "add", "remove", "scale", "texture"],
+        p=[0.35, 0.25, 0.1, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05],
+    )
+    if kind == "scale":
+        document["environment"]["scale"] = float(rng.uniform(0, 3))
+        document["environment"]["color"] = rng.uniform(0, 1, 3).tolist()
+        return kind
+    if kind == "add" and len(terms) < 3:
+        terms.append(random_term(rng))
+        return kind
+    if kind == "remove" and len(terms) > 1:
+        del terms[rng.integers(len(terms))]
+        return kind
+    k = int(rng.integers(len(terms)))
+    term, declared = terms[k], TERMS[terms[k]["model"]]
+    if kind == "params" and declared.parameters:
+        parameter = declared.parameters[rng.integers(len(declared.parameters))]
+        term["params"] = {
+            **term["params"],
+            parameter.name: random_value(rng, parameter, parameter.name in declared.fixed),
+        }
+    elif kind == "curve":
+        curve = declared.curves[rng.integers(len(declared.curves))]
+        term["curves"] = {**term["curves"], curve.name: random_curve(rng, curve.num_bands)}
+    elif kind == "reset":
+        term["curves"] = {}
+    elif kind == "model":
+        terms[k] = random_term(rng)
+    elif kind == "texture":
+        term["texture"] = [None, "diffuse", "specular"][rng.integers(3)]
+    else:
+        term["color"] = rng.uniform(0, 1, 3).tolist()
+    return kind

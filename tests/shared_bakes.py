@@ -1,0 +1,51 @@
+"""Fixtures: tiny bakes that are made once in each process of tests, for all that look at pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sessions import bake_corner
+from tiny_scenes import looking, quad, scene_of, still_life
+
+from relume.bake import Recipe
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.scene.model import Material
+from relume.store import bake_here
+
+
+@pytest.fixture(scope="session")
+def baked(tmp_path_factory):
+    """The still life in two views of 64×48 under 150 lights."""
+    recipe = Recipe("direct", ("front", "left"), (64, 48), 150)
+    return bake_here(METHODS["direct"], still_life(), recipe, tmp_path_factory.mktemp("bake") / "store.zarr")
+
+
+@pytest.fixture(scope="session")
+def transfer(baked):
+    """The bake, opened."""
+    return open_transfer(baked, Memory(1 << 30))
+
+
+@pytest.fixture(scope="session")
+def corner():
+    """A white floor between a red wall and a glossy one, which throw light onto it."""
+    glossy = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 30.0}}
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]}, glossy)),
+        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
+        Material("Blue", ({"model": "oren_nayar", "color": [0.1, 0.2, 0.8], "params": {}},)),
+    ]
+    floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    red = quad("red", [[-1, 0, 1], [-1, 0, -1], [-1, 1.5, -1], [-1, 1.5, 1]], 1, tangent=(0, 1, 0))
+    blue = quad("blue", [[-1, 0, -1], [1, 0, -1], [1, 1.5, -1], [-1, 1.5, -1]], 2)
+    sky = np.full((16, 32, 3), 0.3, np.float32)
+    sky[2:5, 16:20] = 30
+    camera = looking("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
+    return scene_of(floor, red, blue, camera=camera, environment=sky, materials=materials)
+
+
+@pytest.fixture(scope="session")
+def gathered(corner, tmp_path_factory):
+    """The corner's bake with light between its surfaces, opened."""
+    return bake_corner(corner, "gather", tmp_path_factory.mktemp("corner"))

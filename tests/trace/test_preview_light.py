@@ -1,0 +1,76 @@
+"""Shadows predicted between few points that are traced, against the rule in NumPy over rays that are all traced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_scenes import points_at, still_life
+
+from relume.light.local import make_local, pattern_of
+from relume.look import LightGeometry
+from relume.trace.embree import EmbreeScene
+from relume.trace.geometry import merge
+from relume.trace.local_shadows import arriving, trace_local
+from relume.trace.preview_light import BLOCK, preview_light
+from relume.trace.view_samples import BACKGROUND, sample_view
+
+FAR = EmbreeScene.build(np.array([[90, 0, 0], [91, 0, 0], [91, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32))
+CORNERS = np.array([0, 5, 10, 15])
+PROBES = np.isin(np.arange(BLOCK) % 16, CORNERS)
+
+
+@pytest.fixture(scope="module")
+def surfaces():
+    scene = still_life()
+    geometry = merge(scene)
+    samples = sample_view(scene, geometry, "front", (64, 48))
+    solid = np.flatnonzero(samples.material != BACKGROUND)
+    solid = solid[: len(solid) // BLOCK * BLOCK - 5]  # the last block is not full
+    return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
+
+
+def predicted(seen, asked):
+    """Whether each ray of points reaches the light. seen, asked: (n, samples), of all rays that are traced"""
+    found = seen.copy()
+    for first in range(0, len(seen), BLOCK):
+        block = slice(first, first + BLOCK)
+        of_probes = seen[block][PROBES[: len(seen[block])]][asked[block][PROBES[: len(seen[block])]]]
+        if len(of_probes) and of_probes.all() == of_probes.any():
+            found[block] = asked[block] & of_probes.any()
+    return found
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        LightGeometry("point", (0.9, 1.4, 0.6)),
+        LightGeometry("spot", (0.9, 1.4, 0.6), (-0.6, -1.0, -0.4), cone=(10.0, 40.0)),
+        LightGeometry("directional", direction=(-1.0, -1.0, -0.3)),
+        LightGeometry("rectangle", (0.9, 1.4, 0.6), (-1.0, -1.0, 0.0), size=(0.5, 0.8)),
+    ],
+    ids=lambda light: light.kind,
+)
+def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces, light):
+    geometry, position, normal = surfaces
+    made, pattern = make_local(light), pattern_of(light, 4)
+    along = (made, pattern, points_at(position, normal))
+    rough = preview_light(geometry.embree, geometry.epsilon, *along)
+    seen, asked = (
+        np.unpackbits(trace_local(scene, geometry.epsilon, *along), axis=1, bitorder="little")[:, : len(pattern.uv)] > 0
+        for scene in (geometry.embree, FAR)
+    )
+    expected = np.packbits(predicted(seen, asked), axis=1, bitorder="little")
+    np.testing.assert_array_equal(rough.visible, expected)
+    np.testing.assert_allclose(rough.arriving, arriving(*along, expected), rtol=2e-6)
+    wrong = np.unpackbits(rough.visible ^ np.packbits(seen, axis=1, bitorder="little"))
+    assert wrong.sum() < 0.02 * seen.size
+    assert 0.05 < seen.mean() < 0.95
+
+
+def test_points_that_no_light_reaches_stay_dark(surfaces):
+    geometry, position, normal = surfaces
+    made, pattern = make_local(LightGeometry("point", (0.9, 1.4, 0.6))), pattern_of(LightGeometry("point"), 4)
+    points = points_at(position, normal)._replace(normal=0 * normal)
+    rough = preview_light(geometry.embree, geometry.epsilon, made, pattern, points)
+    assert not rough.arriving.any()
+    assert not rough.visible.any()

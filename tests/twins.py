@@ -1,0 +1,231 @@
+"""What the transfer kernels compute, in plain NumPy and float64: slow, exact where the kernels are not, and obvious."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.evaluate import angles_numpy
+from relume.brdf.registry import TERMS
+from relume.environments.equirect import texel_directions, texel_solid_angles
+from relume.picture.light import light_of
+from relume.picture.transfer import Axis
+from relume.points import Points
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+from relume.project.receivers import Receivers
+from relume.views.view import View
+
+
+def unit(v):
+    """Vectors of length one, along the last axis."""
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def make_receivers(count, num_lights, seed=0, horizon=0.15):
+    """Points with random frames and views that see every light above them."""
+    rng = np.random.default_rng(seed)
+    normal = unit(rng.normal(size=(count, 3)))
+    tangent = unit(np.cross(normal, rng.normal(size=(count, 3))))
+    wo = unit(rng.normal(size=(count, 3)))
+    facing = np.einsum("nc,nc->n", wo, normal)
+    wo = unit(wo + np.where(facing < horizon, horizon - facing + np.abs(facing), 0)[:, None] * normal)
+    visible = np.full((count, (num_lights + 7) // 8), 255, np.uint8)
+    return seen_from(wo, normal, tangent, visible)
+
+
+def seen_from(wo, normal, tangent, visible):
+    """Receivers with these frames, all in one place."""
+    wo, normal, tangent = (np.ascontiguousarray(a, np.float32) for a in (wo, normal, tangent))
+    return Receivers(Points(np.zeros_like(normal), normal, tangent, np.arange(len(wo), dtype=np.uint32)), wo, visible)
+
+
+def only_above(receivers, lights):
+    """The same receivers, lights below their horizon hidden."""
+    above = receivers.normal @ lights.direction.T > 0
+    visible = np.packbits(above, axis=1, bitorder="little")
+    return replace(receivers, visible=visible)
+
+
+def frames(receivers):
+    """World to local: rows are tangent, bitangent, normal. (n, 3, 3)"""
+    normal, tangent = receivers.normal.astype(float), receivers.tangent.astype(float)
+    return np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+
+
+def visible_lights(receivers, num_lights):
+    """(n, M) bool"""
+    return np.unpackbits(receivers.visible, axis=1, bitorder="little")[:, :num_lights].astype(bool)
+
+
+def spherical_area(a, b, c):
+    """Solid angle of triangles of unit corners (..., 3) (van Oosterom and Strackee 1983)."""
+    volume = np.abs(np.einsum("...c,...c->...", a, np.cross(b, c)))
+    dots = 1 + sum(np.einsum("...c,...c->...", u, v) for u, v in ((a, b), (b, c), (c, a)))
+    return 2 * np.arctan2(volume, dots)
+
+
+def pieces(lights, depth):
+    """Each light triangle in 4^depth pieces: their middles (M, 4^depth, 3) and shares of its solid angle."""
+    corners = unit(lights.nodes.astype(float).transpose(2, 1, 0))[:, None, :3]
+    for _ in range(depth):
+        a, b, c = np.moveaxis(corners, 2, 0)
+        ab, bc, ca = unit(a + b), unit(b + c), unit(c + a)
+        children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.concatenate([np.stack(child, axis=2) for child in children], axis=1)
+    area = spherical_area(*np.moveaxis(corners, 2, 0))
+    return unit(corners.mean(axis=2)), area / area.sum(axis=1, keepdims=True)
+
+
+def samples_of(term, lights, receivers, row, depth):
+    """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo."""
+    seen = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
+    frame = frames(receivers)[row]
+    wo = frame @ receivers.wo[row].astype(float)
+    wi = lights.direction[seen].astype(float) @ frame.T
+    shading = term.quotients(*wi.T, *(np.full(len(seen), o) for o in wo)).T * wi[:, 2:]
+    middles, shares = pieces(lights, depth)
+    return lights.irradiance[seen].astype(float) * shading, shares[seen], middles[seen] @ frame.T, wo
+
+
+def project(term, bands, active, lights, receivers, depth=5):
+    """`Projector.project` of all receivers with the exact angle of every piece and the mean of curves' products.
+
+    Returns:
+        (n, J, 3) float64
+    """
+    num_bands = term.curve(active).num_bands if active else 1
+    out = np.zeros((len(receivers.normal), num_bands, 3))
+    for row in range(len(out)):
+        power, shares, wi, wo = samples_of(term, lights, receivers, row, depth)
+        weight = power[:, None, :] * shares[..., None]
+        band = np.zeros(shares.shape, int)
+        for curve in term.curves:
+            if curve.outgoing:
+                continue
+            of_curve = band_of(curve, wi, wo)
+            if curve.name == active:
+                band = of_curve
+            else:
+                weight = weight * np.moveaxis(bands[curve.name][:, of_curve], 0, -1)
+        np.add.at(out[row], band.ravel(), weight.reshape(-1, 3))
+    return out
+
+
+def band_of(curve, wi, wo):
+    """The band that the exact angle of each pair of directions falls in."""
+    gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
+    return np.minimum((gamma * curve.num_bands / (np.pi / 2)).astype(int), curve.num_bands - 1)
+
+
+def project_points(term, bands, lights, receivers):
+    """The environment as points: all power of a light at its direction, in the band its angle falls in. (n, 3)"""
+    out = np.zeros((len(receivers.normal), 3))
+    for row in range(len(out)):
+        power, _, _, wo = samples_of(term, lights, receivers, row, 0)
+        seen = visible_lights(receivers, lights.num_lights)[row]
+        wi = lights.direction[seen].astype(float) @ frames(receivers)[row].T
+        for curve in term.curves:
+            if not curve.outgoing:
+                power = power * bands[curve.name][:, band_of(curve, wi, wo)].T
+        out[row] = power.sum(axis=0)
+    return out
+
+
+def integrate_texels(document, radiance, receivers, seen=None):
+    """The reflection integral of one term over all texels at exact angles. seen: (n, texels) bool. (n, 3)"""
+    term = TERMS[document["model"]].settled(document)
+    height, width, _ = radiance.shape
+    directions = texel_directions(height, width).reshape(-1, 3).astype(float)
+    power = (radiance * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
+    out = np.zeros((len(receivers.normal), 3))
+    for row, frame in enumerate(frames(receivers)):
+        wi, wo = directions @ frame.T, frame @ receivers.wo[row].astype(float)
+        above = wi[:, 2] > 0
+        if seen is not None:
+            above &= seen[row]
+        wi = wi[above]
+        weight = power[above] * term.quotients(*wi.T, *(np.full(len(wi), o) for o in wo)).T * wi[:, 2:]
+        for curve in term.curves:
+            if not curve.outgoing:
+                gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
+                weight = weight * curve_values(document, curve, gamma).T
+        out[row] = weight.sum(axis=0)
+    return out
+
+
+def stream(transport, change, image):
+    """Image + T · Δc. transport (tiles, 3, J, samples), change (3, J), image (tiles, 3, samples)"""
+    return image + np.einsum("tcjs,cj->tcs", transport.astype(float), change)
+
+
+def arriving(transfer, view: View, index, look):
+    """All light of a look at a material's samples, every source summed in one go: its triangles, and its receivers."""
+    light = light_of(look, transfer.material_names, has_bounces=Axis.BOUNCES in transfer.axes)
+    gain = np.array(look.environment.gain, np.float32)
+    if Axis.LIGHT not in transfer.axes:  # a method whose light is its own
+        return transfer.arriving(view, index, light._replace(environment_gain=look.environment.gain), transfer.memory)
+    lights, reflected = transfer.lights_in(look.environment.key), None
+    if light.paths.reflect:
+        irradiance = transfer.cells.irradiance(lights) * gain
+        for geometry, of_source in light.local:
+            irradiance += np.array(of_source, np.float32) * transfer.local.irradiance(geometry)[:, None]
+        reflected = transfer.cells.radiance(
+            irradiance, transfer.cells.reflectance(light.reflectances), light.paths.first, light.paths.last
+        )
+    local = transfer.local.all_rays(light, view.points(index))
+    straight = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.none()
+    return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)
+
+
+def radiance_of(transfer, view: View, look):
+    """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
+    out = np.zeros((view.num_view_samples, 3))
+    for index, name in enumerate(transfer.material_names):
+        rows = view.rows(index)
+        if rows.start == rows.stop:
+            continue
+        lights, receivers = arriving(transfer, view, index, look)
+        for document in look.materials[name].terms:
+            term = TERMS[document["model"]].settled(document)
+            bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
+            projector = Projector(term, contract(term, bands, None), lights, receivers)
+            image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
+            if document["texture"] is not None:
+                image *= view.textures[document["texture"]][rows]
+            for curve in term.curves:
+                if curve.outgoing:
+                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
+            out[rows] += image
+        out[rows] += shining(transfer, view, index, look)
+    if look.transport.paths.direct:
+        background = transfer.background_in(look.environment.key, view)
+        out[view.num_surface_samples :] = np.array(look.environment.gain) * background
+    return out
+
+
+def shining(transfer, view: View, index, look):
+    """What a material's samples send out themselves. (n, 3)"""
+    name, position = transfer.material_names[index], view.points(index).position
+    of_it = [light for light in look.lights.values() if light.geometry.material == name]
+    if not of_it or not look.transport.paths.direct:
+        return np.zeros((len(position), 3))
+    eye = view.camera.to_world[:3, 3].astype(np.float32)
+    return np.outer(transfer.local.shines_at(index, eye, position), sum(np.array(light.gain) for light in of_it))
+
+
+def resolve(view: View, radiance):
+    """Samples to pixels: the weighted sum of each pixel's. radiance (n, 3) -> (height, width, 3) float64"""
+    weight = np.empty(view.num_view_samples)
+    weight[view.order] = view.weight
+    out = np.zeros((view.width * view.height, 3))
+    np.add.at(out, view.pixel.astype(int), weight[:, None] * radiance)
+    return out.reshape(view.height, view.width, 3)
+
+
+def full_evaluation(transfer, view_name, look):
+    """The picture of a look, nothing incremental, frozen or cached. (height, width, 3) float64"""
+    view = transfer.views[view_name]
+    return resolve(view, radiance_of(transfer, view, look))

@@ -1,0 +1,75 @@
+"""Which code made something: another name for other sources, found by following imports."""
+
+from __future__ import annotations
+
+import pytest
+
+from relume import code_version
+from relume.code_version import code_hash, sources_of
+
+
+@pytest.fixture
+def package(tmp_path):
+    sources = {
+        "__init__": "",
+        "trace/rays": "from package.light.lamp import Lamp\nimport package.errors\n",
+        "trace/shadows": "import numpy as np\nfrom other.light import lamp\n",
+        "light/lamp": "def of():\n    from package.scene import (\n        mesh,\n        model as described,\n    )\n",
+        "light/unused": "",
+        "scene/__init__": "from package.shown.frame import Frame\n",
+        "scene/mesh": "from package.trace import rays  # a circle\n",
+        "scene/model": "",
+        "shown/frame": "from package.shown import only_here\n",
+        "shown/only_here": "",
+        "errors": "",
+    }
+    for name, text in sources.items():
+        path = tmp_path / "package" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path / "package"
+
+
+def names(package, found):
+    return {path.relative_to(package).with_suffix("").as_posix() for path in found}
+
+
+def test_sources_are_all_that_is_imported_directly_or_not(package):
+    bake = {"trace/rays", "light/lamp", "scene/__init__", "scene/mesh", "scene/model", "errors"}
+    shown = {"shown/frame", "shown/only_here"}
+    assert names(package, sources_of(["trace.rays"], package=package)) == bake | shown
+    assert names(package, sources_of(["trace"], package=package)) == bake | shown | {"trace/shadows"}
+    assert names(package, sources_of(["trace.rays"], but_for=["shown"], package=package)) == bake
+
+
+def test_a_module_that_has_moved_is_missed_aloud(package):
+    with pytest.raises(ModuleNotFoundError, match="no sources"):
+        sources_of(["trace.photons"], package=package)
+
+
+def test_the_hash_follows_what_is_imported_and_nothing_else(package):
+    def current():
+        return code_hash(sources_of(["trace.rays"], package=package), package)
+
+    first = current()
+    (package / "light" / "unused.py").write_text("x = 1\n")
+    assert current() == first
+    (package / "light" / "lamp.py").write_text("x = 1\n")
+    second = current()
+    assert second != first
+    (package / "light" / "lamp.py").rename(package / "light" / "light.py")
+    (package / "trace" / "rays.py").write_text("from package.light.light import Lamp\n")
+    assert current() not in (first, second)
+
+
+def test_images_depend_on_the_code_of_frames_and_bakes_do_not():
+    package = code_version._PACKAGE
+    images = names(package, sources_of(code_version._IMAGES))
+    bakes = names(package, sources_of(code_version._BAKES, code_version._AFTER_BAKES))
+    of_both = {"brdf/terms/ggx", "light/tiles", "light/triangles", "scene/model", "trace/cells", "views/store_io"}
+    of_images = {"project/project_kernel", "operators/shade", "trace/local_shadows", "light/blur", "views/view"}
+    of_bakes = {"trace/coherent_kernel", "trace/photons", "trace/view_samples", "methods/gather", "store/writer"}
+    assert of_both <= images & bakes
+    assert of_images <= images - bakes
+    assert of_bakes | {"scene/archive"} <= bakes
+    assert not {name for name in images | bakes if name.startswith(("scene/gltf", "reference/", "render/", "server"))}

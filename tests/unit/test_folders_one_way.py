@@ -1,0 +1,98 @@
+"""Rooms: folders hold what belongs together, and import each other in one direction.
+
+Children of a folder, its folders and modules alike, are rooms; an import anywhere below one room of anything below
+another is an arrow. Arrows may not go round. What still does is listed here, and the list may only become shorter.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("relume", "worker", "server", "cli")
+MOST_FILES = 22
+LARGER: dict[str, int] = {}
+"""Folders that hold more files than `MOST_FILES`, and how many."""
+AGAINST = {
+    ("relume.scene.lights", "relume.scene.gltf"),
+}
+"""Arrows against the direction of all others, from the room that imports; without them nothing goes round."""
+
+Arrows = dict[str, set[str]]
+
+
+def modules() -> dict[str, Path]:
+    """Files by the dotted names of their modules; a package is its folder."""
+    files = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    return {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
+
+
+def imported(path: Path, known: dict[str, Path]) -> Iterator[str]:
+    """Modules of ours that a file imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module in known:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                yield inner if inner in known else node.module
+
+
+def rooms_of(one: str, other: str) -> tuple[str, str] | None:
+    """The rooms on both ends of an arrow; None where one module contains the other."""
+    ours, theirs = one.split("."), other.split(".")
+    for depth, (here, there) in enumerate(zip(ours, theirs, strict=False), start=1):
+        if here != there:
+            return ".".join(ours[:depth]), ".".join(theirs[:depth])
+    return None
+
+
+def arrows() -> Arrows:
+    known, found = modules(), defaultdict(set)
+    for name, path in known.items():
+        for target in imported(path, known):
+            if (pair := rooms_of(name, target)) is not None:
+                found[pair[0]].add(pair[1])
+    return found
+
+
+def circle_in(found: Arrows) -> list[str] | None:
+    """Rooms of one circle, in order; None where there is none."""
+    try:
+        TopologicalSorter(found).prepare()
+    except CycleError as error:
+        circle: list[str] = error.args[1]
+        return circle
+    return None
+
+
+def test_rooms_import_each_other_in_one_direction() -> None:
+    found = arrows()
+    for room, target in AGAINST:
+        found[room].discard(target)
+    assert circle_in(found) is None
+
+
+def test_arrows_that_are_gone_are_not_listed_any_more() -> None:
+    found = arrows()
+    assert {(room, target) for room, target in AGAINST if target in found[room]} == AGAINST
+
+
+def test_folders_are_small_enough_to_be_looked_over() -> None:
+    files: dict[str, int] = defaultdict(int)
+    for path in modules().values():
+        files[path.parent.relative_to(ROOT).as_posix()] += 1
+    assert {folder: count for folder, count in files.items() if count > MOST_FILES} == LARGER
+
+
+def test_a_circle_would_be_found() -> None:
+    found = {"a": {"b"}, "b": {"c"}, "c": set[str]()}
+    assert circle_in(found) is None
+    found["c"].add("a")
+    assert circle_in(found) is not None
+    assert {"relume", "worker"} <= arrows()["server"]
+    assert "server.wire" in arrows()["server.routes"]

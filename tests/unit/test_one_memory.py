@@ -1,0 +1,167 @@
+"""What lasts and what is made in passing share one budget; everybody can see who holds it."""
+
+from __future__ import annotations
+
+import re
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import relume
+from relume.memory import PASSING_SHARE, Holder, Memory
+
+BUDGET = 8_000
+SHARE = BUDGET // PASSING_SHARE
+
+
+@dataclass(frozen=True)
+class Block:
+    num_bytes: int
+
+
+def put(memory, key, num_bytes):
+    return memory.get(key, Block, num_bytes, lambda: Block(num_bytes))
+
+
+def is_there(memory, key):
+    """Without making it last."""
+    return memory.passing.find(key, Block) is not None
+
+
+def test_what_was_made_in_passing_goes_first():
+    memory = Memory(BUDGET)
+    put(memory, "oldest", 4_000)
+    put(memory.passing, "passing", 3_000)
+    put(memory, "new", 2_000)
+    assert [is_there(memory, key) for key in ("oldest", "passing", "new")] == [True, False, True]
+    assert memory.used_bytes == 6_000
+
+
+def test_what_is_made_in_passing_takes_no_more_than_its_share_of_what_lasts():
+    memory = Memory(BUDGET)
+    for number in range(8):
+        put(memory, number, 1_000)
+    for number in range(50):
+        put(memory.passing, ("passing", number), SHARE // 2)
+    assert [is_there(memory, number) for number in range(8)] == [False] + [True] * 7
+    assert [number for number in range(50) if is_there(memory, ("passing", number))] == [48, 49]
+    assert memory.used_bytes == BUDGET
+    made = put(memory.passing, "large", SHARE + 1)
+    assert made.num_bytes == SHARE + 1
+    assert not is_there(memory, "large")
+    assert [is_there(memory, number) for number in range(8)] == [False] + [True] * 7
+
+
+def test_free_room_is_everybodys():
+    memory = Memory(BUDGET)
+    put(memory.passing, "large", 7_000)
+    assert is_there(memory, "large")
+    assert memory.used_bytes == 7_000
+
+
+def test_what_was_made_in_passing_lasts_once_somebody_else_has_found_it():
+    memory = Memory(BUDGET)
+    put(memory.passing, "found", 1_000)
+    put(memory.passing, "not found", 1_000)
+    assert put(memory, "found", 1_000) is memory.find("found", Block)
+    put(memory, "much", 6_500)
+    assert [is_there(memory, key) for key in ("found", "not found", "much")] == [True, False, True]
+
+
+def test_what_is_kept_is_made_once_and_counted_as_it_is():
+    memory, made, start = Memory(BUDGET), [], threading.Barrier(6)
+    key = ("/data/bakes/0123456789abcdef.zarr", "lights", 1)
+
+    def make():
+        made.append(1)
+        return {"nodes": np.zeros(100), "direction": [np.zeros(50)]}
+
+    def want():
+        start.wait()
+        memory.keep(key, make)
+
+    threads = [threading.Thread(target=want) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1
+    assert memory.used_bytes == 8 * 150
+    put(memory, ("/data/bakes/fedcba9876543210.zarr/3", "front", 0), 500)
+    put(memory, "of nobody", 30)
+    assert memory.held() == {
+        Holder("lights", "0123456789abcdef"): 8 * 150,
+        Holder("block", "fedcba9876543210"): 500,
+        Holder("block", ""): 30,
+    }
+
+
+def test_what_is_larger_than_the_budget_is_handed_out_and_not_kept():
+    memory = Memory(BUDGET)
+    put(memory, "other", 5_000)
+    assert memory.keep(("bake", "lights"), lambda: np.ones(BUDGET)).sum() == BUDGET
+    assert is_there(memory, "other")
+    assert memory.used_bytes == 5_000
+
+
+def test_making_one_thing_while_making_another_fails_leaves_no_trace():
+    memory = Memory(BUDGET)
+
+    def fails():
+        memory.keep(("bake", "part"), lambda: np.zeros(10))
+        raise ValueError("no")
+
+    for _ in range(3):
+        with pytest.raises(ValueError, match="no"):
+            memory.passing.get("whole", Block, 1_000, fails)
+    assert memory.used_bytes == 80
+
+
+def test_bakes_that_nobody_uses_keep_their_floor_and_what_was_made_in_passing_goes_first():
+    memory = Memory(BUDGET)
+    put(memory.passing, ("left", "passing"), 500)
+    put(memory, ("left", "old"), 500)
+    put(memory, ("used", "old"), 500)
+    put(memory, ("left", "new"), 500)
+    for bake in ("left", "used"):
+        memory.keep((bake, "lights"), lambda: np.zeros(5))
+    memory.shrink(700, {"used"})
+    assert memory.held()[Holder("lights", "")] == 40  # those in use
+    keys = [("left", "passing"), ("left", "old"), ("used", "old"), ("left", "new")]
+    assert [is_there(memory, key) for key in keys] == [False, False, True, True]
+    assert memory.used_bytes == 1_040
+
+
+# Small whatever is done: numbers of terms and bands, what is made by code alone, files mapped into memory.
+BOUNDED = {
+    "balls/ball.py",
+    "balls/library.py",
+    "basis/bands.py",
+    "basis/daubechies.py",
+    "brdf/albedo.py",
+    "brdf/curves.py",
+    "brdf/terms/measured.py",
+    "code_version.py",
+    "environments/asset_store.py",
+    "environments/built_in.py",
+    "look/library/materials.py",
+    "look/library/navigation.py",
+    "measured/asset_store.py",
+    "operators/nodes.py",
+    "scene/cornell.py",
+    "scene/demo/__init__.py",
+    "scene/gltf/sheen.py",
+    "scene/interior.py",
+    "scene/tableau.py",
+    "store/fill.py",
+}
+
+
+def test_no_other_cache_grows_beside_the_memory():
+    package = Path(relume.__file__).parent
+    caches = re.compile(r"^from functools import .*\b(lru_cache|cache)\b", re.MULTILINE)
+    found = {path for path in package.rglob("*.py") if caches.search(path.read_text("utf-8"))}
+    assert {path.relative_to(package).as_posix() for path in found} == BOUNDED

@@ -1,0 +1,62 @@
+"""Files are whole or absent, whatever happens while they are written."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from relume.errors import RelumeError
+from relume.replacing import UNFINISHED, replacing
+
+
+def write(path: Path, raised: BaseException | None = None) -> None:
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(b"new")
+        if raised is not None:
+            raise raised
+
+
+def test_a_file_takes_its_name_when_the_block_has_ended(tmp_path: Path) -> None:
+    path = tmp_path / "found.JSON"
+    path.write_text("old")
+    with replacing(path) as unfinished:
+        unfinished.write_text("new")
+        assert (path.read_text(), unfinished.parent, unfinished.suffix) == ("old", tmp_path, ".json")
+        assert list(tmp_path.glob(UNFINISHED)) == [unfinished]
+    assert path.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_others_may_read_it_where_the_system_lets_them(tmp_path: Path) -> None:
+    plain, ours = tmp_path / "plain", tmp_path / "ours"
+    plain.touch()
+    with replacing(ours) as unfinished:
+        unfinished.touch()
+    assert stat.S_IMODE(ours.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+
+
+@pytest.mark.parametrize("raised", [ValueError("half"), KeyboardInterrupt()])
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path, raised: BaseException) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+    with pytest.raises(type(raised)):
+        write(path, raised)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_full_disk_is_said_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
+    def no_space(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, call, no_space)
+    with pytest.raises(RelumeError, match=r"a\.bin cannot be written \(No space left.*free space"):
+        write(tmp_path / "a.bin")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_folder_is_said_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RelumeError, match="check the folder"):
+        write(tmp_path / "nowhere" / "a.bin")

@@ -1,0 +1,144 @@
+"""Samples to pixels and pixels to bytes, against NumPy and the shared-exponent packer of `relume.color`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import twins
+
+from relume.color import rgb9e5_pack, rgb9e5_unpack
+from relume.errors import ParameterError
+from relume.scene.model import Camera
+from relume.views.resolve import encode, pack_rgb9e5, resolve
+from relume.views.view import View
+
+
+def make_view(width=100, height=70, seed=0):
+    """A view of one to four samples a pixel, in no order, without a store behind it."""
+    rng = np.random.default_rng(seed)
+    count = rng.integers(1, 5, width * height)
+    pixel = np.repeat(np.arange(width * height), count).astype(np.uint32)
+    weight = rng.random(len(pixel))
+    weight /= np.repeat(np.bincount(pixel, weight), count)
+    shuffled = rng.permutation(len(pixel))
+    pixel, weight = pixel[shuffled], weight[shuffled]
+    order = np.argsort(pixel, kind="stable").astype(np.int32)
+    return View(
+        camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, memory=None, key="",
+        bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
+        order=order, weight=weight[order].astype(np.float32), textures={}, cos_theta_o=np.ones(len(pixel)),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def view():
+    return make_view()
+
+
+@pytest.fixture(scope="module")
+def radiance(view):
+    return np.exp(np.random.default_rng(1).normal(size=(3, view.num_view_samples))).astype(np.float32)
+
+
+@pytest.mark.parametrize("gain", [0.0, 1.0, 2.5, (2.0, 0.0, 0.5)])
+def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
+    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain).reshape(view.height, view.width, 3)
+    np.testing.assert_allclose(pixels, np.array(gain) * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, count):
+    tiles = view.all_tiles[::-1][:count]
+    whole = twins.resolve(view, radiance.T.astype(float))
+    expected = np.concatenate([whole[y : y + h, x : x + w].reshape(-1, 3) for x, y, w, h in tiles])
+    np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0), expected, rtol=2e-6)
+    payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0), "<f4").reshape(-1, 3)
+    np.testing.assert_allclose(payload, expected, rtol=2e-6)
+
+
+def test_tiles_cover_the_picture_once():
+    for width, height in [(64, 64), (65, 63), (16, 200), (130, 128)]:
+        view = make_view(width, height)
+        seen = np.zeros((height, width), int)
+        for x, y, w, h in view.all_tiles:
+            assert 0 < w <= 64
+            assert 0 < h <= 64
+            seen[y : y + h, x : x + w] += 1
+        np.testing.assert_array_equal(seen, 1)
+
+
+def test_no_tiles_are_no_bytes(view, radiance):
+    assert resolve(view, radiance, [], 1.0).shape == (0, 3)
+    assert encode(view, radiance, [], "f32", 1.0) == b""
+    assert encode(view, radiance, [], "rgb9e5", 1.0) == b""
+
+
+def test_packed_payload_is_the_packed_picture(view, radiance):
+    tiles = view.all_tiles
+    pixels = resolve(view, radiance, tiles, 1.0)
+    words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0), "<u4")
+    np.testing.assert_array_equal(words, rgb9e5_pack(pixels))
+    error = np.abs(rgb9e5_unpack(words) - pixels)
+    assert (error <= pixels.max(axis=1, keepdims=True) * 2**-9).all()
+
+
+@pytest.mark.parametrize("form", ["jpeg", "", "F32", "../x"])
+def test_other_formats_are_refused(view, radiance, form):
+    with pytest.raises(ParameterError, match="'rgb9e5' or 'f32'"):
+        encode(view, radiance, view.all_tiles, form, 1.0)
+
+
+def packed(rgb):
+    rgb = np.asarray(rgb, np.float32)
+    return np.array([pack_rgb9e5(*pixel) for pixel in rgb], np.uint32)
+
+
+def test_kernel_packs_bit_for_bit_as_the_twin():
+    rng = np.random.default_rng(2)
+    random = np.exp(rng.uniform(-25, 14, (20_000, 1)) + rng.normal(size=(20_000, 3)))
+    halfway = np.ldexp(
+        rng.integers(0, 1024, (5000, 3)) + 0.5, rng.integers(-30, 8, (5000, 1))
+    )  # rounding to even or up
+    powers = np.ldexp(1.0, np.arange(-40, 20))[:, None] * [1.0, 0.5, 0.25]
+    below = np.nextafter(powers.astype(np.float32), np.float32(0))
+    for rgb in (random, halfway, powers, below, np.eye(3) * 0.9999, rng.integers(0, 70_000, (2000, 3))):
+        rgb = np.asarray(rgb, np.float32)
+        np.testing.assert_array_equal(packed(rgb), rgb9e5_pack(rgb))
+
+
+HOSTILE = [
+    0.0,
+    -0.0,
+    -1.0,
+    -np.inf,
+    np.inf,
+    np.nan,
+    1e38,
+    -1e38,
+    1e-45,
+    65408.0,
+    65409.0,
+    65535.0,
+    2.0**-24,
+    2.0**-25,
+    1.0,
+]
+
+
+def test_hostile_values_pack_as_the_twin_says_and_never_as_garbage():
+    rgb = np.array(np.meshgrid(HOSTILE, HOSTILE, HOSTILE), np.float32).reshape(3, -1).T
+    words = packed(rgb)
+    np.testing.assert_array_equal(words, rgb9e5_pack(rgb))
+    back = rgb9e5_unpack(words)
+    assert np.isfinite(back).all()
+    assert back.max() <= 65408
+
+
+def test_hostile_radiance_in_one_sample_stays_in_its_pixel(view, radiance):
+    hurt = radiance.copy()
+    hurt[0, 17], hurt[1, 17], hurt[2, 17] = np.nan, np.inf, -1e30
+    whole = [(0, 0, view.width, view.height)]
+    words, clean = (np.frombuffer(encode(view, r, whole, "rgb9e5", 1.0), "<u4") for r in (hurt, radiance))
+    others = np.arange(len(words)) != view.pixel[17]
+    np.testing.assert_array_equal(words[others], clean[others])
+    assert np.isfinite(rgb9e5_unpack(words)).all()

@@ -1,0 +1,94 @@
+"""What gather rays bring, shared among neighbours: which samples are neighbours, and what the projector makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twins
+from analytic_terms import ANALYTIC
+from scipy.sparse import csr_array
+
+from relume.brdf.registry import TERMS
+from relume.light.gather_rays import make_pattern
+from relume.light.triangles import subdivide
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+from relume.project.receivers import GatherRays
+from relume.views.sharing import sharing
+
+WIDTH, HEIGHT = 9, 7
+
+
+def grid(keep=None):
+    """Samples of a floor, one for each pixel, in an order of their own."""
+    pixel = np.random.default_rng(1).permutation(WIDTH * HEIGHT).astype(np.uint32)
+    pixel = pixel if keep is None else pixel[keep(pixel)]
+    position = np.stack([pixel % WIDTH, 0 * pixel, pixel // WIDTH], axis=1).astype(np.float32)
+    return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
+
+
+def by_hand(pixel, is_same):
+    """Every pair of samples, one after another."""
+    weights = np.zeros((len(pixel), len(pixel)))
+    for a, pa in enumerate(pixel.astype(int)):
+        for b, pb in enumerate(pixel.astype(int)):
+            dx, dy = abs(pa % WIDTH - pb % WIDTH), abs(pa // WIDTH - pb // WIDTH)
+            if a == b or (max(dx, dy) <= 1 and is_same(a, b)):
+                weights[a, b] = (2 - dx) * (2 - dy) / np.count_nonzero(pixel == pb)
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
+    pixel, position, normal = grid()
+    found = sharing(pixel, WIDTH, position, normal)
+    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
+
+
+def test_samples_of_one_pixel_count_as_one():
+    pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
+    found = sharing(pixel, WIDTH, position, normal)
+    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+
+
+def test_other_pieces_of_a_surface_take_no_part():
+    """A wall that meets the floor, and a step in it."""
+    pixel, position, normal = grid()
+    x, y = pixel % WIDTH, pixel // WIDTH
+    normal[x > 4] = [1, 0, 0]
+    position[(x <= 4) & (y > 3), 1] += 0.5
+    found = sharing(pixel, WIDTH, position, normal).toarray()
+    piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
+    flat = piece != 2  # on the wall, depth as the floor has it is a rise
+    assert not found[piece[:, None] != piece[None, :]].any()
+    expected = by_hand(pixel, lambda a, b: piece[a] == piece[b])
+    np.testing.assert_allclose(found[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["lambert", "cook_torrance"])
+@pytest.mark.parametrize("is_active", [False, True])
+def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active):
+    """Free curves and contracted ones, in ranges of any length; light of the environment is not shared."""
+    rng, num = np.random.default_rng(2), 70
+    lights = subdivide(rng.random((16, 32, 3), np.float32), 40)
+    points = twins.make_receivers(num, lights.num_lights, seed=3)
+    links = rng.integers(0, 50, (num, 24)).astype(np.uint16)
+    radiance = rng.random((1 << 16, 3), np.float32)
+    alone = GatherRays(links, make_pattern(16, 8, 5), radiance)
+    weights = csr_array(rng.random((num, num)) * (rng.random((num, num)) < 0.1) + np.eye(num)).astype(np.float32)
+    term = TERMS[model]
+    curve = next(c for c in ANALYTIC[model].curves if not c.outgoing)
+    bands = {c.name: rng.random((3, c.num_bands)) for c in term.curves}
+    contraction = contract(term, bands, curve.name if is_active else None)
+
+    def project(rays, ranges):
+        projector = Projector(term, contraction, lights, replace(points, rays=rays))
+        return np.concatenate([projector.project(*of) for of in ranges])
+
+    dark = project((), [(0, num)])
+    separate = project((alone,), [(0, num)]) - dark
+    shared = project((replace(alone, sharing=weights),), [(0, 50), (50, num)]) - dark
+    expected = np.einsum("pq,qjc->pjc", weights.toarray(), separate)
+    np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())
