@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.points import Lit, frame_radiance, lit_points, relative_rmse
+from bench.points import Lit, frame_radiance, lit_points
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
-from relume.look.terms import complete_term
+from bench.standard_error import Estimated, over_points
+from relume.brdf.document import complete_term
 from relume.reference import reference_radiance, texels_of
 from relume.trace.embree import EmbreeScene
 from relume.trace.visibility import trace_visibility
@@ -35,9 +36,17 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def compare(cases: tuple[Case, ...], num_points: int, tiny: bool) -> list[Figure]:
-    """A figure for each case: its name, the term of pot and table, the curve that is free. They share shadow rays."""
+    """A figure for each case; they share shadow rays.
+
+    Args:
+        cases: of each the figure's name, the term of pot and table, and the curve that is free.
+        num_points: view samples.
+        tiny: few lights, one environment, few texels.
+    Returns:
+        The worst error over the environments, and its standard error over the view samples.
+    """
     num_lights = 200 if tiny else 4000
-    errors: dict[str, dict[str, float]] = {name: {} for name, _, _ in cases}
+    errors: dict[str, dict[str, Estimated]] = {name: {} for name, _, _ in cases}
     documents = {name: complete_term(("accuracy",), dict(term), None) for name, term, _ in cases}
     for environment in environments()[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
@@ -47,16 +56,18 @@ def compare(cases: tuple[Case, ...], num_points: int, tiny: bool) -> list[Figure
             terms = [[documents[name]] for name, _, _ in cases]
             truth = reference_radiance(of.geometry, texels, of.points, terms, spp)
             for (name, _, curve), right in zip(cases, truth, strict=True):
-                errors[name][label] = relative_rmse(frame_radiance(of, documents[name], curve), right)
+                errors[name][label] = over_points(frame_radiance(of, documents[name], curve), right)
     context = {"view_samples": num_points, "lights": num_lights}
-    return [
-        Figure(name, max(found[map_] for map_ in found if "without" not in map_), "relative RMSE", {**context, **found})
-        for name, found in errors.items()
-    ]
+    figures = []
+    for name, found in errors.items():
+        worst = max(error for label, error in found.items() if "without" not in label)
+        parts = {label: error.value for label, error in found.items()}
+        figures.append(Figure(name, worst.value, "relative RMSE", {**context, **parts}, worst.standard_error))
+    return figures
 
 
 def _without_shadows(lit: Lit) -> Lit:
-    """The same points with nothing near them."""
+    """Put the same points where nothing is near them, so that nothing casts a shadow."""
     corners = np.array([[1e6, 1e6, 1e6], [1e6 + 1, 1e6, 1e6], [1e6, 1e6 + 1, 1e6]], np.float32)
     geometry = replace(lit.geometry, embree=EmbreeScene.build(corners, np.array([[0, 1, 2]], np.uint32)))
     points = lit.points

@@ -1,7 +1,7 @@
 """accuracy.TERM: as `bench.accuracy`, for every other term, at moderate sharpness; a tenth of the view samples.
 
-Brute force over half a million texels costs minutes for each term; 200 samples tell the error within a few per cent of
-itself.
+Brute force over half a million texels costs minutes for each term; how well 200 samples tell the error is its standard
+error.
 """
 
 from __future__ import annotations
@@ -31,5 +31,5 @@ CASES: tuple[Case, ...] = tuple(
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Every term but `lambert`, which has a figure with a target."""
+    """Measure every term but `lambert`, which has a figure with a target."""
     return compare(CASES, 20 if tiny else 200, tiny)

@@ -14,17 +14,17 @@ from typing import Any
 
 from bench.figure import Figure
 from bench.timing import seconds
+from relume.bake import Recipe, Written
+from relume.methods.direct import DirectMethod
+from relume.methods.store_io import read_rays
 from relume.parallel import num_threads
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
 from relume.store import bake_here, open_store
-from relume.transfer.base import Recipe, Written
-from relume.transfer.direct import DirectMethod
-from relume.transfer.stored import read_rays
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Two bakes that count, after a small one that compiles."""
+    """Time two bakes, after a small one that compiles."""
     scene = demo_scene()
     with tempfile.TemporaryDirectory() as folder:
         _bake(scene, (32, 24), 30, Path(folder) / "warm.zarr")

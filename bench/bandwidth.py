@@ -1,6 +1,6 @@
 """frame.bandwidth_ratio: how much of the memory's read bandwidth an incremental update uses.
 
-Numerator: bytes of the operator that `relume.transfer.stream.stream` reads for 30 random columns of 256 (others each
+Numerator: bytes of the operator that `relume.operators.stream.stream` reads for 30 random columns of 256 (others each
 time, so that no cache holds them) at 512×512×RGB, per second. Denominator: the same array summed from end to end by
 the same threads. Both are taken in turn; the best of each counts, as other programs can only slow them down.
 """
@@ -12,9 +12,9 @@ import numpy as np
 
 from bench.figure import Figure
 from bench.timing import in_turn
+from relume.operators.frozen import tiles_of
+from relume.operators.stream import columns_of, stream
 from relume.parallel import for_ranges, num_threads
-from relume.transfer.frozen import tiles_of
-from relume.transfer.stream import columns_of, stream
 
 _NUM_BANDS, _NUM_COLUMNS = 256, 30
 _FLOATS_A_RANGE = 1 << 22
@@ -30,7 +30,7 @@ def _sum(values, start, stop):  # type: ignore[no-untyped-def]
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Both sides on the same 805 MB."""
+    """Time both sides on the same 805 MB, in turn."""
     side = 64 if tiny else 512
     tiles, samples = tiles_of(side * side)
     transport = np.full((tiles, 3, _NUM_BANDS, samples), 1e-6, np.float32)

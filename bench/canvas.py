@@ -18,8 +18,8 @@ from urllib.parse import urlencode
 from bench.figure import Figure, skipped
 from bench.house import House, baked_house, serving
 from bench.timing import percentiles
+from relume.bake import Recipe
 from relume.scene.demo import demo_scene
-from relume.transfer.base import Recipe
 from server.settings import Settings
 
 _NAMES = ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")

@@ -15,8 +15,8 @@ from bench.figure import Figure
 from bench.points import Lit, freeze_along, lit_points
 from bench.scenes import cook_torrance, teapot_on_table
 from bench.timing import in_turn
+from relume.brdf.document import complete_term
 from relume.environments.studio import studio
-from relume.look.terms import complete_term
 from relume.parallel import num_threads
 
 

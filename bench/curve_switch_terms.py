@@ -13,13 +13,13 @@ from bench.figure import Figure
 from bench.points import freeze_along
 from bench.scenes import LAMBERT
 from bench.timing import in_turn
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.look.terms import complete_term
 from relume.parallel import num_threads
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """One curve after another."""
+    """Time the freeze of one curve after another."""
     documents = [complete_term(("curve_switch",), term, None) for term in (LAMBERT, *(term for _, term, _ in CASES))]
     lit = lit_teapot(documents[0], tiny)
     taken = {}

@@ -36,7 +36,10 @@ def render(
     """Let Cycles render the scene's first view at rising sample counts, all light, with two seeds each.
 
     Args:
+        scene: handed over as arrays. size: width and height, pixels.
         materials: of each mesh "diffuse" and "glossy" colours, and "roughness".
+        spp: sample counts, rising. bounces: reflections of a path at most.
+        folder: where files of the exchange are written.
     Returns:
         "version", and "steps" with "spp", "seconds" of one picture and its "noise", absolute. Writes picture.npy.
     """

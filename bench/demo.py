@@ -11,8 +11,8 @@ import time
 
 from bench.figure import Figure
 from bench.house import House, baked_house, serving, session
+from relume.bake import Recipe
 from relume.scene.demo import demo_scene
-from relume.transfer.base import Recipe
 from worker.presets import PRESETS
 
 

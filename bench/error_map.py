@@ -23,7 +23,7 @@ _WHITE = 3.0  # of it is white
 
 def side_by_side(pair: Pair) -> NDArray[np.uint8]:
     """Ours, Mitsuba's, and the difference: red too bright, blue too dark. (height, 3 width, 3)"""
-    theirs = pair.halves.mean(axis=0, dtype=np.float64)
+    theirs = pair.passes.mean(axis=0, dtype=np.float64)
     scale = np.sqrt(np.mean(theirs**2))
     shown = [np.clip(image / (_WHITE * scale), 0, 1) ** (1 / 2.2) for image in (pair.ours, theirs)]
     away = np.clip(_blocks(pair.ours - theirs).mean(axis=-1) / (_FULL * scale), -1, 1)

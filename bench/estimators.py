@@ -17,18 +17,22 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure
 from bench.gather import bake, recipe_of
+from bench.standard_error import over_points
+from relume.light.gather_rays import make_pattern
 from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.methods.store_io import read_tree
+from relume.methods.transfer import BouncedViews
+from relume.picture.light import light_of
+from relume.points import Points
 from relume.scene.cornell import cornell_box
 from relume.trace.cell_tree import NO_CELL, CellTree
 from relume.trace.cells import face_normals
-from relume.trace.gather_rays import make_pattern
 from relume.trace.geometry import Geometry, merge
-from relume.trace.links import Gatherers, trace_links
+from relume.trace.links import trace_links
 from relume.trace.primary import trace_from
 from relume.trace.surface import any_tangent
-from relume.transfer.light import light_of
-from relume.transfer.opened import open_transfer
-from relume.transfer.stored import read_tree
 
 F64 = NDArray[np.float64]
 _NAMES = (
@@ -40,26 +44,25 @@ _SEED = 11
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """One bake, and some of its samples in all three ways."""
+    """Compare some samples of one bake in all three ways."""
     scene, num_samples, num_truth = cornell_box(), 40 if tiny else 1200, 512 if tiny else 4096
     geometry = merge(scene)
     with tempfile.TemporaryDirectory() as folder:
-        transfer = open_transfer(bake(scene, recipe_of(tiny), Path(folder) / "gather.zarr").path)
+        transfer = open_transfer(bake(scene, recipe_of(tiny), Path(folder) / "gather.zarr").path, Memory(4 << 30))
         store, tree = transfer.store, read_tree(transfer.store)
         light = light_of(
-            validate(transfer.default_look, transfer.default_look), transfer.material_names, has_cells=True
+            validate(transfer.default_look, transfer.default_look), transfer.material_names, has_bounces=True
         )
-        radiance = transfer.reflected_in(light)
-        assert radiance is not None
+        assert isinstance(transfer, BouncedViews)
+        radiance = transfer.reflected.under(light)
         num_rays = store.shape("views/0/links")[1]
         chosen = np.linspace(0, store.shape("views/0/links")[0] - 1, num_samples).astype(np.int64)
         position, normal = (store.read(f"views/0/{name}")[chosen] for name in ("position", "normal"))
-        points = Gatherers(position, normal, any_tangent(normal), normal)
+        points = Points(position, normal, any_tangent(normal), 64 * np.arange(num_samples, dtype=np.uint32))
         cell_at, cell_normal = (store.read(f"cells/{name}")[:, 0] for name in ("position", "normal"))
 
     def gathered(count: int) -> F64:
-        numbers = np.arange(num_samples, dtype=np.uint32) * 64
-        links = trace_links(geometry, tree, points, make_pattern(count, 0, _SEED), numbers)
+        links = trace_links(geometry, tree, points, points.normal, make_pattern(count, 0, _SEED))
         return np.asarray(np.pi * radiance[links.cell].mean(axis=1, dtype=np.float64))
 
     truth, num_cells = gathered(num_truth), len(cell_at)
@@ -68,17 +71,17 @@ def measure(tiny: bool) -> list[Figure]:
     counts = [min(count, num_cells) for count in (num_rays, 16 * num_rays, num_cells)]
     found = [gathered(num_rays), *(_connected(geometry, points, _merged(*cells, count)) for count in counts)]
     return [
-        Figure(name, _error(irradiance, truth), _UNIT, {
+        Figure(name, over_points(irradiance, truth).value, _UNIT, {
             "rays_or_cells": count, "samples": num_samples,
-            "without_the_worst_percent": _error(irradiance, truth, 0.01),
-        })
+            "without_the_worst_percent": _without_the_worst(irradiance, truth),
+        }, over_points(irradiance, truth).standard_error)
         for name, irradiance, count in zip(_NAMES, found, [num_rays, *counts], strict=True)
     ]  # fmt: skip
 
 
-def _error(found: F64, truth: F64, left_out: float = 0.0) -> float:
-    """Over all but the share of samples that are furthest off."""
-    squares = np.sort(((found - truth) ** 2).mean(axis=1))[: round((1 - left_out) * len(truth))]
+def _without_the_worst(found: F64, truth: F64) -> float:
+    """Relative RMSE over all but the hundredth of samples that are furthest off."""
+    squares = np.sort(((found - truth) ** 2).mean(axis=1))[: round(0.99 * len(truth))]
     return float(np.sqrt(squares.mean() / np.mean(truth**2)))
 
 
@@ -110,7 +113,7 @@ def _merged(position: Any, normal: Any, area: F64, radiance: F64, count: int) ->
     return position[middle], normal[middle], total, power / np.maximum(total, 1e-30)[:, None]
 
 
-def _connected(geometry: Geometry, points: Gatherers, cells: tuple[Any, Any, F64, F64]) -> F64:
+def _connected(geometry: Geometry, points: Points, cells: tuple[Any, Any, F64, F64]) -> F64:
     """E of points. (n, 3)"""
     position, normal, area, radiance = cells
     out = np.zeros((len(points.position), 3))

@@ -18,16 +18,17 @@ import numpy as np
 
 from bench.figure import Figure
 from bench.timing import percentiles, seconds
+from relume.bake import Recipe, Task, Written
 from relume.look import validate
+from relume.memory import Memory
+from relume.methods.gather import GatherMethod
+from relume.methods.registry import open_transfer
 from relume.parallel import num_threads
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
 from relume.store import bake_here
-from relume.transfer.base import Recipe, Task, Written
-from relume.transfer.cache import FrozenCache
-from relume.transfer.gather import GatherMethod
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
 
 _NAMES = ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")
 FLOOR = "/materials/Floor/terms/1"
@@ -53,7 +54,7 @@ def measure(tiny: bool) -> list[Figure]:
         bake(scene, recipe_of(tiny=True), Path(folder) / "warm.zarr")
         baked = bake(scene, recipe_of(tiny), Path(folder) / "gather.zarr")
         size_mb = store_mb(baked.path)
-        transfer = open_transfer(baked.path)
+        transfer = open_transfer(baked.path, Memory(4 << 30))
         picture = opened(transfer)
         freeze_s = _freeze_s(transfer, picture)
         frames_s = edit_frames_s(transfer, picture, 5 if tiny else 120)
@@ -68,12 +69,19 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def recipe_of(tiny: bool) -> Recipe:
-    """What is measured, or a bake of a second."""
+    """The recipe that is measured, or, where tiny, one that bakes in a second."""
     return Recipe("gather", ("front",), *(((40, 40), 60) if tiny else ((400, 400), 2000)))
 
 
 def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
-    """Bake in this process; wall and tracing seconds of every stage."""
+    """Bake in this process by the method `gather`.
+
+    Args:
+        scene: that is baked. recipe: how.
+        target: folder of the store.
+    Returns:
+        Where the store is, wall seconds, and wall and tracing seconds and rays of every stage.
+    """
     method, stages = (
         GatherMethod(),
         {name: {"wall_s": 0.0, "tracing_s": 0.0, "rays": 0} for name in GatherMethod.stages},
@@ -89,7 +97,7 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
         last = now
 
     wall_s = seconds(lambda: bake_here(method, scene, recipe, target, note))
-    cells = open_transfer(target).store.shape("cells/material")[0]
+    cells = open_transfer(target, Memory(4 << 30)).store.shape("cells/material")[0]
     return Baked(target, wall_s, {"cells": cells, "size": list(recipe.size), "lights": recipe.num_lights, **stages})
 
 
@@ -100,15 +108,15 @@ def store_mb(path: Path) -> float:
 
 def opened(transfer: Transfer) -> Picture:
     """A picture at rest."""
-    picture = Picture(transfer, "front", FrozenCache(4 << 30))
+    picture = Picture(transfer, "front", Memory(4 << 30))
     settle(picture)
     return picture
 
 
 def settle(picture: Picture) -> None:
     """Make all that is lacking."""
-    while not picture.advance(None).exact or picture.waiting() is not None:
-        if picture.waiting() is not None:
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)
 
 
@@ -127,7 +135,13 @@ def _freeze_s(transfer: Transfer, picture: Picture) -> float:
 
 
 def edit_frames_s(transfer: Transfer, picture: Picture, num_frames: int) -> list[float]:
-    """Seconds of each frame of a drag, from the look to the encoded bytes."""
+    """Seconds of each frame but the first, from the look to the encoded bytes, while the floor's exponent is dragged.
+
+    Args:
+        transfer: the opened bake, with its default look.
+        picture: of it, at rest, what a hand needs made before.
+        num_frames: looks of the drag.
+    """
     taken = []
     for exponent in np.geomspace(3, 300, num_frames):
         document = copy.deepcopy(transfer.default_look)

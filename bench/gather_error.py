@@ -2,7 +2,7 @@
 
 The bake of bench/gather.py. Diffuse: the whole picture, its floor's highlight taken away. Glossy: the highlight of the
 floor alone (exponent 100) over the floor's pixels, lit by surfaces that reflect diffusely. Direct light is in neither,
-and Mitsuba has as many bounces as we have. Its own noise is taken off: `bench.indirect.error_without_noise`.
+and Mitsuba has as many bounces as we have. Its own noise is taken off: `bench.standard_error.over_passes`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,13 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.gather import bake, recipe_of
-from bench.indirect import error_without_noise, reflected, reflected_by_mitsuba
+from bench.indirect import PASSES, reflected, reflected_by_mitsuba
 from bench.mitsuba import bsdf, missing
+from bench.standard_error import over_passes
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.picture.transfer import Transfer
 from relume.scene.cornell import GLOSSY_FLOOR, cornell_box
-from relume.transfer.opened import Transfer, open_transfer
 
 _NAMES = ("gather.rmse_diffuse", "gather.rmse_glossy")
 _UNIT = "relative RMSE"
@@ -29,13 +32,13 @@ def measure(tiny: bool) -> list[Figure]:
     if (why := missing()) is not None:
         return skipped(_NAMES, _UNIT, why)
     scene, recipe = cornell_box(is_floor_glossy=True), recipe_of(tiny)
-    spp = {"diffuse": 2, "glossy": 2} if tiny else {"diffuse": 320, "glossy": 128}
+    spp = {"diffuse": 2, "glossy": 2} if tiny else {"diffuse": 128, "glossy": 64}  # of each pass
     diffuse, glossy = GLOSSY_FLOOR
     beyond = [bsdf(scene.materials[mesh.material].terms[:1]) for mesh in scene.meshes]
     highlight = bsdf([glossy])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path)
+        transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
         plain, both = (reflected(transfer, terms) for terms in ({"Floor": (diffuse,)}, {}))
         theirs = {
             "diffuse": reflected_by_mitsuba(scene, recipe.size, beyond, beyond, spp["diffuse"], folder),
@@ -43,13 +46,16 @@ def measure(tiny: bool) -> list[Figure]:
         }
         on_floor = _is_all_floor(transfer)
     found = {
-        "diffuse": error_without_noise(plain, theirs["diffuse"]),
-        "glossy": error_without_noise((both - plain)[on_floor], theirs["glossy"][:, on_floor]),
+        "diffuse": over_passes(plain, theirs["diffuse"]),
+        "glossy": over_passes(on_floor[..., None] * (both - plain), on_floor[..., None] * theirs["glossy"]),
     }
     return [
-        Figure(f"gather.rmse_{kind}", error["error"], _UNIT, {**error, "size": list(recipe.size), "spp": 2 * spp[kind]})
-        for kind, error in found.items()
-    ]
+        Figure(
+            f"gather.rmse_{kind}", of.error.value, _UNIT,
+            {**of.context, "size": list(recipe.size), "spp": PASSES * spp[kind]}, of.error.standard_error,
+        )
+        for kind, of in found.items()
+    ]  # fmt: skip
 
 
 def _is_all_floor(transfer: Transfer) -> Any:

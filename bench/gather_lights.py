@@ -25,13 +25,14 @@ from bench.gather import bake, recipe_of, settle
 from bench.rays import embreex_scene
 from bench.timing import in_turn, seconds
 from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
 from relume.trace.geometry import merge
 from relume.trace.view_samples import BACKGROUND, sample_view
-from relume.transfer.cache import FrozenCache
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
 
 _NAMES = ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")
 _SPEED = "frames/s"
@@ -40,11 +41,11 @@ _PANEL: dict[str, Any] = {"kind": "rectangle", "direction": [0.0, -1.0, 0.0], "e
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Three drags."""
+    """Measure three drags: a point moved, a panel moved, a panel dimmed."""
     num_frames, recipe = 3 if tiny else 24, recipe_of(tiny)
     with tempfile.TemporaryDirectory() as folder:
         scene = cornell_box(is_floor_glossy=True)
-        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path)
+        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Memory(4 << 30))
         places = [{"position": [float(x), 1.7, 0.2]} for x in np.linspace(-0.4, 0.4, num_frames)]
         scales = [{**places[-1], "scale": float(scale)} for scale in np.geomspace(0.1, 3, num_frames)]
         drags = [
@@ -52,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
             [_PANEL | place for place in places],
             [_PANEL | scale for scale in scales],
         ]
-        found = [_dragged(transfer, Picture(transfer, "front", FrozenCache(4 << 30)), drag) for drag in drags]
+        found = [_dragged(transfer, Picture(transfer, "front", Memory(4 << 30)), drag) for drag in drags]
         embreex_s = _embreex_s(scene, recipe.size, places[-1]["position"])
     return [
         Figure(name, 1 / float(np.median(drag.frames_s)), _SPEED, {
@@ -100,7 +101,7 @@ def _embreex_s(scene: Scene, size: tuple[int, int], position: Sequence[float]) -
     """Of a shadow ray from each view sample, in the order in which they are stored; the best of five."""
     geometry = merge(scene)
     samples = sample_view(scene, geometry, "front", size)
-    origins = np.ascontiguousarray(samples.surface.position[samples.material != BACKGROUND])
+    origins = np.ascontiguousarray(samples.surface.points.position[samples.material != BACKGROUND])
     directions = (np.array(position, np.float32) - origins).astype(np.float32)
     peer = embreex_scene(geometry)
     return min(in_turn([lambda: peer.run(origins, directions, query="OCCLUDED")], 5)[0])

@@ -10,15 +10,15 @@ from pathlib import Path
 
 from bench.figure import Figure
 from bench.gather import bake, recipe_of, store_mb
+from relume.bake import Recipe
 from relume.parallel import num_threads
 from relume.scene.interior import interior
-from relume.transfer.base import Recipe
 
 _NAMES = ("gather.interior_bake_s", "gather.interior_store_mb")
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """One bake that counts."""
+    """Time one bake."""
     recipe = recipe_of(tiny=True) if tiny else Recipe("gather", ("front",), (800, 800), 2000)
     with tempfile.TemporaryDirectory() as folder:
         bake(interior(), recipe_of(tiny=True), Path(folder) / "warm.zarr")

@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.gather import bake
-from bench.indirect import error_without_noise, reflected, reflected_by_mitsuba
+from bench.indirect import PASSES, reflected, reflected_by_mitsuba
 from bench.mitsuba import bsdf, missing
+from bench.standard_error import over_passes
+from relume.bake import Recipe
 from relume.brdf.albedo import is_diffuse
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
 from relume.scene.built_in import built_in
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
-from relume.transfer.base import Recipe
-from relume.transfer.opened import open_transfer
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -33,7 +35,7 @@ Terms = tuple[Mapping[str, Any], ...]
 
 SIZES = {"cornell_box": (400, 400), "tableau": (400, 300), "still_life": (400, 300), "interior": (400, 400)}
 _FINER = 2
-_SPP = {"cornell_box": 160, "tableau": 128, "still_life": 128, "interior": 160}  # of each half
+_SPP = 128  # of each pass
 _UNIT = "relative RMSE"
 
 
@@ -41,11 +43,11 @@ class Pair(NamedTuple):
     """Reflected light of one scene.
 
     Attributes:
-        ours: (height, width, 3). halves: two independent ones of Mitsuba's. (2, height, width, 3)
+        ours: (height, width, 3). passes: independent ones of Mitsuba's. (passes, height, width, 3)
     """
 
     ours: F64
-    halves: F32
+    passes: F32
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -56,14 +58,14 @@ def measure(tiny: bool) -> list[Figure]:
     figures = []
     for figure, name in zip(names, SIZES, strict=True):
         pair = rendered(name, tiny)
-        error = error_without_noise(*pair)
-        about = {"size": list(pair.ours.shape[1::-1]), "spp": 2 * _spp(name, tiny)}
-        figures.append(Figure(figure, error["error"], _UNIT, {**error, **about}))
+        found = over_passes(*pair)
+        about = {**found.context, "size": list(pair.ours.shape[1::-1]), "spp": PASSES * (2 if tiny else _SPP)}
+        figures.append(Figure(figure, found.error.value, _UNIT, about, found.error.standard_error))
     return figures
 
 
 def rendered(name: str, tiny: bool = False) -> Pair:
-    """One of `SIZES` by both."""
+    """Bake and render one of `SIZES` by both renderers."""
     scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)
     size = (40, 30) if tiny else SIZES[name]
     terms: dict[str, Terms] = {material.name: material.terms for material in scene.materials}
@@ -75,15 +77,10 @@ def rendered(name: str, tiny: bool = False) -> Pair:
     finer = (_FINER * size[0], _FINER * size[1])
     recipe = Recipe("gather", (scene.cameras[0].name,), finer, 60 if tiny else 2000)
     with tempfile.TemporaryDirectory() as folder:
-        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path)
+        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Memory(4 << 30))
         fine = reflected(transfer, terms).reshape(size[1], _FINER, size[0], _FINER, 3)
-        return Pair(
-            fine.mean(axis=(1, 3)), reflected_by_mitsuba(scene, size, seen, beyond, _spp(name, tiny), Path(folder))
-        )
-
-
-def _spp(name: str, tiny: bool) -> int:
-    return 2 if tiny else _SPP[name]
+        theirs = reflected_by_mitsuba(scene, size, seen, beyond, 2 if tiny else _SPP, Path(folder))
+        return Pair(fine.mean(axis=(1, 3)), theirs)
 
 
 def _in_place_of(scene: Scene) -> dict[str, Terms]:

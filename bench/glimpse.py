@@ -17,14 +17,15 @@ import numpy as np
 from bench.figure import Figure
 from bench.points import relative_rmse
 from bench.timing import seconds
+from relume.bake import Recipe
 from relume.look import validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.scene.demo import demo_scene
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -34,8 +35,8 @@ def measure(tiny: bool) -> list[Figure]:
     view = scene.cameras[0].name
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", (view,), size, num_lights)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"))
-        picture = Picture(transfer, view, FrozenCache(4 << 30))
+        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
+        picture = Picture(transfer, view, Memory(4 << 30))
         _settle(picture)
         first, *glimpses = [seconds(partial(_turn, picture, transfer, angle)) for angle in range(10, 51, 10)]
         rough = picture.image()
@@ -64,6 +65,6 @@ def _turn(picture: Picture, transfer: Transfer, angle: float) -> None:
 
 
 def _settle(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.waiting() is not None:
-        if picture.waiting() is not None:
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)

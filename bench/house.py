@@ -19,9 +19,9 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 
 from bench.workers import bake_s
+from relume.bake import Recipe
 from relume.errors import PlanError
 from relume.scene.model import Scene
-from relume.transfer.base import Recipe
 from worker.scenes import register_scene
 from worker.service import BakeService
 from worker.status import bake_id

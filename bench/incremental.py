@@ -18,18 +18,20 @@ from numpy.typing import NDArray
 from bench.figure import Figure
 from bench.points import relative_rmse
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.bake import Recipe
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
 from relume.look import Look, validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.methods.store_io import read_lights
+from relume.operators.frozen import freeze
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import DirectMethod
-from relume.transfer.frozen import freeze
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
 
 F64 = NDArray[np.float64]
 
@@ -46,8 +48,8 @@ def measure(tiny: bool) -> list[Figure]:
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT, glossy))
     with tempfile.TemporaryDirectory() as folder:
         path = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, num_lights), Path(folder) / "s.zarr")
-        transfer = open_transfer(path)
-        picture = Picture(transfer, "front", FrozenCache(4 << 30))
+        transfer = open_transfer(path, Memory(4 << 30))
+        picture = Picture(transfer, "front", Memory(4 << 30))
         _settle(picture)
         look, inexact = _edit(picture, transfer, num_edits)
         _settle(picture)
@@ -57,8 +59,8 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _settle(picture: Picture) -> None:
-    while not picture.advance(_BUDGET).exact or picture.waiting() is not None:
-        if picture.waiting() is not None:
+    while not picture.advance(_BUDGET).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)
 
 
@@ -76,7 +78,7 @@ def _edit(picture: Picture, transfer: Transfer, num_edits: int) -> tuple[Look, i
         _change(rng, term, curve, parameter)
         look = validate(copy.deepcopy(document), transfer.default_look)
         picture.set_look(look)
-        while (need := picture.waiting()) is not None and not need.refines:
+        while (need := picture.next_job()) is not None and not need.refines:
             picture.freeze(lambda share: None, lambda: False)
         inexact += not picture.advance(_BUDGET).exact
     return look, inexact
@@ -118,7 +120,7 @@ def _full_term(transfer: Transfer, receivers: Any, document: dict[str, Any], cos
     term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
     active = max(bands, key=lambda name: bands[name].shape[1])
-    frozen = freeze(term, bands, active, transfer.lights, receivers, lambda share: None, lambda: False)
+    frozen = freeze(term, bands, active, read_lights(transfer.store), receivers, lambda share: None, lambda: False)
     sums = np.einsum("tcjs,cj->tsc", frozen.transport.astype(np.float64), analysis(bands[active]), optimize=True)
     radiance = sums.reshape(-1, 3)[: len(cos_theta_o)] * np.asarray(document["color"])
     for curve in term.curves:

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from bench.mitsuba import render
 from relume.look import validate
 from relume.look.document import MAX_BOUNCES
+from relume.picture.transfer import Transfer
+from relume.render.image import render_image
 from relume.scene.model import Scene
-from relume.transfer.opened import Transfer
-from relume.transfer.render import render_image
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+
+PASSES = 8  # independent pictures of the peer, from which the noise of their mean is known
 
 
 def reflected(transfer: Transfer, terms: Mapping[str, Sequence[Mapping[str, Any]]]) -> F64:
@@ -46,27 +48,14 @@ def mitsuba_job(seen: Sequence[Any], beyond: Sequence[Any]) -> dict[str, Any]:
 def reflected_by_mitsuba(
     scene: Scene, size: tuple[int, int], seen: Sequence[Any], beyond: Sequence[Any], spp: int, folder: Path
 ) -> F32:
-    """Two independent halves of Mitsuba's picture of the same light. (2, height, width, 3)
+    """Independent passes of Mitsuba's picture of the same light. (`PASSES`, height, width, 3)
 
     Args:
+        scene: its first view is rendered.
+        size: width and height, pixels.
         seen, beyond: BSDFs of the meshes where the camera sees them, and further along paths.
-        spp: of each half.
+        spp: samples of a pixel in each pass, a power of two.
+        folder: where files of the exchange are written.
     """
-    render(scene, size, {"spp": [spp], "passes": 2, **mitsuba_job(seen, beyond)}, folder)
+    render(scene, size, {"spp": [spp], "passes": PASSES, **mitsuba_job(seen, beyond)}, folder)
     return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
-
-
-def error_without_noise(ours: F64, halves: F32) -> dict[str, float]:
-    """Relative RMSE against the mean that two noisy halves share: E[(o − a)(o − b)] = (o − mean)².
-
-    Returns:
-        "error", "bias" of the means, and "noise" of the two halves' mean.
-    """
-    one, other = halves.astype(np.float64)
-    scale = np.sqrt(np.mean(one * other))
-    squared = np.mean((ours - one) * (ours - other))
-    return {
-        "error": float(np.sqrt(max(0.0, squared)) / scale),
-        "bias": float(ours.mean() / halves.mean(dtype=np.float64) - 1),
-        "noise": float(np.sqrt(np.mean((one - other) ** 2)) / 2 / scale),
-    }

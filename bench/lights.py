@@ -1,7 +1,8 @@
 """lights.rmse_…: direct light of each kind against Mitsuba 3; lights.gain_fps: frames a second while one is dimmed.
 
 The Cornell box, 128×128 pixels, diffuse; the environment is dark. Pictures are compared by means over squares of 4×4
-pixels: a pixel has one view sample inside surfaces and Mitsuba's many, which differ along every edge of a hard shadow.
+pixels, Mitsuba's noise taken off: a pixel has one view sample inside surfaces and Mitsuba's many, which differ along
+every edge of a hard shadow.
 Mitsuba's spot falls off in angle and ours in cosine: the cone compared has an edge of a tenth of a degree.
 bench/mitsuba.py says where Mitsuba is looked for.
 """
@@ -17,19 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
+from bench.indirect import PASSES
 from bench.mitsuba import bsdf, missing, render
+from bench.standard_error import over_passes
+from relume.bake import Recipe
+from relume.environments.model import Environment
 from relume.light.local import rectangle
 from relume.look import Look, validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
+from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.cornell import cornell_box
-from relume.scene.model import Environment, Scene
+from relume.scene.model import Scene
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
-from relume.transfer.registry import METHODS
-from relume.transfer.render import render_image
 
 F64 = NDArray[np.float64]
 
@@ -59,22 +63,22 @@ def measure(tiny: bool) -> list[Figure]:
 def _errors(folder: Path, tiny: bool) -> list[Figure]:
     if (why := missing()) is not None:
         return skipped(_NAMES, "relative RMSE", why)
-    size, spp = ((32, 32), 16) if tiny else ((128, 128), 512)
+    size, spp = ((32, 32), 4) if tiny else ((128, 128), 128)
     room = cornell_box()
     night = Environment("night", np.full((4, 8, 3), 1e-7, np.float32))
     scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
     recipe = Recipe("direct", ("front",), size, 20)
-    transfer = open_transfer(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"))
+    transfer = open_transfer(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Memory(4 << 30))
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     figures = []
     for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
         ours = render_image(transfer, "front", _look(transfer, {"A": light})).astype(np.float64)
-        job = {"spp": [spp], "passes": 2, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
         render(scene, size, job, folder)
-        theirs = np.load(folder / "passes.npy", allow_pickle=False).astype(np.float64).mean(axis=0)
-        error = np.sqrt(np.mean((_blocks(ours) - _blocks(theirs)) ** 2) / np.mean(_blocks(theirs) ** 2))
-        context = {"bias": float(ours.mean() / theirs.mean() - 1), "size": list(size), "spp": 2 * spp, "kind": kind}
-        figures.append(Figure(name, float(error), "relative RMSE", context))
+        theirs = np.load(folder / "passes.npy", allow_pickle=False)
+        found = over_passes(_blocks(ours), np.array([_blocks(one) for one in theirs], np.float32))
+        context = {**found.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
+        figures.append(Figure(name, found.error.value, "relative RMSE", context, found.error.standard_error))
     return figures
 
 
@@ -82,10 +86,10 @@ def _look(transfer: Transfer, lights: dict[str, Any]) -> Look:
     return validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
 
 
-def _blocks(picture: F64) -> F64:
+def _blocks(picture: NDArray[np.floating]) -> F64:
     height, width, _ = picture.shape
     blocks = picture.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, 3)
-    return np.asarray(blocks.mean(axis=(1, 3)))
+    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
 
 
 def _emitter(light: dict[str, Any], transfer: Transfer) -> dict[str, Any]:
@@ -115,14 +119,14 @@ def _emitter(light: dict[str, Any], transfer: Transfer) -> dict[str, Any]:
 
 
 def _gain_fps(folder: Path, tiny: bool) -> Figure:
-    """Of a picture with reflected light, 400×400."""
+    """Time frames of a picture with reflected light, 400×400, while one of two lights is dimmed."""
     scene: Scene = cornell_box()
     size, method = ((32, 32), "direct") if tiny else ((400, 400), "gather")
     store = bake_here(
         METHODS[method], scene, Recipe(method, ("front",), size, 20 if tiny else 1000), folder / "gather.zarr"
     )
-    transfer = open_transfer(store)
-    picture = Picture(transfer, "front", FrozenCache(1 << 30))
+    transfer = open_transfer(store, Memory(4 << 30))
+    picture = Picture(transfer, "front", Memory(1 << 30))
     taken = []
     for k in range(5 if tiny else 60):
         panel = _LIGHTS["rectangle"] | {"scale": 1 + k / 60}
@@ -131,6 +135,6 @@ def _gain_fps(folder: Path, tiny: bool) -> Figure:
         if k > 1:  # the first shades all, the second one light alone
             picture.encode(picture.advance(None).tiles, "rgb9e5")
             taken.append(time.perf_counter() - began)
-        while not picture.advance(None).exact or picture.waiting() is not None:
+        while not picture.advance(None).exact or picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)
     return Figure(_FPS, 1 / float(np.median(taken)), "fps", {"size": list(size), "method": method})

@@ -16,11 +16,11 @@ from typing import Any
 from bench.figure import Figure
 from bench.house import House, Server, baked_house, serving, session
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.bake import Recipe
 from relume.environments.studio import studio
 from relume.errors import PlanError
 from relume.scene.built_in import BUILT_IN
 from relume.scene.model import Scene
-from relume.transfer.base import Recipe
 from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene
@@ -38,7 +38,7 @@ class Resident:
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """One server; scene after scene; then nothing."""
+    """Let one server bake and show scene after scene, then leave it alone."""
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
     scenes = list(_scenes(2 if tiny else _NUM_SCENES))
     with baked_house(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as house:

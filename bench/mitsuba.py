@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.look.terms import complete_term
+from relume.brdf.document import complete_term
 from relume.scene.model import Scene
 
 F32 = NDArray[np.float32]
@@ -88,11 +88,15 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
     """Hand the scene's first view over as arrays and let the peer render.
 
     Args:
+        scene: that is handed over. size: width and height, pixels.
         job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
             and "seen" where reflected light alone is (peer_mitsuba_render.py); "emitters", Mitsuba's own descriptions
             of lights beside the map.
+        folder: where files of the exchange are written.
     Returns:
         What it wrote to result.json in `folder`.
+    Raises:
+        CalledProcessError: the peer failed.
     """
     camera, llvm = scene.cameras[0], _llvm()
     arrays: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}

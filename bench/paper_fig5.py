@@ -15,16 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.points import Lit, freeze_along, lit_points, relative_rmse
+from bench.points import Lit, freeze_along, lit_points
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from bench.standard_error import over_points
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
-from relume.look.terms import complete_term
-from relume.transfer.along import AlongCurve
-from relume.transfer.frozen import Frozen
-from relume.transfer.term_image import TermImage
+from relume.look import BAKED_ENVIRONMENT, Paths
+from relume.operators.edit_basis import CurveBasis
+from relume.operators.frozen import Frozen
+from relume.picture.light import Light
+from relume.picture.routes.operator import advance
+from relume.picture.shown import Shown
 
 F64 = NDArray[np.float64]
 
@@ -34,7 +38,7 @@ _PEAK_DEG, _RISE = (20.0, 40.0, 62.0, 80.0), (0.6, 0.15, 0.05)  # where the rise
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Both errors of the same last frame."""
+    """Measure both errors on the same last frame."""
     num_points, num_lights = (30, 200) if tiny else (4000, 2000)
     start = complete_term(("fig5",), cook_torrance(0.1), None)
     scene = teapot_on_table(studio(), (LAMBERT, start), (LAMBERT,))
@@ -42,13 +46,13 @@ def measure(tiny: bool) -> list[Figure]:
     frozen = freeze_along(lit, start, _CURVE)
     frames = [_drawn(start, (k + 1) / _DRAG) for k in range(_DRAG)]
     bands = curve_bands(frames[-1], TERMS["cook_torrance"].curve(_CURVE))
-    truth = _image(frozen, analysis(bands))
-    incremental = relative_rmse(_dragged(lit, frozen, start, frames), truth)
-    non_linear = relative_rmse(_image(frozen, _largest(analysis(bands))), truth)
+    truth = _rows(_image(frozen, analysis(bands)), num_points)
+    incremental = over_points(_rows(_dragged(lit, frozen, start, frames), num_points), truth)
+    non_linear = over_points(_rows(_image(frozen, _largest(analysis(bands))), num_points), truth)
     context = {"terms": _BUDGET, "of": bands.shape[1], "drag_frames": _DRAG, "resting_frames": _REST}
     return [
-        Figure("paper.fig5_incremental", incremental, "relative RMSE", context),
-        Figure("paper.fig5_non_linear", non_linear, "relative RMSE", context),
+        Figure("paper.fig5_incremental", incremental.value, "relative RMSE", context, incremental.standard_error),
+        Figure("paper.fig5_non_linear", non_linear.value, "relative RMSE", context, non_linear.standard_error),
     ]
 
 
@@ -64,12 +68,13 @@ def _drawn(start: dict[str, Any], share: float) -> dict[str, Any]:
 
 def _dragged(lit: Lit, frozen: Frozen, start: dict[str, Any], frames: list[dict[str, Any]]) -> F64:
     """The term's image after the drag and the rest."""
-    term = TermImage(start, np.einsum("nc,nc->n", lit.points.normal, lit.points.wo).astype(np.float64))
-    term.adopt(frozen, AlongCurve.of(term.term.curve(_CURVE)))
+    curve = TERMS["cook_torrance"].curve(_CURVE)
+    basis, light = CurveBasis.of(curve), Light(BAKED_ENVIRONMENT, (), Paths(True, 1, 0))
+    empty = Shown(np.zeros_like(frozen.transport[:, :, 0]))
+    shown = empty.summed(frozen, basis, {_CURVE: curve_bands(start, curve)}, light)
     for document in [*frames, *[frames[-1]] * _REST]:
-        term.set_document(document)
-        term.step(frozen, _BUDGET)
-    return term.image.astype(np.float64)
+        shown = advance(shown, {_CURVE: curve_bands(document, curve)}, frozen, _BUDGET)
+    return shown.image.astype(np.float64)
 
 
 def _image(frozen: Frozen, coefficients: F64) -> F64:
@@ -77,8 +82,13 @@ def _image(frozen: Frozen, coefficients: F64) -> F64:
     return np.asarray(np.einsum("tcjs,cj->tcs", frozen.transport.astype(np.float64), coefficients, optimize=True))
 
 
+def _rows(image: F64, num_points: int) -> F64:
+    """Samples of an image in tiles, (tiles, 3, samples), one a row. (n, 3)"""
+    return image.transpose(0, 2, 1).reshape(-1, 3)[:num_points]
+
+
 def _largest(coefficients: F64) -> F64:
-    """All but the largest of each channel made zero."""
+    """The coefficients, all but the largest of each channel made zero."""
     kept = np.zeros_like(coefficients)
     index = np.argsort(-np.abs(coefficients), axis=1)[:, :_BUDGET]
     np.put_along_axis(kept, index, np.take_along_axis(coefficients, index, axis=1), axis=1)

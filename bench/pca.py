@@ -4,7 +4,7 @@ Norm of `pca.blinn_phong_6`: √mean (linearised − exact)² ÷ √mean exact²
 exponent evenly spaced over [3, 300] as in the paper, 256 bands; decomposed at 298 values, measured at those between.
 `pca.vectors` is the largest number of vectors, over all terms and sliders, that holds this norm to 1e-3; in its context
 are the errors of each slider with 2 to 16 vectors: over all values, and at the worst of them. `pca.slider_nodes` is the
-largest number of nodes of an operator along a slider (`relume.transfer.slider`), all of them in the context.
+largest number of nodes of an operator along a slider (`relume.operators.nodes`), all of them in the context.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import bands_at, moved_curves, slider_values
 from relume.brdf.term import F64, Parameter, Term
-from relume.transfer.slider import linearise
+from relume.operators.nodes import linearise
 
 _NUM_VECTORS = (2, 4, 6, 8, 10, 12, 16)
 _BOUND = 1e-3

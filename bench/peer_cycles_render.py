@@ -86,7 +86,14 @@ def load(folder: Path, job: dict[str, Any]) -> None:
 
 
 def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
-    """A picture (height, width, 3), and its seconds."""
+    """Render the scene that is loaded.
+
+    Args:
+        folder: where a file of the picture is written.
+        spp: samples a pixel. seed: of them.
+    Returns:
+        The picture, (height, width, 3) float64, and its seconds.
+    """
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.seed = spp, seed
     scene.render.filepath = str(folder / "cycles.exr")
@@ -102,7 +109,7 @@ def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
 
 
 def main(folder: Path) -> None:
-    """One job."""
+    """Render what cycles.json asks for, and write cycles_result.json and picture.npy."""
     job = json.loads((folder / "cycles.json").read_text())
     load(folder, job)
     found = []

@@ -23,18 +23,19 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.mitsuba import bsdf, missing, render
-from bench.points import frame_radiance, lit_points, relative_rmse
+from bench.points import frame_radiance, lit_points
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
+from bench.standard_error import Estimated, over_points
+from relume.bake import Recipe
+from relume.brdf.document import complete_term
 from relume.look import validate
-from relume.look.terms import complete_term
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
 from relume.reference import reference_radiance, texels_of
 from relume.scene.model import Scene
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import open_transfer
-from relume.transfer.picture import Picture
 
 _NAMES = ("peer.mitsuba_time_ratio",)
 _SIGMA, _CURVES = 0.2, ("theta_i", "theta_h")
@@ -42,7 +43,7 @@ _TERMS = tuple(complete_term(("peer",), term, None) for term in (LAMBERT, cook_t
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Their time to our error, and our time."""
+    """Measure our error and our edit's time, then how long Mitsuba renders to that error."""
     if (why := missing()) is not None:
         return skipped(_NAMES, "ratio", why)
     size = (32, 32) if tiny else (512, 512)
@@ -54,34 +55,36 @@ def measure(tiny: bool) -> list[Figure]:
         found = render(scene, size, job, Path(folder))
         picture = np.load(Path(folder) / "picture.npy", allow_pickle=False)
     last = found["steps"][-1]
-    theirs_s = last["seconds"] * max(1.0, (last["error"] / error) ** 2)
+    theirs_s = last["seconds"] * max(1.0, (last["error"] / error.value) ** 2)
     context = {
-        "our_error": error,
+        "our_error": error.value,
+        "our_error_standard_error": error.standard_error,
         "our_edit_ms": 1e3 * edit_s,
         "their_seconds": theirs_s,
-        "extrapolated_from_spp": last["spp"] if last["error"] > error else 0,
+        "extrapolated_from_spp": last["spp"] if last["error"] > error.value else 0,
         "their_steps": found["steps"],
         "pictures_differ_median": float(np.median(np.abs(picture - frame) / np.maximum(frame, 1e-6))),
         "mitsuba": found["version"],
         "size": list(size),
     }
-    return [Figure(_NAMES[0], theirs_s / edit_s, "ratio", context)]
+    ratio = theirs_s / edit_s  # ∝ 1/error²
+    return [Figure(_NAMES[0], ratio, "ratio", context, 2 * ratio * error.standard_error / error.value)]
 
 
-def _our_error(scene: Scene, tiny: bool) -> float:
+def _our_error(scene: Scene, tiny: bool) -> Estimated:
     lit = lit_points(scene, (320, 320), 20 if tiny else 2000, 200 if tiny else 4000, None)
     texels = texels_of(scene.environment)
     truth = reference_radiance(lit.geometry, texels, lit.points, [_TERMS], 500 if tiny else 0)[0]
     frame = sum(frame_radiance(lit, term, curve) for term, curve in zip(_TERMS, _CURVES, strict=True))
-    return relative_rmse(np.asarray(frame), truth)
+    return over_points(np.asarray(frame), truth)
 
 
 def _our_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[float, Any]:
     """Median seconds of an edit, and the picture of the default look."""
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", ("front",), size, 60 if tiny else 1000)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"))
-        picture = Picture(transfer, "front", FrozenCache(4 << 30))
+        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
+        picture = Picture(transfer, "front", Memory(4 << 30))
         picture.touch("/materials/Teapot/terms/1/curves/theta_h")
         _settle(picture)
         shown = picture.image()
@@ -98,6 +101,6 @@ def _our_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[float, A
 
 
 def _settle(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.waiting() is not None:
-        if picture.waiting() is not None:
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)

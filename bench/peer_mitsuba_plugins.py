@@ -135,7 +135,15 @@ class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
     def sample(
         self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
     ) -> tuple[Any, Any, list[Any]]:
-        """Mitsuba's interface."""
+        """Mitsuba's interface.
+
+        Args:
+            scene: in which paths go on. sampler: of random numbers.
+            ray: from the camera. medium: always None, as there are none.
+            active: lanes that are wanted.
+        Returns:
+            Radiance, which lanes hit anything, and no further values.
+        """
         si = self.seen.ray_intersect(ray, active)
         active = active & si.is_valid()
         bs, weight = si.bsdf(ray).sample(mi.BSDFContext(), si, sampler.next_1d(active), sampler.next_2d(active), active)

@@ -1,7 +1,7 @@
 """Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
 
-python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, passes.npy (the last
-                                            two pictures, or as many independent ones as the job asks for), picture.npy
+python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, and picture.npy
+                                            or passes.npy (as many independent pictures as the job asks for)
 """
 
 from __future__ import annotations
@@ -22,7 +22,12 @@ plugins: Any = __import__("peer_mitsuba_plugins")
 
 
 def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
-    """The k-th mesh of scene.npz."""
+    """One mesh of the scene.
+
+    Args:
+        arrays: of scene.npz. k: which mesh.
+        bsdf: its material, as `bench.mitsuba.bsdf` describes it.
+    """
     props = mi.Properties()
     colors = {key: mi.ScalarVector3f(value) for key, value in bsdf.items() if isinstance(value, list)}
     props["mesh_bsdf"] = mi.load_dict({"type": "twosided", "front": {**bsdf, **colors}})
@@ -40,6 +45,10 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
 
     Our cameras look along -Z with +X to the right, Mitsuba's along +Z with +X to the left; our maps have +X in their
     middle, Mitsuba's +Z.
+
+    Args:
+        folder: with scene.npz. job: of job.json: size, camera, emitters.
+        bsdfs: descriptions, one a mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
     transform = mi.ScalarTransform4f
@@ -89,7 +98,13 @@ def renderer(folder: Path, job: dict[str, Any]) -> Callable[[int, int], Any]:
 
 
 def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
-    """Two pictures with different seeds at each count: their difference is √2 times the error of one."""
+    """Render two pictures with different seeds at each count: their difference is √2 times the error of one.
+
+    Args:
+        render: makes a picture of so many samples a pixel from a seed.
+        job: its "spp" are the counts, rising; "most" of them are rendered at once.
+        folder: where picture.npy, of the last count, and result.json are written.
+    """
     render(job["spp"][0], 99)  # compiles
     found = []
     for spp in job["spp"]:
@@ -103,19 +118,24 @@ def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) 
         error = np.sqrt(np.mean((one - other) ** 2) / 2) / scale
         found.append({"spp": spp, "seconds": taken_s, "error": float(error)})
     np.save(folder / "picture.npy", np.ascontiguousarray(picture[..., :3], np.float32))
-    np.save(folder / "passes.npy", np.array([one, other], np.float32)[..., :3])
     (folder / "result.json").write_text(json.dumps({"steps": found, "version": mi.__version__}))
 
 
 def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
-    """Pictures that are independent of each other. (passes, height, width, 3)"""
+    """Render pictures that are independent of each other.
+
+    Args:
+        render: makes a picture of so many samples a pixel from a seed.
+        job: its first "spp" is the count, and "passes" the number of pictures.
+        folder: where passes.npy, (passes, height, width, 3), and result.json are written.
+    """
     pictures = [render(job["spp"][0], seed)[..., :3] for seed in range(job["passes"])]
     np.save(folder / "passes.npy", np.array(pictures, np.float32))
     (folder / "result.json").write_text(json.dumps({"version": mi.__version__}))
 
 
 def main(folder: Path) -> None:
-    """One job."""
+    """Render what job.json asks for."""
     job = json.loads((folder / "job.json").read_text())
     (passes if "passes" in job else steps)(renderer(folder, job), job, folder)
 

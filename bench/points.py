@@ -13,15 +13,15 @@ from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.light.triangles import TriangleLights, subdivide
+from relume.operators.frozen import Frozen, freeze
+from relume.operators.stream import columns_of, stream
+from relume.project.receivers import Receivers
 from relume.reference import Points
 from relume.reference.image import points_of
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
-from relume.transfer.frozen import Frozen, freeze
-from relume.transfer.receivers import Receivers
-from relume.transfer.stream import columns_of, stream
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,14 @@ class Lit:
 
 
 def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights: int, material: int | None) -> Lit:
-    """A random subset (fixed seed, order kept) of a view's samples on one material, or on all."""
+    """A random subset (fixed seed, order kept) of a view's samples, with the light triangles that they see.
+
+    Args:
+        scene: its first view is taken. size: width and height, pixels.
+        num_points: of the subset; all where there are fewer.
+        num_lights: triangles that the environment is divided into, at least.
+        material: whose samples are taken; None for those on any surface.
+    """
     geometry = merge(scene)
     camera = scene.cameras[0]
     samples = sample_view(scene, geometry, camera.name, size)
@@ -46,18 +53,30 @@ def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights:
     points = points_of(samples, camera.to_world[:3, 3]).rows(chosen)
     lights = subdivide(scene.environment.radiance, num_lights)
     visible = trace_visibility(geometry.embree, points.position, points.normal, lights.direction).visible
-    return Lit(geometry, points, lights, Receivers(points.normal, points.tangent, points.wo, visible))
+    return Lit(geometry, points, lights, Receivers(samples.surface.points.rows(chosen), points.wo, visible))
 
 
 def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
-    """The operator of one term along one curve."""
+    """The operator of one term along one curve.
+
+    Args:
+        lit: points and lights. document: the complete term.
+        active: name of the curve that stays free.
+    """
     term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
     return freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
 
 
 def frame_radiance(lit: Lit, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
-    """R = T · c of one term, as a frame computes it, times its colour and curves of the outgoing angle. (n, 3)"""
+    """R = T · c of one term, as a frame computes it, times its colour and curves of the outgoing angle.
+
+    Args:
+        lit: points and lights. document: the complete term.
+        active: name of the curve that T is frozen along.
+    Returns:
+        (n, 3) float64
+    """
     frozen = freeze_along(lit, document, active)
     tiles, _, _, samples = frozen.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)

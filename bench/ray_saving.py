@@ -17,20 +17,24 @@ from bench.figure import Figure
 from bench.points import relative_rmse
 from bench.scenes import LAMBERT
 from bench.timing import seconds
+from relume.bake import BakeMethod, Recipe, StoreReader, Task, Written
 from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.methods.sampled_views import SampledViews
+from relume.methods.store_io import read_lights, read_rays
+from relume.render.image import render_image
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
 from relume.store import bake_here, open_store
 from relume.trace.visibility import trace_visibility
-from relume.transfer.base import Recipe, StoreReader, Task, Written
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import open_transfer
-from relume.transfer.render import render_image
-from relume.transfer.stored import read_lights, read_rays
 
 
-class _EveryRay(DirectMethod):
+class _EveryRay(SampledViews):
     """The same bake without predictions."""
+
+    name = "direct"
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         position = store.read(f"views/{k}/position", task.start, task.stop)
@@ -40,10 +44,10 @@ class _EveryRay(DirectMethod):
         return Written({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 
 
-_BAKES = (DirectMethod(), _EveryRay())
+_BAKES: tuple[BakeMethod, ...] = (DirectMethod(), _EveryRay())
 
 
-def _times(method: DirectMethod, scene: Scene, recipe: Recipe, path: Path) -> tuple[float, float]:
+def _times(method: BakeMethod, scene: Scene, recipe: Recipe, path: Path) -> tuple[float, float]:
     """Seconds of a whole bake, and those in which it traced and predicted."""
     written: list[Written] = []
     wall_s = seconds(lambda: bake_here(method, scene, recipe, path, lambda _, one: written.append(one)))
@@ -51,7 +55,7 @@ def _times(method: DirectMethod, scene: Scene, recipe: Recipe, path: Path) -> tu
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Two bakes, two pictures of each."""
+    """Bake with predictions and with every ray, and compare two pictures of each."""
     scene = demo_scene()
     recipe = Recipe("direct", ("front",), (64, 48) if tiny else (640, 480), 60 if tiny else 2000)
     with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +89,7 @@ def _changes(scene: Scene, paths: list[Path]) -> dict[str, float]:
     for name, partial in looks.items():
         pictures = []
         for path in paths:
-            transfer = open_transfer(path)
+            transfer = open_transfer(path, Memory(4 << 30))
             look = validate(complete(partial, transfer.default_look), transfer.default_look)
             pictures.append(render_image(transfer, "front", look))
         changes[name] = relative_rmse(*pictures)

@@ -33,8 +33,8 @@ def measure(tiny: bool) -> list[Figure]:
     samples = sample_view(scene, geometry, "front", size)
     surfaces = int((samples.material != BACKGROUND).sum())
     start = max(0, surfaces // 2 - num_points // 2) // 16 * 16  # neighbours, as in a bake
-    origins = samples.surface.position[start : start + num_points]
-    normals = samples.surface.normal[start : start + num_points]
+    origins = samples.surface.points.position[start : start + num_points]
+    normals = samples.surface.points.normal[start : start + num_points]
     directions = subdivide(scene.environment.radiance, num_lights).direction
     point, light = _active_rays(normals, directions)
     ray_origins, ray_directions = np.ascontiguousarray(origins[point]), np.ascontiguousarray(directions[light])

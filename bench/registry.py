@@ -8,11 +8,13 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from datetime import date
 from typing import Any
 
 from bench.figure import Figure
 from bench.machine import processor_ticks, stolen_share
+from relume.store.schema import SCHEMA_VERSION
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,9 @@ class Group:
         about = {
             "measured_in_s": round(time.perf_counter() - began, 1),
             "stolen_share": stolen_share(ticks, processor_ticks()),
+            "measured_on": f"{date.today().isoformat()}, schema {SCHEMA_VERSION}",
         }
-        return [Figure(f.name, f.value, f.unit, {**f.context, **about}) for f in figures]
+        return [replace(figure, context={**figure.context, **about}) for figure in figures]
 
 
 GROUPS = (
@@ -76,6 +79,8 @@ GROUPS = (
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
     Group("bench.ray_saving", ("bake.ray_saving",)),
     Group("bench.store_size", ("store.bytes_per_view_sample",)),
+    Group("bench.plan", ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")),
+    Group("bench.mesh_files", ("import.obj", "import.ply")),
     Group("bench.workers", ("bake.two_workers_speedup",)),
     Group("bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
     Group("bench.demo", ("demo.bake_s", "demo.first_picture_s")),
@@ -83,6 +88,7 @@ GROUPS = (
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group("bench.gather_rooms", ("gather.interior_bake_s", "gather.interior_store_mb")),
     Group("bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
+    Group("bench.gather_follow", ("gather.follow_error",)),
     Group("bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
     Group(
         "bench.gather_scenes",
@@ -133,7 +139,13 @@ def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
 
 
 def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
-    """Measure and print; 1 where something failed or nothing has such a name."""
+    """Measure and print; 1 where something failed or nothing has such a name.
+
+    Args:
+        prefix: figures whose name starts with it are measured; "" for all.
+        as_json: print a list of figures to standard output, and lines for people to standard error.
+        tiny: sizes that end in seconds and mean nothing, for the tests.
+    """
     if not any(name.startswith(prefix) for name in names()):
         print(f"relume: no benchmark starts with {prefix!r}; there are {', '.join(names())}", file=sys.stderr)
         return 1
@@ -151,7 +163,8 @@ def _line(figure: Figure) -> str:
         return f"{figure.name:<32} -  {figure.context.get('skipped') or figure.context.get('failed')}"
     stolen = figure.context.get("stolen_share") or 0
     beside = f"   (the host gave {stolen:.0%} of the processor time to others)" if stolen >= _NOTEWORTHY else ""
-    return f"{figure.name:<32} {figure.value:.4g} {figure.unit}{beside}"
+    error = "" if figure.standard_error is None else f" ± {figure.standard_error:.2g}"
+    return f"{figure.name:<32} {figure.value:.4g}{error} {figure.unit}{beside}"
 
 
 def _plain(value: Any) -> Any:

@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.points import Lit, relative_rmse
+from bench.points import Lit
 from bench.scenes import LAMBERT, cook_torrance
+from bench.standard_error import Estimated, over_points
 from relume.brdf.curves import curve_bands
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
+from relume.environments.model import Environment
 from relume.light.tiles import Tiles, choose_tiles
 from relume.light.triangles import TriangleLights, weigh
-from relume.look.terms import complete_term
+from relume.operators.shade import shade
 from relume.reference import reference_radiance, texels_of
-from relume.scene.model import Environment
 from relume.trace.visibility import trace_visibility
-from relume.transfer.shade import shade
 
 F64 = NDArray[np.float64]
 
@@ -40,7 +41,12 @@ class Bake:
 
 
 def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
-    """What a bake of this environment keeps."""
+    """What a bake of this environment keeps.
+
+    Args:
+        num_lights: tiles into which the sphere is divided, at least.
+        relightable: tiles do not depend on where the light is, and shadow rays go to their middles.
+    """
     tiles = choose_tiles(environment.radiance, num_lights, relightable)
     centroids = tiles.centroids.astype(np.float32)
     return Bake(tiles, centroids if relightable else weigh(tiles, environment.radiance).direction)
@@ -48,11 +54,17 @@ def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
 
 def compare(
     lit: Lit, bakes: Mapping[str, Bake], light: Environment, terms: Mapping[str, Mapping[str, Any]], spp: int
-) -> dict[tuple[str, str], float]:
-    """Relative RMSE of each term, by name, in each bake, by name, of the same points under one light.
+) -> dict[tuple[str, str], Estimated]:
+    """Relative RMSE of each term in each bake, of the same points under one light.
 
     Args:
-        spp: of the truth; 0 for every texel.
+        lit: the points; what they see is traced anew for each bake.
+        bakes: by a name for each.
+        light: the map that is shown.
+        terms: complete ones, by the names of their figures.
+        spp: texels of the truth at each point; 0 for every texel.
+    Returns:
+        By the names of term and bake.
     """
     documents = [[dict(document)] for document in terms.values()]
     truth = reference_radiance(lit.geometry, texels_of(light), lit.points, documents, spp)
@@ -60,7 +72,7 @@ def compare(
     for kind, baked in bakes.items():
         lights = weigh(baked.tiles, light.radiance)
         for (name, document), right in zip(terms.items(), truth, strict=True):
-            errors[name, kind] = relative_rmse(_radiance(lit, baked, lights, document), right)
+            errors[name, kind] = over_points(_radiance(lit, baked, lights, document), right)
     return errors
 
 
@@ -75,18 +87,16 @@ def _radiance(lit: Lit, baked: Bake, lights: TriangleLights, document: Mapping[s
     return np.asarray(found.astype(np.float64) * np.asarray(document["color"]))
 
 
-def figures(found: Mapping[str, Mapping[str, float]], context: Mapping[str, Any]) -> list[Figure]:
+def figures(found: Mapping[str, Mapping[str, Estimated]], context: Mapping[str, Any]) -> list[Figure]:
     """Each figure's worst error of a relightable bake; all errors, labelled "kind, …", beside it."""
-    return [
-        Figure(
-            name,
-            _worst(errors, "relightable"),
-            "relative RMSE",
-            {**context, "plain": _worst(errors, "plain"), **errors},
-        )
-        for name, errors in found.items()
-    ]
+    made = []
+    for name, errors in found.items():
+        worst, plain = _worst(errors, "relightable"), _worst(errors, "plain")
+        about = {"plain": plain.value, "plain_standard_error": plain.standard_error}
+        parts = {label: error.value for label, error in errors.items()}
+        made.append(Figure(name, worst.value, "relative RMSE", {**context, **about, **parts}, worst.standard_error))
+    return made
 
 
-def _worst(errors: Mapping[str, float], kind: str) -> float:
+def _worst(errors: Mapping[str, Estimated], kind: str) -> Estimated:
     return max(error for label, error in errors.items() if label.startswith(kind))

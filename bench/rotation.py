@@ -14,17 +14,18 @@ from bench.figure import Figure
 from bench.points import lit_points
 from bench.relit import bake, compare, documents, figures
 from bench.scenes import LAMBERT, environments, teapot_on_table
+from bench.standard_error import Estimated
+from relume.environments.model import Environment
 from relume.light.tiles import MIN_LIGHTS
-from relume.scene.model import Environment
 
 _TURNS = (0, 1 / 32, 1 / 8, 1 / 4, 1 / 2)  # whole texels of any map as wide as a multiple of 32
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """All bakes of a map share the truth."""
+    """Compare the bakes of each map at every turn, all by one truth."""
     num_points, num_lights = (20, 100) if tiny else (1000, 4000)
     terms = documents("rotation")
-    found: dict[str, dict[str, float]] = {name: {} for name in terms}
+    found: dict[str, dict[str, Estimated]] = {name: {} for name in terms}
     for environment in environments()[: 1 if tiny else 3]:
         lit = lit_points(teapot_on_table(environment, (LAMBERT,), (LAMBERT,)), (320, 320), num_points, MIN_LIGHTS, None)
         bakes = {kind: bake(environment, num_lights, kind == "relightable") for kind in ("relightable", "plain")}

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from relume.environments.equirect import texel_directions
+from relume.environments.model import Environment
+from relume.environments.reading import read_environment
 from relume.environments.studio import studio
-from relume.light.environment import read_environment, texel_directions
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import Surface
 from relume.scene.demo.teapot import teapot
-from relume.scene.model import Environment, Material, Scene
+from relume.scene.model import Material, Scene
 
 REAL = ("debevec_grace_latlong", "debevec_stpeters_latlong", "polyhaven_venice_sunset_1k")
 Terms = tuple[Mapping[str, Any], ...]
@@ -46,7 +48,9 @@ def sky(name: str, height: float, num_rows: int = 256, spread: float = 0.0004) -
     """A sky with a sun whose radiance falls to 1/e where 1 − cos = spread, the same power whatever the spread.
 
     Args:
+        name: of the environment.
         height: of the sun; the tangent of its elevation is about 1.28 of it.
+        num_rows: of the map, which is twice as wide.
     """
     d = texel_directions(num_rows, 2 * num_rows)
     sun = np.array([0.6, height, 0.5]) / np.linalg.norm([0.6, height, 0.5])
@@ -59,6 +63,7 @@ def teapot_on_table(environment: Environment, pot: Terms, table: Terms, eye_dist
     """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square pictures frame the pot.
 
     Args:
+        environment: around it.
         pot, table: terms of the two materials, "Teapot" and "Table".
         eye_distance: 1 for a pot that covers about a third of the picture.
     """

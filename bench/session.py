@@ -16,9 +16,10 @@ from bench.figure import Figure
 from bench.house import SessionClient, baked_house, serving, session
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from bench.timing import percentiles
+from relume.bake import Recipe
 from relume.environments.studio import studio
-from relume.transfer.base import Recipe
-from relume.transfer.opened import open_transfer
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
 from worker.paths import bake_path
 
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
@@ -31,7 +32,7 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_lights, num_edits = ((64, 64), 60, 10) if tiny else ((512, 512), 1000, 600)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     with baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house:
-        ids = open_transfer(bake_path(house.data, house.bake)).views["front"].material_ids()
+        ids = open_transfer(bake_path(house.data, house.bake), Memory(4 << 30)).views["front"].material_ids()
         with serving(house) as server, session(server, house.bake) as client:
             client.send(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
             client.exact(0)

@@ -1,6 +1,6 @@
 """slider.sharp_*: what a hand sees while a highlight is dragged through the sharpest tenth of its slider.
 
-Samples of the teapot, in real light; its highlight alone, by the nodes of the slider (`relume.transfer.slider`), at
+Samples of the teapot, in real light; its highlight alone, by the nodes of the slider (`relume.operators.nodes`), at
 values between those that nodes were chosen from, against the same shaded. `slider.sharp_error`: the largest error of a
 sample, as a share of itself and of a hundredth of what it would show if the highlight were spread evenly over its
 angle. `slider.sharp_levels`: the largest after the tone map `agx`, the brightest twentieth white, of 255. The context
@@ -17,21 +17,21 @@ from bench.figure import Figure
 from bench.points import Lit, lit_points
 from bench.scenes import LAMBERT, environments, teapot_on_table
 from relume.brdf.curves import curve_bands
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
 from relume.brdf.term import F64
-from relume.look.terms import complete_term
-from relume.tonemap import tone_map
-from relume.transfer.contraction import contract
-from relume.transfer.projector import Projector
-from relume.transfer.slider import Linearised, linearise
-from relume.transfer.stream import columns_of, stream
+from relume.imageio.tonemap import tone_map
+from relume.operators.nodes import Linearised, linearise
+from relume.operators.stream import columns_of, stream
+from relume.project.contraction import contract
+from relume.project.projector import Projector
 
 _SLIDERS = (("ggx", "roughness"), ("cook_torrance", "sigma"), ("blinn_phong", "exponent"))
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Every light and slider."""
+    """Measure every slider under every light."""
     num_points, num_lights, size = (60, 80, (32, 32)) if tiny else (4000, 2000, (160, 160))
     found = {}
     for environment in environments()[: 1 if tiny else 3]:

@@ -26,18 +26,19 @@ from bench.figure import Figure
 from bench.points import freeze_along, lit_points, relative_rmse
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from bench.timing import in_turn
+from relume.bake import Recipe
 from relume.brdf.curves import curve_bands
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
 from relume.look import Look, validate
-from relume.look.terms import complete_term
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.operators.nodes import linearise
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
 from relume.store import bake_here
-from relume.transfer.base import Recipe
-from relume.transfer.cache import FrozenCache
-from relume.transfer.direct import DirectMethod
-from relume.transfer.opened import Transfer, open_transfer
-from relume.transfer.picture import Picture
-from relume.transfer.slider import linearise
 
 _NAMES = ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")
 _TERM = "/materials/Teapot/terms/1"
@@ -69,7 +70,7 @@ class _Drag:
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Both drags, and both freezes."""
+    """Measure both drags, and both freezes."""
     size, num_lights, num_frames = ((32, 32), 60, 4) if tiny else ((320, 320), 500, 12)
     several = _Drag("ggx", "roughness", np.linspace(0.15, 0.75, num_frames))
     alone = _Drag("cook_torrance", "sigma", np.geomspace(0.05, 0.5, num_frames))
@@ -77,7 +78,7 @@ def measure(tiny: bool) -> list[Figure]:
     scene = teapot_on_table(studio(), terms, terms)
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", ("front",), size, num_lights)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"))
+        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
         found = {f"{drag.model}.{drag.parameter}": _ways(transfer, drag) for drag in (several, alone)}
     ours, before = found["ggx.roughness"]["nodes"], found["ggx.roughness"]["θh alone, 64"]
     ratio, freezes = _freezes(tiny, several, alone)
@@ -102,7 +103,7 @@ def _exact(transfer: Transfer, drag: _Drag) -> list[NDArray[np.float32]]:
     """The pictures of the drag, each of them shaded."""
     pictures = []
     for look in drag.looks(transfer):
-        picture = Picture(transfer, "front", FrozenCache(4 << 30))
+        picture = Picture(transfer, "front", Memory(4 << 30))
         picture.set_look(look)
         _settle(picture)
         pictures.append(picture.image())
@@ -114,7 +115,7 @@ def _follow(
 ) -> dict[str, float]:
     """Drag with what is touched frozen beforehand, and nothing else made."""
     looks, seen = drag.looks(transfer), transfer.views["front"].material_ids() == 0
-    picture = Picture(transfer, "front", FrozenCache(4 << 30))
+    picture = Picture(transfer, "front", Memory(4 << 30))
     picture.set_look(looks[0])
     _settle(picture)
     picture.touch(f"{_TERM}/{touched}")
@@ -130,8 +131,8 @@ def _follow(
 
 
 def _settle(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.waiting() is not None:
-        if picture.waiting() is not None:
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
             picture.freeze(lambda share: None, lambda: False)
 
 

@@ -9,14 +9,15 @@ from bench.figure import Figure
 from bench.points import lit_points
 from bench.relit import bake, compare, documents, figures
 from bench.scenes import LAMBERT, environments, teapot_on_table
+from bench.standard_error import Estimated
 from relume.light.tiles import MIN_LIGHTS
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """All bakes that are shown in a map share its truth."""
+    """Compare all bakes that are shown in a map, by one truth."""
     num_points, num_lights = (20, 100) if tiny else (400, 4000)
     terms = documents("swap")
-    found: dict[str, dict[str, float]] = {name: {} for name in terms}
+    found: dict[str, dict[str, Estimated]] = {name: {} for name in terms}
     maps = environments()[: 2 if tiny else 3]
     lit = lit_points(teapot_on_table(maps[0], (LAMBERT,), (LAMBERT,)), (320, 320), num_points, MIN_LIGHTS, None)
     bakes = {

@@ -71,11 +71,17 @@ def row(figure: dict[str, Any]) -> str:
     if figure["value"] is None:
         value = "not measured"
     elif figure["unit"] == "relative RMSE" and figure["value"] > 1e-3:
-        value = f"{100 * figure['value']:.2f} %"
+        value = f"{100 * figure['value']:.2f}{_spread(figure, 100)} %"
     else:
-        value = f"{figure['value']:.3g} {figure['unit'].replace('ratio', '×')}"
+        value = f"{figure['value']:.3g}{_spread(figure)} {figure['unit'].replace('ratio', '×')}"
     said = "; ".join(f"{key} {_short(item)}" for key, item in context.items() if key not in ("their_steps",))
     return f"| `{figure['name']}` | {value} | {TARGETS.get(figure['name'], '')} | {said.replace('|', '/')} |"
+
+
+def _spread(figure: dict[str, Any], scale: float = 1.0) -> str:
+    """The standard error of an estimate, to two digits."""
+    error = figure.get("standard_error")
+    return "" if error is None else f" ± {scale * error:.2g}"
 
 
 def _short(value: Any) -> str:

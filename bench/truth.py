@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.mitsuba import bsdf, missing, render
 from bench.scenes import cook_torrance, sky, teapot_on_table
+from bench.standard_error import Estimated, over_passes
+from relume.brdf.document import complete_term
+from relume.environments.model import Environment
 from relume.look import default_look, validate
-from relume.look.terms import complete_term
 from relume.reference import reference_image
 from relume.reference.truth import Estimate, compare
 from relume.scene.archive import make_scene
 from relume.scene.demo import demo_scene
-from relume.scene.model import Environment, Material, Scene
+from relume.scene.model import Material, Scene
 
 F32 = NDArray[np.float32]
 _NAMES = ("truth.mitsuba",)
@@ -33,15 +35,14 @@ _FINER = 4
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Noise taken off, how far apart the two are; where that is less than the noise, what it is below."""
+    """Noise taken off, how far apart the two are."""
     if (why := missing()) is not None:
         return skipped(_NAMES, "relative RMSE", why)
     size, spp, passes = ((16, 12), 4, 2) if tiny else ((96, 72), 64, 8)
-    found: dict[str, Any] = {}
-    for name, scene in _scenes(64 if tiny else 1024).items():
-        found[name] = _disagreement(scene, size, spp, passes)
-    context = {"size": list(size), "spp": spp, "passes": passes, **found}
-    return [Figure(_NAMES[0], max(scene["error"] for scene in found.values()), "relative RMSE", context)]
+    found = {name: _disagreement(scene, size, spp, passes) for name, scene in _scenes(64 if tiny else 1024).items()}
+    context = {"size": list(size), "spp": spp, "passes": passes, **{name: about for name, (_, about) in found.items()}}
+    worst = max(error for error, _ in found.values())
+    return [Figure(_NAMES[0], worst.value, "relative RMSE", context, worst.standard_error)]
 
 
 def _scenes(num_rows: int) -> dict[str, Scene]:
@@ -67,8 +68,15 @@ def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
     return tuple(complete_term(("truth",), term, None) for term in (lambert, cook_torrance(sigma)))
 
 
-def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) -> dict[str, float]:
-    """`relume.reference.truth.Comparison` of the two means."""
+def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) -> tuple[Estimated, dict[str, Any]]:
+    """How far the two means are apart, and what else `relume.reference.truth.Comparison` says of them.
+
+    Args:
+        scene: its first view is rendered by both.
+        size: width and height of Mitsuba's pictures, pixels.
+        spp: of a pixel in each of Mitsuba's passes, and of a view sample in ours.
+        passes: of each renderer.
+    """
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     with tempfile.TemporaryDirectory() as folder:
         render(scene, size, {"spp": [spp], "bsdfs": bsdfs, "passes": passes}, Path(folder))
@@ -76,11 +84,13 @@ def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) ->
     ours = np.array([_our_pass(scene, size, spp, k) for k in range(passes)])
     mean = ours.mean(axis=0)
     estimate = Estimate.nothing(size[1], size[0])
-    for one, other in zip(theirs, ours, strict=True):
-        estimate = estimate.add(one - (other - mean))
+    both = theirs - (ours - mean)
+    for one in both:
+        estimate = estimate.add(one)
     found, _ = compare(mean, estimate)
-    told = found.error if found.error is not None else found.limit
-    return {**asdict(found), "error": told, "mean_ratio": float(mean.mean() / theirs.mean())}
+    error, *_ = over_passes(mean.astype(np.float64), both)
+    about = {**asdict(found), "error": error.value, "standard_error": error.standard_error}
+    return error, {**about, "mean_ratio": float(mean.mean() / theirs.mean())}
 
 
 def _our_pass(scene: Scene, size: tuple[int, int], spp: int, index: int) -> F32:

@@ -11,16 +11,22 @@ import time
 from pathlib import Path
 
 from bench.figure import Figure
+from relume.bake import Recipe
 from relume.errors import PlanError
 from relume.scene.demo import demo_scene
-from relume.transfer.base import Recipe
 from worker.executor import num_cores
 from worker.scenes import register_scene
 from worker.service import BakeService
 
 
 def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
-    """Seconds from submitting a bake to `ready`. Raises PlanError where it fails."""
+    """Seconds from submitting a bake to `ready`.
+
+    Args:
+        service: that bakes. scene: id of a registered one. recipe: how.
+    Raises:
+        PlanError: the bake has failed.
+    """
     began = time.perf_counter()
     identity = service.submit(scene, recipe)
     with service.subscribe(identity) as changes:
@@ -31,7 +37,7 @@ def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """One service after the other."""
+    """Time the same bake by one worker process, then by two."""
     scene = demo_scene()
     views = tuple(camera.name for camera in scene.cameras)
     warm = Recipe("direct", views, (320, 240), 500 if not tiny else 8)

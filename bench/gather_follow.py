@@ -1,0 +1,87 @@
+"""gather.follow_error: pictures that follow a dragged colour, or the number of bounces, before they are shaded at rest.
+
+The room of bench/gather.py. Its red wall is dragged to blue, its floor to dark grey, and bounces from all to one, held
+by the hand; what holding makes is made before. The last frame of each drag against the same look shaded, relative RMSE
+of the whole picture; the worst of the three. Beside it the time of a frame, from the look to the encoded bytes.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.gather import bake, recipe_of, settle
+from bench.points import relative_rmse
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
+from relume.scene.cornell import cornell_box
+
+Document = dict[str, Any]
+Edit = Callable[[Document, float], None]
+
+_NAME = "gather.follow_error"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Measure three drags in one bake."""
+    recipe, num_frames = recipe_of(tiny), 3 if tiny else 12
+    drags: dict[str, tuple[str, Edit]] = {
+        "red wall to blue": ("/materials/Red wall/terms/0/color", _color("Red wall", [0.06, 0.1, 0.7])),
+        "floor to dark grey": ("/materials/Floor/terms/0/color", _color("Floor", [0.1, 0.1, 0.1])),
+        "all bounces to one": ("/transport/bounces", _bounces),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = bake(cornell_box(is_floor_glossy=True), recipe, Path(folder) / "gather.zarr").path
+        transfer = open_transfer(path, Memory(4 << 30))
+        found = {name: _dragged(transfer, pointer, edit, num_frames) for name, (pointer, edit) in drags.items()}
+    worst = max(drag["error"] for drag in found.values())
+    return [Figure(_NAME, worst, "relative RMSE", {**found, "size": list(recipe.size)})]
+
+
+def _color(material: str, target: list[float]) -> Edit:
+    def edit(document: Document, share: float) -> None:
+        term = document["materials"][material]["terms"][0]
+        term["color"] = [
+            (1 - share) * was + share * becomes for was, becomes in zip(term["color"], target, strict=True)
+        ]
+
+    return edit
+
+
+def _bounces(document: Document, share: float) -> None:
+    document["transport"]["bounces"] = round(document["transport"]["bounces"] ** (1 - share))
+
+
+def _dragged(transfer: Transfer, pointer: str, edit: Edit, num_frames: int) -> dict[str, float]:
+    """Error of the last frame, the change that it shows, both relative, and median milliseconds of a frame."""
+    picture = Picture(transfer, "front", Memory(4 << 30))
+    settle(picture)
+    before = picture.image().astype(np.float64)
+    picture.touch(pointer)
+    settle(picture)
+    taken = []
+    for share in np.linspace(0, 1, num_frames + 1)[1:]:
+        document = copy.deepcopy(transfer.default_look)
+        edit(document, float(share))
+        look = validate(document, transfer.default_look)
+        began = time.perf_counter()
+        picture.set_look(look)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        taken.append(time.perf_counter() - began)
+    followed = picture.image().astype(np.float64)
+    settle(picture)
+    exact = picture.image()
+    return {
+        "error": relative_rmse(followed, exact), "changed_by": relative_rmse(before, exact),
+        "ms_p50": 1e3 * float(np.median(taken[1:])),
+    }  # fmt: skip

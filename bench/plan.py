@@ -1,0 +1,72 @@
+"""plan.*: what bakes take of what was planned for them, at the most over the built-in scenes and real ones.
+
+Each is baked in a process of its own, on one thread, as worker processes are. A share above 1 would be a plan that is
+no upper bound.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from bench.figure import Figure, skipped
+from bench.scenes import shared_data
+from relume.bake import Recipe
+from relume.methods.registry import METHODS
+from relume.scene.archive import save_scene
+from relume.scene.built_in import BUILT_IN
+from relume.scene.importer import import_scene
+from relume.scene.model import Scene
+from worker.executor import ONE_THREAD
+
+_NAMES = ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")
+_PLANNED = ("peak_bytes", "num_view_samples", "store_bytes", "num_rays")
+_TAKEN = ("peak_bytes", "view_samples", "store_bytes", "rays")
+_FILES = ("scenes/*.glb", "scenes/*/*.glb", "scenes/openchessset_gltf/chess_set.gltf", "scenes/meshes/*.ply")
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake all scenes by all methods; the largest share of each kind, and whose it is."""
+    if not Path("/proc/self/status").exists():
+        return skipped(_NAMES, "", "only Linux counts the most memory that a process has held")
+    size, num_lights = ((32, 24), 60) if tiny else ((640, 480), 500)
+    shares: dict[str, list[float]] = {}
+    for scene in _scenes(tiny):
+        for method in sorted(METHODS):
+            recipe = Recipe(method, (scene.cameras[0].name,), size, num_lights)
+            plan, took = METHODS[method].plan(scene, recipe), taken(scene, recipe)
+            shares[f"{scene.name}, {method}"] = [
+                took[of] / getattr(plan, planned) for of, planned in zip(_TAKEN, _PLANNED, strict=True)
+            ]
+    context = {"scenes": len(shares), "size": list(size), "lights": num_lights}
+    found = []
+    for k, name in enumerate(_NAMES):
+        most = max(shares, key=lambda which: shares[which][k])
+        of_each = {which: round(values[k], 3) for which, values in shares.items()}
+        found.append(Figure(name, shares[most][k], "of the plan", {**context, "most": most, "shares": of_each}))
+    return found
+
+
+def taken(scene: Scene, recipe: Recipe) -> dict[str, Any]:
+    """What a bake takes in a process of its own; see `bench.plan_process`."""
+    with tempfile.TemporaryDirectory() as folder:
+        save_scene(scene, folder)
+        command = [sys.executable, "-m", "bench.plan_process", folder, json.dumps(asdict(recipe))]
+        done = subprocess.run(command, env=os.environ | ONE_THREAD, stdout=subprocess.PIPE, check=True)
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def _scenes(tiny: bool) -> Iterator[Scene]:
+    for built_in in list(BUILT_IN.values())[: 1 if tiny else None]:
+        yield built_in.make()
+    for pattern in () if tiny else _FILES:
+        for path in sorted(shared_data().glob(pattern)):
+            yield import_scene(path, path.stem)

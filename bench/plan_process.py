@@ -1,0 +1,51 @@
+"""Bakes a saved scene as a worker process does, and says what it took: `python -m bench.plan_process FOLDER RECIPE`.
+
+RECIPE is JSON with the fields of `relume.bake.Recipe`. Prints one line of JSON: bytes of memory at the most, samples
+of all views, rays, bytes of the store's arrays. Linux only: the system counts the memory.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import distributed.worker  # noqa: F401  a worker process holds it too
+
+from relume.bake import Recipe, Task, Written
+from relume.methods.registry import METHODS
+from relume.scene.archive import load_scene
+from relume.store import bake_here, open_store
+from relume.store.publish import array_paths
+
+
+def main(folder: str, recipe: str) -> None:
+    """Bake, look at the store, print."""
+    fields: dict[str, Any] = json.loads(recipe)
+    wanted = Recipe(**(fields | {key: tuple(fields[key]) for key in ("views", "size")}))
+    rays = 0
+
+    def count(_: Task, written: Written) -> None:
+        nonlocal rays
+        rays += written.num_rays
+
+    with tempfile.TemporaryDirectory() as target:
+        scene = load_scene(folder)
+        store = bake_here(METHODS[wanted.method], scene, wanted, Path(target) / "s.zarr", count)
+        peak_bytes = _peak_bytes()
+        reader = open_store(store)
+        samples = sum(reader.shape(f"views/{k}/pixel")[0] for k in range(len(wanted.views)))
+        store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
+    print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))
+
+
+def _peak_bytes() -> int:
+    """The most memory that this process has held since it was started."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
