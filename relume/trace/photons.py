@@ -33,6 +33,7 @@ _PATHS_A_PASS = 1 << 15
 _CONTACT_PIXELS = 12  # flights shorter than this many pixels are split
 _SPLIT, _SPLITS = 8, 3
 _CONTACT_SHARE = 0.25  # of all photons, at most
+_MOST_SPLIT = 1 << 15  # paths of a pass, each time they are split: among leaves all flights are short
 _LOBE = 200.0  # exponent of the mirror lobes
 _MIRROR_SHARE = 1 / 7  # of all photons, at most: a sixth of the others
 _MIRRORED = 4  # from each point that has a highlight
@@ -78,13 +79,13 @@ def shoot_photons(
     cameras = [camera for camera in scene.cameras if camera.name in views]
     num_paths = max(256, _PATHS_A_PASS // len(cameras))
     shines = np.array([not all(map(is_diffuse, material.terms)) for material in scene.materials])
-    found = _Found([], [], [])
+    found, num_short = _Found([], [], []), int(_CONTACT_SHARE * num_photons)
     for _ in range(_MOST_PASSES):
         for camera in cameras:
-            _walk(geometry, camera, size, num_paths, shines, rng, found)
+            _walk(geometry, camera, size, num_paths, num_short, shines, rng, found)
         if sum(len(photons.directions) for photons in found.anywhere) >= num_photons:
             break
-    short = _some(found.at_contacts, int(_CONTACT_SHARE * num_photons), rng)
+    short = _some(found.at_contacts, num_short, rng)
     mirrored = _some(found.in_mirrors, int(_MIRROR_SHARE * num_photons), rng)
     num_others = num_photons - len(short.directions) - len(mirrored.directions)
     return _joined([short, mirrored, _some(found.anywhere, num_others, rng)])
@@ -108,18 +109,20 @@ def _walk(
     camera: Camera,
     size: tuple[int, int],
     num_paths: int,
+    num_short: int,
     shines: NDArray[np.bool_],
     rng: np.random.Generator,
     found: _Found,
 ) -> None:
-    """Follow paths through random positions of a picture; add what they hit. shines: whether each material does"""
+    """Follow paths through random positions of a picture; add what they hit, at most `num_short` of it after short
+    flights. shines: whether each material does"""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
     hits, directions = _hits(geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y))
     surface = surface_at(geometry, hits, directions)
     pixel = np.float32(2 * math.tan(camera.yfov / 2) / height)
     reach = _CONTACT_PIXELS * pixel * hits.distance
-    found.at_contacts.extend(_split(geometry, surface.points, reach, rng))
+    found.at_contacts.append(_some(_split(geometry, surface.points, reach, rng), num_short, rng))
     is_mirror = shines[geometry.face_material[hits.face]]
     found.in_mirrors.append(_mirrored(geometry, surface.points.rows(is_mirror), directions[is_mirror], rng))
     for _ in range(_BOUNCES):
@@ -156,7 +159,8 @@ def _split(geometry: Geometry, points: Points, reach: F32, rng: np.random.Genera
             found.append(Photons(hits, directions).rows(is_short))
             reach = reach * np.float32(0.25)
             is_short &= hits.distance < reach
-        position, normal, reach = (np.repeat(a[is_short], _SPLIT, axis=0) for a in (position, normal, reach))
+        divided = np.sort(rng.permutation(np.flatnonzero(is_short))[:_MOST_SPLIT])
+        position, normal, reach = (np.repeat(a[divided], _SPLIT, axis=0) for a in (position, normal, reach))
     return found
 
 

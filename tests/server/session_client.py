@@ -58,6 +58,11 @@ class Session:
             if isinstance(message, dict) and message["type"] == kind:
                 return message
 
+    def ready(self, what: str) -> None:
+        """Wait until this has been prepared; other jobs may end before it."""
+        while (status := self.text("status"))["state"] != "ready" or status["what"] != what:
+            pass
+
     def frame(self) -> Frame:
         while True:
             message = self.receive()

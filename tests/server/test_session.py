@@ -255,7 +255,8 @@ def test_space_says_nothing_of_hdr_frames(client: TestClient, baked: Baked) -> N
         while (frame := session.exact(1)).header["view"] != "left":
             pass
         assert frame.header["format"] == "rgb9e5"
-        assert len(frame.payload) == 4 * WIDTH * HEIGHT
+        assert (frame.header["width"], frame.header["height"]) == (WIDTH, HEIGHT)
+        assert len(frame.payload) == 4 * sum(width * height for _, _, width, height in frame.header["tiles"])
 
 
 def test_slow_link_gets_jpeg_while_moving_and_one_hdr_still(

@@ -171,10 +171,13 @@ class FrameLoop:
     async def _install(self) -> None:
         """Hand over what was made, where its view is still shown."""
         made = await self._freezer.take()
-        if made is not None and made[0] in self._viewports.values():
-            viewport, job, result = made
+        if made is None:
+            return
+        viewport, job, result = made
+        if viewport in self._viewports.values():
             viewport.installed(await self._work.quick(painter.install, viewport.picture, job, result))
             self._rest_until_s = 0.0
+        await self._freezer.say_ready(viewport, job)
 
     def _freeze_next(self) -> None:
         """Start what is needed most; what runs for nothing is ended."""

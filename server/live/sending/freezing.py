@@ -74,11 +74,16 @@ class Freezer:
         self._running = None
         error = running.future.exception()
         if isinstance(error, CancelledError):
+            await self.say_ready(running.viewport, running.job)
             return None
         if error is not None:
             raise error
         self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         return running.viewport, running.job, running.future.result()
+
+    async def say_ready(self, viewport: Viewport, job: Job) -> None:
+        """Tell the client that this is not waited for any more: it has been handed over, or given up."""
+        await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.what, progress=1.0))
 
     async def end(self) -> None:
         """Cancel what runs and wait for its thread; nobody asks for its result any more."""
@@ -101,4 +106,3 @@ class Freezer:
                 told = shown
                 await self._socket.send(StatusMessage(state=job.state, view=view, what=job.what, progress=shown))
             await asyncio.wait({future}, timeout=STATUS_S)
-        await self._socket.send(StatusMessage(state="ready", view=view, what=job.what, progress=progress[0]))
