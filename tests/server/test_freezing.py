@@ -60,7 +60,9 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
 
 
 @pytest.mark.parametrize("state", ["freezing", "shading"])
-def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
+def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
+    told = Told()
+
     async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d", state))  # type: ignore[arg-type]
@@ -73,10 +75,11 @@ def test_freeze_is_told_by_its_own_word_and_handed_over(state: str) -> None:
         assert taken is not None
         assert (taken[0], taken[2]) == (view, "/curves/theta_d")
         assert freezer.running is None
+        assert set(told.states) == {state}
+        await freezer.say_ready(taken[0], taken[1])
 
-    told, complaints = run(scenario)
-    assert set(told[:-1]) == {state}
-    assert told[-1] == "ready"
+    states, complaints = run(scenario, told)
+    assert states[-1] == "ready"
     assert complaints == []
 
 
