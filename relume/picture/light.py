@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 from relume.brdf.albedo import Reflectances, reflectances_of
@@ -15,6 +17,7 @@ Solo = frozenset[str] | None
 
 _ONE: Rgb = (1.0, 1.0, 1.0)
 _NOTHING: Rgb = (0.0, 0.0, 0.0)
+_MOST_KNOWN = 64  # lights whose vectors are kept: every route asks for those of a frame, for every term
 
 
 class Source(NamedTuple):
@@ -77,7 +80,8 @@ def parts_of(light: Light) -> dict[Light, Rgb]:
     return parts
 
 
-def vector_of(light: Light) -> dict[Light, Rgb]:
+@lru_cache(maxsize=_MOST_KNOWN)
+def vector_of(light: Light) -> Mapping[Light, Rgb]:
     """A light as a vector over its elements: one source each, one kind of way (straight, or over surfaces), gain 1.
 
     Transport is linear in it: an image is Σ_e g_e R_e, and brightness, colour, solo and dim are arithmetic on g.
@@ -95,14 +99,15 @@ def vector_of(light: Light) -> dict[Light, Rgb]:
             vector[_direct(alone)] = gain
         if light.paths.reflect:
             vector[_reflected(alone)] = gain
-    return vector
+    return MappingProxyType(vector)
 
 
-def change_of(before: Light, after: Light) -> dict[Light, Rgb]:
+@lru_cache(maxsize=_MOST_KNOWN)
+def change_of(before: Light, after: Light) -> Mapping[Light, Rgb]:
     """The difference of two lights as vectors, elements that are in both alike left out."""
     old, new = vector_of(before), vector_of(after)
     change = {e: _sum(new.get(e, _NOTHING), old.get(e, _NOTHING), -1.0) for e in {**old, **new}}
-    return {element: gain for element, gain in change.items() if any(gain)}
+    return MappingProxyType({element: gain for element, gain in change.items() if any(gain)})
 
 
 def _direct(light: Light) -> Light:
