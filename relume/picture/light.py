@@ -123,6 +123,7 @@ def _sum(one: Rgb, other: Rgb, factor: float = 1.0) -> Rgb:
     return red, green, blue
 
 
+@lru_cache(maxsize=_MOST_KNOWN)
 def is_same_but_for_gains(before: Light, after: Light) -> bool:
     """Whether no light has moved; some may have been added or taken away."""
     alike = before._replace(local=after.local, environment_gain=after.environment_gain) == after

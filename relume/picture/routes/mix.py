@@ -91,10 +91,17 @@ class Mix:
         if anchor is None or anchor.light is None or not is_same_but_for_gains(anchor.light, light):
             return None
         change = self._made_of(place, True, change_of(anchor.light, light))
-        whole = change if not change.lacking else self._made_of(place, False, vector_of(light))
+        if not change.lacking:
+            return change
+        whole = self._made_of(place, False, vector_of(light))
         best = min(change, whole, key=lambda recipe: recipe.num_lacking)
-        has_room = 2 * len(best.gains) * place.images.image_bytes() <= place.images.cache.budget_bytes
-        return best if best.num_lacking <= _MOST_LACKING and (not best.lacking or has_room) else None
+        return best if not best.lacking or self._may_be_made(place, best) else None
+
+    @staticmethod
+    def _may_be_made(place: Place, recipe: _Recipe) -> bool:
+        """Whether making what is lacking is worth its while, and the memory has room for it beside other things."""
+        needed = 2 * len(recipe.gains) * place.images.image_bytes()
+        return recipe.num_lacking <= _MOST_LACKING and needed <= place.images.cache.budget_bytes
 
     def _made_of(self, place: Place, from_anchor: bool, gains: Mapping[Light, Rgb]) -> _Recipe:
         images, material, live = place
