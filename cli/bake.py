@@ -5,18 +5,17 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Data, SceneName, Scheduler, Size, parse_size
+from cli.options import Data, SceneName, Scheduler, Size, parse_size, read_camera
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from relume.bake import Recipe
     from server.settings import Settings
-    from worker.scenes import SceneRecord
+    from worker.cameras import Views
     from worker.service import BakeService
     from worker.status import BakeStatus
 
@@ -26,6 +25,10 @@ def bake(
     method: Annotated[str, typer.Option(help="Transfer method.")] = "direct",
     view: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="View to bake, several times for several; else all.")
+    ] = None,
+    camera: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE.json", help='View from here: {"name", "to_world": 16 numbers, "yfov": degrees}.'),
     ] = None,
     size: Size = None,
     lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: 2000]")] = None,
@@ -44,12 +47,14 @@ def bake(
     in the background or to cancel.
     """
     from cli.data_folder import find_scene, open_bakes, open_settings
+    from worker.cameras import chosen_views
 
     settings = open_settings(data, scheduler=scheduler)
     service = open_bakes(settings)
     try:
         record = find_scene(service.ledger, scene)
-        identity = service.submit(record.id, _recipe(record, method, view, size, lights, relightable))
+        views = chosen_views(service.ledger, record, [*(view or ()), *(read_camera(path) for path in camera or ())])
+        identity = service.submit(record.id, _recipe(method, views, size, lights, relightable))
         if not watch:
             typer.echo(identity)
             return 0
@@ -58,22 +63,16 @@ def bake(
         service.close()
 
 
-def _recipe(
-    record: SceneRecord, method: str, views: list[str] | None, size: str | None, lights: int | None, relightable: bool
-) -> Recipe:
+def _recipe(method: str, views: Views, size: str | None, lights: int | None, relightable: bool) -> Recipe:
     from relume.bake import Recipe
     from relume.errors import ParameterError
     from worker.presets import PRESETS
 
-    unknown = sorted(set(views or ()) - set(record.views))
-    if unknown:
-        raise ParameterError("--view", unknown[0], "one of " + ", ".join(record.views)[:400])
     if lights is not None and lights < 1:
         raise ParameterError("--lights", lights, "a number of at least 1")
-    preset = PRESETS["good"]
-    chosen = tuple(dict.fromkeys(views or record.views))
+    preset, (names, cameras) = PRESETS["good"], views
     pixels = parse_size(size) if size else preset.size
-    return Recipe(method, chosen, pixels, lights or preset.num_lights, relightable)
+    return Recipe(method, names, pixels, lights or preset.num_lights, relightable, cameras)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:

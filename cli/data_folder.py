@@ -67,9 +67,10 @@ def find_scene(ledger: Ledger, name: str) -> SceneRecord:
 
 def find_bake(service: BakeService, scene: SceneRecord, view: str | None) -> tuple[BakeStatus, str]:
     """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError."""
-    if view is not None and view not in scene.views:
-        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(scene.views)[:400]}")
     ready = [bake for bake in service.bakes(scene.id) if bake.state == "ready"]
+    known = dict.fromkeys((*scene.views, *(baked for bake in ready for baked in bake.recipe.views)))
+    if view is not None and view not in known:
+        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(known)[:400]}")
     fitting = [bake for bake in ready if view is None or view in bake.recipe.views]
     if not fitting:
         raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from relume.errors import ParameterError
+
+if TYPE_CHECKING:
+    from relume.scene.placed_camera import PlacedCamera
 
 Data = Annotated[
     Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
@@ -24,7 +28,7 @@ Scheduler = Annotated[
     typer.Option("--scheduler", metavar="tcp://…", help="Dask scheduler to bake on; else processes of this machine."),
 ]
 
-MAX_LOOK_BYTES = 16 << 20
+MAX_DOCUMENT_BYTES = 16 << 20
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -37,16 +41,28 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def read_look(path: Path | None) -> dict[str, object]:
     """A look document from a file; an empty one where there is no file. Raises ParameterError, OSError."""
-    import json
-
     if path is None:
         return {}
-    with path.open("rb") as file:
-        text = file.read(MAX_LOOK_BYTES + 1)
-    try:
-        document = json.loads(text) if len(text) <= MAX_LOOK_BYTES else None
-    except (ValueError, RecursionError) as error:
-        raise ParameterError("--look", path.name, f"a JSON file; {error}") from None
+    document = _read_json("--look", path)
     if not isinstance(document, dict):
-        raise ParameterError("--look", path.name, f"a JSON object of at most {MAX_LOOK_BYTES >> 20} MB")
+        raise ParameterError("--look", path.name, "a file with a JSON object")
+    return document
+
+
+def read_camera(path: Path) -> PlacedCamera:
+    """A camera from a file. Raises ParameterError, OSError."""
+    from relume.scene.placed_camera import read_placed
+
+    return read_placed(_read_json("--camera", path))
+
+
+def _read_json(option: str, path: Path) -> object:
+    with path.open("rb") as file:
+        text = file.read(MAX_DOCUMENT_BYTES + 1)
+    if len(text) > MAX_DOCUMENT_BYTES:
+        raise ParameterError(option, path.name, f"a file of at most {MAX_DOCUMENT_BYTES >> 20} MB")
+    try:
+        document: object = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ParameterError(option, path.name, f"a JSON file; {error}") from None
     return document

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from cli.options import Data, LookFile, SceneName, Size, View, parse_size, read_look
+from cli.options import Data, LookFile, SceneName, Size, View, parse_size, read_camera, read_look
 from cli.render import Output
 
 
@@ -16,6 +17,7 @@ def reference(
     spp: Annotated[int, typer.Option(metavar="N", min=1, max=1 << 20, help="Samples per pixel.")],
     look: LookFile = None,
     view: View = None,
+    camera: Annotated[Path | None, typer.Option(metavar="FILE.json", help="View from here instead.")] = None,
     size: Size = None,
     method: Annotated[
         Literal["direct", "gather"], typer.Option(help="Light as bakes of this method have it.")
@@ -32,6 +34,7 @@ def reference(
     from relume.look import default_look
     from relume.reference import reference_image
     from relume.scene.archive import load_scene
+    from relume.scene.placed_camera import with_cameras
     from worker.paths import scene_path
     from worker.presets import PRESETS
 
@@ -44,13 +47,16 @@ def reference(
         service.close()
     if view is not None and view not in record.views:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
-    loaded = load_scene(scene_path(service.data_dir, record.id))
+    loaded, seen_from = load_scene(scene_path(service.data_dir, record.id)), view or record.views[0]
+    if camera is not None:
+        placed = read_camera(camera)
+        loaded, seen_from = with_cameras(loaded, [placed.camera]), placed.name
     document = complete_look(partial, default_look(loaded.materials, loaded.lights))
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("reference", total=1.0)
         image = reference_image(
             loaded,
-            view or record.views[0],
+            seen_from,
             document,
             pixels,
             spp,

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from relume.scene.model import Scene
+from relume.scene.placed_camera import PlacedCamera, with_cameras
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -27,6 +28,7 @@ class Recipe:
         size: width and height in pixels.
         num_lights: triangles that the environment is divided into.
         relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
+        cameras: those of `views` that somebody placed; the others came with the scene.
     """
 
     method: str
@@ -34,6 +36,11 @@ class Recipe:
     size: tuple[int, int]
     num_lights: int
     relightable: bool = False
+    cameras: tuple[PlacedCamera, ...] = ()
+
+    def seen(self, scene: Scene) -> Scene:
+        """The scene with the cameras that this recipe brings: what its method plans and bakes."""
+        return with_cameras(scene, [placed.camera for placed in self.cameras]) if self.cameras else scene
 
 
 @dataclass(frozen=True)

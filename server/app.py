@@ -19,9 +19,11 @@ from server.metrics import Metrics
 from server.routes import (
     bakes,
     built_ins,
+    cameras,
     client,
     comparisons,
     environments,
+    finder,
     health,
     library,
     looks,
@@ -39,6 +41,8 @@ from worker.paths import environments_path, materials_path
 
 ROUTE_GROUPS = (
     scenes,
+    cameras,
+    finder,
     built_ins,
     models,
     materials,

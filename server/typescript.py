@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, protocol
+from server.wire import bodies, cameras, protocol
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -57,6 +57,9 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     *SERVER_MESSAGES,
     protocol.FrameHeader,
     bodies.SceneBody,
+    cameras.CameraEntry,
+    cameras.FinderBody,
+    cameras.PlaceBody,
     bodies.BuiltInBody,
     bodies.ModelBody,
     bodies.MaterialBody,

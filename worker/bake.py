@@ -93,7 +93,7 @@ class BakeRunner:
         shown = status.progress if self.ledger.finished_tasks(job.bake_id) else 0.0
         progress = Progress(status.plan, shown, self.expected)
         self._beat(progress, "reading")
-        scene = scene_of(job.data_dir, job.scene_id)
+        scene = job.recipe.seen(scene_of(job.data_dir, job.scene_id))
         fill.begin(job.method, scene, job.recipe, staging)
         for stage in range(len(job.method.stages)):
             self._run_stage(scene, stage, progress)

@@ -25,6 +25,16 @@ class SceneRow(Base):
     summary: Mapped[str] = mapped_column(Text)
 
 
+class CameraRow(Base):
+    """A camera that somebody placed in a scene; `document` is its JSON, see `relume.scene.placed_camera`."""
+
+    __tablename__ = "cameras"
+
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+
+
 class BakeRow(Base):
     """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970).
 

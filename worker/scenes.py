@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
 from relume.errors import NotFoundError
@@ -17,7 +17,7 @@ from relume.remarks import Remark, remark_of
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
 from worker.ledger import Ledger
-from worker.models import SceneRow
+from worker.models import CameraRow, SceneRow
 from worker.paths import bake_path, scene_path, staging_path
 
 
@@ -107,6 +107,7 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
         shutil.rmtree(bake_path(data_dir, identity), ignore_errors=True)
         shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
     with ledger.sessions.begin() as session:
+        session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
         if (row := session.get(SceneRow, scene_id)) is not None:
             session.delete(row)
     shutil.rmtree(scene_path(data_dir, scene_id), ignore_errors=True)

@@ -104,7 +104,8 @@ class BakeService:
         """
         identity = self._known_scene(scene_id)
         with idle_timer.kept_awake():
-            plan = self._method(recipe.method).plan(scene_of(self.data_dir, identity), recipe)
+            scene = recipe.seen(scene_of(self.data_dir, identity))
+            plan = self._method(recipe.method).plan(scene, recipe)
         processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
         check_budget(plan, self.data_dir, processes)
         return plan

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from relume.bake import Plan, Recipe
 from relume.code_version import bake_code
+from relume.scene.placed_camera import read_placed
 from relume.store.schema import SCHEMA_VERSION
 
 BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
@@ -107,6 +108,7 @@ def recipe_from_json(text: str) -> Recipe:
         (width, height),
         int(document["num_lights"]),
         bool(document["relightable"]),
+        tuple(read_placed(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
     )
 
 

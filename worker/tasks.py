@@ -84,7 +84,8 @@ def run_task(job: Job, task: Task) -> TaskCost:
     notes = Notebook(staging)
     with idle_timer.kept_awake(), notes.watching_compiler():
         notes.note("reading")
-        scene, method = scene_of(job.data_dir, job.scene_id), _resident(job.method)
+        scene = job.recipe.seen(scene_of(job.data_dir, job.scene_id))
+        method = _resident(job.method)
         notes.note("building")
         method.prepare(scene)
         notes.note("working")

@@ -15,11 +15,11 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. `relightable`: divide the light so that turning or exchanging the environment errs little. */
+/** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
   method?: string;
-  views?: string[] | null;
+  views?: (string | CameraBody)[] | null;
   preset?: "preview" | "good" | "final" | null;
   size?: [number, number] | null;
   lights?: number | null;
@@ -33,6 +33,13 @@ export interface BrushMessage {
   curve: string;
   from: number;
   to: number;
+}
+
+/** A camera that a person placed, by name. */
+export interface CameraBody {
+  to_world: number[];
+  yfov: number;
+  name: string;
 }
 
 /** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
@@ -169,6 +176,20 @@ export interface BuiltInBody {
   method: string;
 }
 
+/** A camera of a scene; `is_placed`: somebody placed it, it did not come with the scene. */
+export interface CameraEntry {
+  to_world: number[];
+  yfov: number;
+  name: string;
+  is_placed: boolean;
+}
+
+/** Where a camera is and how wide it looks. `to_world`: camera to world, 16 numbers by row, looking along -Z; scale is taken out. `yfov`: vertical, degrees. */
+export interface CameraFrame {
+  to_world: number[];
+  yfov: number;
+}
+
 /** Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians. */
 export interface CameraInfo {
   to_world: number[];
@@ -210,6 +231,13 @@ export interface EnvironmentBody {
   created: string | null;
   warnings: string[];
   thumbnail: string;
+}
+
+/** The corners of a scene, metres, and a camera that sees all of it. */
+export interface FinderBody {
+  lowest: number[];
+  highest: number[];
+  framing: CameraFrame;
 }
 
 /** Header of a binary frame. */
@@ -324,6 +352,11 @@ export interface ParameterBody {
   fixed: boolean;
 }
 
+/** World space, metres; null where nothing is there. */
+export interface PlaceBody {
+  position: number[] | null;
+}
+
 /** What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none. */
 export interface PlanBody {
   view_samples: number;
@@ -363,13 +396,14 @@ export interface ProblemMessage {
   problem: Problem;
 }
 
-/** What was asked for, complete. */
+/** What was asked for, complete; `cameras` are those of the `views` that somebody placed. */
 export interface RecipeBody {
   method: string;
   views: string[];
   size: [number, number];
   lights: number;
   relightable: boolean;
+  cameras: CameraBody[];
 }
 
 /** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. */
@@ -421,10 +455,11 @@ export interface SceneVariant {
   look: Record<string, unknown>;
 }
 
-/** A camera; `aspect` is width ÷ height. */
+/** A camera; `aspect` is width ÷ height. `is_placed`: somebody placed it, it did not come with the scene. */
 export interface SceneView {
   name: string;
   aspect: number;
+  is_placed: boolean;
 }
 
 /** What a link shows; `lacking`: what of it is not here any more, one sentence each. */

@@ -108,6 +108,14 @@ def load_scene(folder: str | Path) -> Scene:
     return scene
 
 
+def load_cameras(folder: str | Path) -> list[Camera]:
+    """The cameras alone of what `save_scene` wrote. Raises SceneError where they cannot be read."""
+    try:
+        return _cameras(_read_document(Path(folder) / "scene.json"))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
+        raise SceneError(f"the cameras of the scene in {Path(folder).name!r} cannot be read; {REMEDY}") from problem
+
+
 def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
     yield from sorted(material.textures.items())
     if material.normal_map is not None:
@@ -152,9 +160,7 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
         Mesh(name=str(m["name"]), material=int(m["material"]), **{k: arrays[f"mesh{i}_{k}"] for k in MESH_ARRAYS})
         for i, m in enumerate(document["meshes"])
     ]
-    cameras = [
-        Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"])) for c in document["cameras"]
-    ]
+    cameras = _cameras(document)
     return Scene(
         str(document["id"]),
         str(document["name"]),
@@ -179,6 +185,11 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
     terms = tuple(dict(term) for term in document["terms"])
     double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
     return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher)
+
+
+def _cameras(document: dict[str, Any]) -> list[Camera]:
+    found = document["cameras"]
+    return [Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"])) for c in found]
 
 
 def _read_document(path: Path) -> dict[str, Any]:

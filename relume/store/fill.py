@@ -96,7 +96,7 @@ def bake_here(
     Returns:
         `target`.
     """
-    staging = target.with_name(f"{target.name}.staging")
+    staging, scene = target.with_name(f"{target.name}.staging"), recipe.seen(scene)
     shutil.rmtree(staging, ignore_errors=True)
     begin(method, scene, recipe, staging)
     for stage in range(len(method.stages)):

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from server.library.ports import Library
+
+if TYPE_CHECKING:
+    from relume.scene.model import Camera
 
 
 def open_library(cache_bytes: int, floor_bytes: int) -> Library:
@@ -20,11 +23,16 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.methods.registry import open_transfer
     from relume.picture.picture import Picture
     from relume.reference import reference_image
+    from relume.render.finder import Finder
     from relume.render.image import render_image, render_small
     from relume.scene.archive import load_scene
+    from relume.scene.placed_camera import with_cameras
 
-    def reference(scene: Path, *args: Any, reflects: bool) -> Any:
-        return reference_image(load_scene(scene), *args, reflects=reflects)
+    def reference(scene: Path, camera: Camera, *args: Any, reflects: bool) -> Any:
+        return reference_image(with_cameras(load_scene(scene), [camera]), camera.name, *args, reflects=reflects)
+
+    def finder(scene: Path) -> Finder:
+        return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(scene)))
 
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)
@@ -35,6 +43,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         render=render_image,
         render_small=render_small,
         reference=reference,
+        finder=finder,
         held_bytes=memory.held,
         cache_used_bytes=lambda: memory.used_bytes,
         shrink_cache=lambda stores: memory.shrink(floor_bytes, {str(store.resolve()) for store in stores}),

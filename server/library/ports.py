@@ -16,6 +16,7 @@ from relume.picture.transfer import Transfer
 
 if TYPE_CHECKING:
     from relume.picture.jobs import Job
+    from relume.scene.model import Camera
 
 Tile = tuple[int, int, int, int]
 F32 = NDArray[np.float32]
@@ -56,6 +57,19 @@ class Picture(Protocol):
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
 
 
+class Finder(Protocol):
+    """A scene as cameras are placed in it; see `relume.render.finder`."""
+
+    @property
+    def framing(self) -> Camera: ...
+    @property
+    def lowest(self) -> NDArray[np.float64]: ...
+    @property
+    def highest(self) -> NDArray[np.float64]: ...
+    def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]: ...
+    def place_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> NDArray[np.float64] | None: ...
+
+
 @dataclass(frozen=True)
 class Library:
     """How transfers are opened and pictures made; one per app.
@@ -69,8 +83,9 @@ class Library:
             heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
-        reference: (folder of a scene, view name, complete look, size, spp, progress, cancelled, pass index,
+        reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,
             reflects=whether surfaces light each other) -> the same by brute force; heavy.
+        finder: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
         held_bytes: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
         cache_used_bytes: all of it, and what is being made.
         shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
@@ -82,6 +97,7 @@ class Library:
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., F32]
+    finder: Callable[[Path], Finder]
     held_bytes: Callable[[], Mapping[Holder, int]]
     cache_used_bytes: Callable[[], int]
     shrink_cache: Callable[[Collection[Path]], None]

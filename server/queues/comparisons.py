@@ -126,8 +126,8 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         self, transfer: Transfer, view: str, look: Any, size: tuple[int, int], index: int, tell: Any, is_stopped: Any
     ) -> F32:
         return self._library.reference(
-            scene_path(self._data, transfer.scene_id), view, look, size, SPP, tell, is_stopped, index,
-            reflects=Axis.BOUNCES in transfer.axes,
+            scene_path(self._data, transfer.scene_id), transfer.views[view].camera, look, size, SPP, tell, is_stopped,
+            index, reflects=Axis.BOUNCES in transfer.axes,
         )  # fmt: skip
 
 

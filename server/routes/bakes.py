@@ -14,12 +14,16 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
-from relume.errors import NotFoundError, ParameterError
+from relume.errors import NotFoundError
 from relume.imageio import png_bytes
+from relume.scene.placed_camera import placed_camera
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
 from server.services import Services, Shared
-from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, Id, PlanBody, RecipeBody
+from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody
+from server.wire.body import Id
+from server.wire.cameras import CameraBody
+from worker.cameras import chosen_views
 from worker.presets import PRESETS
 from worker.scenes import get_scene
 from worker.status import BakeStatus, bake_id
@@ -112,15 +116,16 @@ def ready_bake(services: Services, bake: str) -> BakeStatus:
 
 
 def _recipe(request: BakeRequest, services: Services) -> Recipe:
-    """What is baked: the preset, what the request names beside it, every view where none is named."""
-    known = get_scene(services.bakes.ledger, request.scene).views
-    unknown = sorted(set(request.views or ()) - set(known))
-    if unknown:
-        raise ParameterError("views", unknown[0], "some of " + ", ".join(known)[:400])
+    """What is baked: the preset, what the request names beside it, every view of the file where none is named."""
+    ledger = services.bakes.ledger
+    wanted = [
+        view if isinstance(view, str) else placed_camera(view.name, view.to_world, view.yfov)
+        for view in request.views or ()
+    ]
+    views, cameras = chosen_views(ledger, get_scene(ledger, request.scene), wanted)
     preset = PRESETS[request.preset or "good"]
-    views = tuple(dict.fromkeys(request.views or known))
     lights = request.lights or preset.num_lights
-    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable)
+    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable, cameras)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
@@ -137,6 +142,7 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         size=recipe.size,
         lights=recipe.num_lights,
         relightable=recipe.relightable,
+        cameras=[CameraBody(**camera.document()) for camera in recipe.cameras],
     )
 
 

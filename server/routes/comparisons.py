@@ -15,7 +15,8 @@ from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
 from server.routes.renders import baked_view, check_look
 from server.services import Services, Shared
-from server.wire.bodies import Id, TruthBody, TruthFigures, TruthPlanBody, TruthRequest
+from server.wire.bodies import TruthBody, TruthFigures, TruthPlanBody, TruthRequest
+from server.wire.body import Id
 
 router = APIRouter(prefix="/api/truths", tags=["truths"])
 

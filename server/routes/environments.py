@@ -19,7 +19,8 @@ from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_proce
 from server.files.png import A_DAY, PngResponse
 from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.wire.bodies import EnvironmentBody, Id, moment
+from server.wire.bodies import EnvironmentBody, moment
+from server.wire.body import Id
 from worker.paths import environments_path
 
 router = APIRouter(prefix="/api/environments", tags=["environments"])

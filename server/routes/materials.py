@@ -17,7 +17,8 @@ from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
 from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.wire.bodies import Id, MeasuredBody, moment
+from server.wire.bodies import MeasuredBody, moment
+from server.wire.body import Id
 from worker.paths import materials_path
 
 router = APIRouter(prefix="/api/materials/measured", tags=["materials"])

@@ -15,7 +15,8 @@ from server.errors import NotReadyError
 from server.queues.renders import Render
 from server.routes.bakes import ready_bake
 from server.services import Shared
-from server.wire.bodies import MAX_LOOKS, MAX_NAME, Id, RenderBody, RenderRequest
+from server.wire.bodies import MAX_LOOKS, RenderBody, RenderRequest
+from server.wire.body import MAX_NAME, Id
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])

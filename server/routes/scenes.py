@@ -18,7 +18,9 @@ from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_proce
 from server.files.thumbnails import MAX_WIDTH
 from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
-from server.wire.bodies import Id, SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
+from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
+from server.wire.body import Id
+from worker.cameras import kept_cameras, placed_names
 from worker.paths import scene_path
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
@@ -99,13 +101,15 @@ def get_all(services: Shared) -> list[SceneBody]:
     bakes: dict[str, list[BakeStatus]] = defaultdict(list)
     for status in services.bakes.bakes():
         bakes[status.scene].append(status)
-    return [_body(record, bakes[record.id]) for record in list_scenes(services.bakes.ledger)]
+    placed = placed_names(services.bakes.ledger)
+    return [_body(record, bakes[record.id], placed[record.id]) for record in list_scenes(services.bakes.ledger)]
 
 
 @router.get("/{scene}")
 def get_one(scene: Id, services: Shared) -> SceneBody:
     """One scene."""
-    return _body(get_scene(services.bakes.ledger, scene), services.bakes.bakes(scene))
+    placed = [camera.name for camera in kept_cameras(services.bakes.ledger, scene)]
+    return _body(get_scene(services.bakes.ledger, scene), services.bakes.bakes(scene), placed)
 
 
 @router.delete("/{scene}", status_code=204)
@@ -134,13 +138,17 @@ def _pictured(bakes: Sequence[BakeStatus]) -> str | None:
     return (enough or ready[-1:])[0].id if ready else None
 
 
-def _body(record: SceneRecord, bakes: Sequence[BakeStatus]) -> SceneBody:
+def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str]) -> SceneBody:
     bake = _pictured(bakes)
     return SceneBody(
         id=record.id,
         name=record.name,
         created=moment(record.created),
-        views=[SceneView(name=name, aspect=DEFAULT_ASPECT) for name in record.views],
+        views=[
+            SceneView(name=name, aspect=DEFAULT_ASPECT, is_placed=is_placed)
+            for names, is_placed in ((record.views, False), (placed, True))
+            for name in names
+        ],
         materials=[SceneMaterial(**{"catcher": False, **material}) for material in record.materials],
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],

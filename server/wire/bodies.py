@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import Show
 from relume.remarks import Effect
+from server.wire.body import Body, Id, Name
+from server.wire.cameras import CameraBody
 from server.wire.protocol import MAX_VIEWS_SHOWN
 from worker.status import Phase
 
-Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
-MAX_NAME = 256
-Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
 Side = Annotated[int, Field(ge=1, le=16384)]
 Preset = Literal["preview", "good", "final"]
 ImageFormat = Literal["exr", "png", "webp"]
@@ -27,23 +26,12 @@ def moment(posix_s: float) -> str:
     return datetime.fromtimestamp(posix_s, UTC).isoformat()
 
 
-class Body(BaseModel):
-    """The base of all bodies."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    @classmethod
-    def of(cls, status: object, **more: Any) -> Self:
-        """A body whose fields are the attributes of `status` with the same names, and `more`."""
-        own = {name: getattr(status, name) for name in cls.model_fields if name not in more}
-        return cls(**own, **more)
-
-
 class SceneView(Body):
-    """A camera; `aspect` is width ÷ height."""
+    """A camera; `aspect` is width ÷ height. `is_placed`: somebody placed it, it did not come with the scene."""
 
     name: str
     aspect: float
+    is_placed: bool
 
 
 class SceneMaterial(Body):
@@ -203,12 +191,13 @@ class EnvironmentBody(Body):
 class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 
-    `relightable`: divide the light so that turning or exchanging the environment errs little.
+    `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
+    where none are named. `relightable`: divide the light so that turning or exchanging the environment errs little.
     """
 
     scene: Id
     method: Name = "direct"
-    views: Annotated[list[Name], Field(min_length=1, max_length=64)] | None = None
+    views: Annotated[list[Name | CameraBody], Field(min_length=1, max_length=64)] | None = None
     preset: Preset | None = None
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
@@ -227,13 +216,14 @@ class PlanBody(Body):
 
 
 class RecipeBody(Body):
-    """What was asked for, complete."""
+    """What was asked for, complete; `cameras` are those of the `views` that somebody placed."""
 
     method: str
     views: list[str]
     size: tuple[int, int]
     lights: int
     relightable: bool
+    cameras: list[CameraBody]
 
 
 class BakeBody(Body):
@@ -354,7 +344,7 @@ class TruthRequest(Body):
 
     bake: Id
     view: Name
-    look: dict[str, Any] = {}
+    look: Annotated[dict[str, Any], Field(default_factory=dict)]
     passes: Annotated[int, Field(ge=2, le=1024)] = 16
     dry_run: bool = False
 

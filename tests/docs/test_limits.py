@@ -18,6 +18,7 @@ from relume.trace.view_samples import POSITIONS_A_PIXEL
 from server.queues.work_queue import MAX_QUEUED
 from server.records import looks, shares
 from server.wire import bodies, protocol
+from worker import cameras
 
 KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
 OPERATIONS = Path(__file__).resolve().parents[2] / "docs" / "operations.md"
@@ -51,6 +52,7 @@ ROWS = {
     "views shown at once; frames that are not acknowledged": (
         f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
     ),
+    "cameras placed in a scene": f"{cameras.MAX_CAMERAS}",
     "saved look; number of them": f"{looks.MAX_LOOK_BYTES // KIB} KiB; {looks.MAX_LOOKS:,}",
     "shared look; number of them; all together": (
         f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"

@@ -15,7 +15,8 @@ from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetErr
 from relume.look import default_look
 from relume.memory import Holder
 from relume.picture.transfer import Axis, Eyes
-from relume.scene.archive import make_scene
+from relume.render.finder import Finder
+from relume.scene.archive import load_scene, make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.store import open_store
 from server.library.ports import Library
@@ -255,6 +256,7 @@ class Control:
         paint = self._open, self._open, self._picture, self._render, self._render_small, self._reference
         return Library(
             *paint,
+            lambda folder: Finder.of(load_scene(folder)),
             lambda: {Holder("frozen", "0123"): 100},
             lambda: 123,
             lambda stores: self.stores_kept.append(set(stores)),

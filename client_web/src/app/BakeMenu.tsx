@@ -1,5 +1,6 @@
 /** What light the open bake has and how large it is; bake the scene again with other light, finer or coarser. */
 import { useState } from "preact/hooks";
+import type { Frame } from "../cameras/orbit";
 import { wordsOf } from "../scene/methods";
 import { startFullBake } from "../scene/takeover";
 import { PresetList } from "../start/PresetList";
@@ -7,6 +8,12 @@ import { bake, bakes, method } from "../state/bakes";
 import { scene } from "../state/scene";
 import { view, views } from "../state/views";
 import { attempt } from "../ui/toasts";
+
+/** The camera of the view in hand. */
+function cameraShown(): Frame | null {
+  const camera = view.value?.camera;
+  return camera === undefined ? null : { to_world: camera.to_world, yfov: (camera.yfov * 180) / Math.PI };
+}
 
 export function BakeMenu() {
   const [open, setOpen] = useState(false);
@@ -33,6 +40,7 @@ export function BakeMenu() {
             method={words.name}
             views={views.value.map((baked) => baked.name)}
             {...(size === null ? {} : { size: [size.width, size.height] })}
+            from={cameraShown()}
             action="Bake"
             onChoose={(choice) => {
               setOpen(false);

@@ -63,34 +63,34 @@ export function json(method: string, body: unknown, headers: Record<string, stri
   return { method, headers: { "content-type": "application/json", ...headers }, body: JSON.stringify(body) };
 }
 
-async function get<T>(path: string): Promise<T> {
+export async function getJson<T>(path: string): Promise<T> {
   return (await (await request(path)).json()) as T;
 }
 
-export const listScenes = () => get<SceneBody[]>("/api/scenes");
-export const getScene = (id: string) => get<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
-export const listBuiltIns = () => get<BuiltInBody[]>("/api/built-ins");
+export const listScenes = () => getJson<SceneBody[]>("/api/scenes");
+export const getScene = (id: string) => getJson<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
+export const listBuiltIns = () => getJson<BuiltInBody[]>("/api/built-ins");
 /** Make a built-in scene; a second time it is the same one. */
 export async function takeBuiltIn(name: string): Promise<SceneBody> {
   return (await (await request(`/api/built-ins/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
 }
-export const listModels = () => get<ModelBody[]>("/api/models");
-export const listMaterials = () => get<MaterialBody[]>("/api/materials");
-export const listMeasured = () => get<MeasuredBody[]>("/api/materials/measured");
-export const getMaterialMap = () => get<MaterialMapBody>("/api/materials/map");
-export const materialAt = (f0: number, sigma: number) => get<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
+export const listModels = () => getJson<ModelBody[]>("/api/models");
+export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
+export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
+export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
+export const materialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
 /** Of a library material, whose id is "table/material". */
 export const materialThumbnail = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
-export const listEnvironments = () => get<EnvironmentBody[]>("/api/environments");
+export const listEnvironments = () => getJson<EnvironmentBody[]>("/api/environments");
 export async function deleteEnvironment(id: string): Promise<void> {
   await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 /** The light that a bake's scene came with. */
 export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
-export const getBake = (id: string) => get<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
+export const getBake = (id: string) => getJson<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
 
-export const bakesOfScene = (scene: string) => get<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);
+export const bakesOfScene = (scene: string) => getJson<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);
 
 export async function deleteScene(id: string): Promise<void> {
   await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
@@ -119,19 +119,19 @@ export async function startRender(body: RenderRequest): Promise<RenderBody> {
 export async function deleteRender(id: string): Promise<void> {
   await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
-export const getRender = (id: string) => get<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
+export const getRender = (id: string) => getJson<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
 
 export async function makeShare(body: ShareRequest): Promise<ShareEntry> {
   return (await (await request("/api/shares", json("POST", body))).json()) as ShareEntry;
 }
-export const getShare = (id: string) => get<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
+export const getShare = (id: string) => getJson<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
 
 const truthPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
 
 export async function startTruth(body: TruthRequest): Promise<TruthBody> {
   return (await (await request("/api/truths", json("POST", body))).json()) as TruthBody;
 }
-export const getTruth = (id: string) => get<TruthBody>(truthPath(id));
+export const getTruth = (id: string) => getJson<TruthBody>(truthPath(id));
 /** How long a comparison would take; nothing is begun. */
 export async function planTruth(body: TruthRequest): Promise<TruthPlanBody> {
   return (await (await request("/api/truths", json("POST", { ...body, dry_run: true }))).json()) as TruthPlanBody;

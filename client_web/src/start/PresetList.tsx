@@ -1,12 +1,14 @@
 /** What can be baked: which light, which views, and the three presets with what each will cost, before anything starts. */
 import { useEffect, useId, useState } from "preact/hooks";
+import type { Frame } from "../cameras/orbit";
 import { planBake } from "../net/api";
-import { MAX_VIEWS_SHOWN, type SceneBody } from "../protocol";
+import type { SceneBody } from "../protocol";
 import type { BakeChoice, Preset } from "../scene/bakeChoice";
 import { METHODS, type Method } from "../scene/methods";
 import type { Size } from "../scene/recipe";
 import { OwnRecipe } from "./OwnRecipe";
 import { PlanWords, type Planned } from "./PlanWords";
+import { ViewChoice } from "./ViewChoice";
 
 const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "preview", label: "Preview", help: "to find the look" },
@@ -73,33 +75,6 @@ function Relightable({ chosen, onChoose }: RelightableProps) {
   );
 }
 
-interface ViewsProps {
-  all: readonly string[];
-  chosen: readonly string[];
-  onChoose(views: string[]): void;
-}
-
-/** A box for each view, in the scene's order; the last one that is chosen stays. */
-function Views({ all, chosen, onChoose }: ViewsProps) {
-  const toggle = (name: string) => onChoose(all.filter((each) => chosen.includes(each) !== (each === name)));
-  return (
-    <fieldset class="bake-views">
-      <legend>Views{all.length > MAX_VIEWS_SHOWN && `, of which the editor shows ${MAX_VIEWS_SHOWN} at once`}</legend>
-      {all.map((name) => (
-        <label key={name}>
-          <input
-            type="checkbox"
-            checked={chosen.includes(name)}
-            disabled={chosen.length === 1 && chosen[0] === name}
-            onChange={() => toggle(name)}
-          />
-          {name}
-        </label>
-      ))}
-    </fieldset>
-  );
-}
-
 interface Props {
   scene: SceneBody;
   /** What is chosen at first. */
@@ -108,10 +83,12 @@ interface Props {
   action: string;
   /** Where a size of one's own begins. */
   size?: Size;
+  /** Where a new camera begins; else where all is seen. */
+  from?: Frame | null;
   onChoose(choice: BakeChoice): void;
 }
 
-export function PresetList({ scene, method: initial, views, action, size = OWN_SIZE, onChoose }: Props) {
+export function PresetList({ scene, method: initial, views, action, size = OWN_SIZE, from = null, onChoose }: Props) {
   const [method, setMethod] = useState(initial);
   const [chosen, setChosen] = useState([...views]);
   const [relightable, setRelightable] = useState(false);
@@ -119,9 +96,7 @@ export function PresetList({ scene, method: initial, views, action, size = OWN_S
   return (
     <>
       <Methods chosen={method} onChoose={setMethod} />
-      {scene.views.length > 1 && (
-        <Views all={scene.views.map((view) => view.name)} chosen={chosen} onChoose={setChosen} />
-      )}
+      <ViewChoice scene={scene} from={from} chosen={chosen} onChoose={setChosen} />
       <Relightable chosen={relightable} onChoose={setRelightable} />
       <ul class="presets">
         {PRESETS.map(({ name, label, help }) => (

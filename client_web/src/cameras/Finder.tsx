@@ -1,0 +1,186 @@
+/** Places a camera: the scene in plain colours, moved by hand until it shows what the picture shall show. */
+import { useEffect, useId, useRef, useState } from "preact/hooks";
+import type { FinderBody, SceneBody, Triple } from "../protocol";
+import type { Size } from "../scene/recipe";
+import { IconButton } from "../ui/Button";
+import { LabelledSlider } from "../ui/LabelledSlider";
+import { finderPicture, freeName, getFinder, keepCamera, placeAt } from "./calls";
+import { Motion } from "./motion";
+import { frameOf, MAX_YFOV, MIN_YFOV, orbitOf, withAngle, type Bounds, type Frame, type Orbit } from "./orbit";
+import { Pictures } from "./pictures";
+import { step, useHand } from "./useHand";
+import "./cameras.css";
+
+const MOVING: Size = [400, 300];
+const RESTING: Size = [960, 720];
+const MAX_NAME = 80;
+const STEPS = [
+  { key: "ArrowLeft", sign: "◂", label: "Turn left" },
+  { key: "ArrowRight", sign: "▸", label: "Turn right" },
+  { key: "ArrowUp", sign: "▴", label: "Turn up" },
+  { key: "ArrowDown", sign: "▾", label: "Turn down" },
+  { key: "+", sign: "+", label: "Nearer" },
+  { key: "-", sign: "−", label: "Farther" },
+];
+
+interface Props {
+  scene: SceneBody;
+  /** Where it begins; null: where the scene is seen whole. */
+  from: Frame | null;
+  /** The camera that is moved; null: a new one. */
+  name: string | null;
+  onKept(name: string): void;
+  onClose(): void;
+}
+
+const boundsOf = ({ lowest, highest }: FinderBody): Bounds => ({
+  lowest: lowest as Triple,
+  highest: highest as Triple,
+});
+
+export function Finder({ scene, from, name, onKept, onClose }: Props) {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const [found, setFound] = useState<FinderBody | null>(null);
+  const [problem, setProblem] = useState("");
+  useEffect(() => {
+    dialog.current?.showModal();
+    getFinder(scene.id).then(setFound, (error: Error) => setProblem(error.message));
+  }, [scene.id]);
+  const title = name === null ? `Place a camera in “${scene.name}”` : `Move “${name}”`;
+  return (
+    <dialog class="finder" ref={dialog} aria-label={title} onClose={onClose} onKeyDown={(event) => event.stopPropagation()}>
+      <header class="panel-head">
+        <h2>{title}</h2>
+        <IconButton icon="close" label="Close" onClick={() => dialog.current?.close()} />
+      </header>
+      {found === null ? (
+        <p class="finder-wait">{problem || "Reading the scene…"}</p>
+      ) : (
+        <Placing scene={scene} found={found} from={from} name={name} onKept={onKept} />
+      )}
+    </dialog>
+  );
+}
+
+/** Where the hand has put the camera, and the picture that follows it. */
+function useMoved(scene: string, canvas: { current: HTMLCanvasElement | null }, first: Orbit, fail: (text: string) => void) {
+  const [orbit, setOrbit] = useState(first);
+  const parts = useRef<{ motion: Motion; pictures: Pictures } | null>(null);
+  useEffect(() => {
+    const pictures = new Pictures(
+      (frame, size) => finderPicture(scene, frame, size),
+      async (blob) => {
+        const bitmap = await createImageBitmap(blob);
+        if (canvas.current !== null) {
+          canvas.current.width = bitmap.width;
+          canvas.current.height = bitmap.height;
+          canvas.current.getContext("2d")?.drawImage(bitmap, 0, 0);
+        }
+        bitmap.close();
+        fail("");
+      },
+      (error) => fail(error instanceof Error ? error.message : String(error)),
+    );
+    const motion = new Motion(first, (shown, isLast) => pictures.show(frameOf(shown), isLast ? RESTING : MOVING));
+    parts.current = { motion, pictures };
+    pictures.show(frameOf(first), RESTING);
+    return () => {
+      motion.end();
+      pictures.close();
+    };
+  }, [scene]);
+  const change = (by: (orbit: Orbit) => Orbit) => {
+    const motion = parts.current?.motion;
+    motion?.change(by);
+    if (motion !== undefined) setOrbit(motion.target);
+  };
+  return { orbit, change };
+}
+
+interface PlacingProps {
+  scene: SceneBody;
+  found: FinderBody;
+  from: Frame | null;
+  name: string | null;
+  onKept(name: string): void;
+}
+
+function Placing({ scene, found, from, name, onKept }: PlacingProps) {
+  const bounds = boundsOf(found);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [problem, setProblem] = useState("");
+  const [called, setCalled] = useState(name ?? freeName(scene.views.map((view) => view.name)));
+  const { orbit, change } = useMoved(scene.id, canvas, orbitOf(from ?? found.framing, bounds), setProblem);
+  const field = useId();
+
+  const seeAll = () => change(() => orbitOf(found.framing, bounds));
+  const lookAt = async (u: number, v: number) => {
+    try {
+      const place = await placeAt(scene.id, frameOf(orbit), RESTING, u * RESTING[0], v * RESTING[1]);
+      if (place !== null) change((now) => ({ ...now, target: place }));
+    } catch (error) {
+      setProblem((error as Error).message);
+    }
+  };
+  const keep = async (event: Event) => {
+    event.preventDefault();
+    try {
+      await keepCamera(scene.id, called.trim(), frameOf(orbit));
+      onKept(called.trim());
+    } catch (error) {
+      setProblem((error as Error).message);
+    }
+  };
+  const hand = useHand(change, bounds, (u, v) => void lookAt(u, v));
+  return (
+    <form onSubmit={keep}>
+      <canvas
+        ref={canvas}
+        width={RESTING[0]}
+        height={RESTING[1]}
+        tabIndex={0}
+        role="img"
+        aria-label="What the camera sees. Arrows turn, with Shift they slide, + and − go nearer and farther, F shows everything"
+        onKeyDown={(event) => {
+          if (event.key === "f" || event.key === "F") seeAll();
+          else if (!step(change, bounds, event.key, event.shiftKey)) return;
+          event.preventDefault();
+        }}
+        {...hand}
+      />
+      <p class="finder-help">
+        Drag turns. Shift or the right button slides. The wheel goes nearer. A click looks at what is there.
+      </p>
+      <div class="finder-steps" role="group" aria-label="Move the camera">
+        {STEPS.map(({ key, sign, label }) => (
+          <button key={key} type="button" title={label} aria-label={label} onClick={() => step(change, bounds, key, false)}>
+            {sign}
+          </button>
+        ))}
+        <button type="button" title="See everything (F)" onClick={seeAll}>
+          See everything
+        </button>
+      </div>
+      <LabelledSlider
+        label="Angle"
+        unit="°"
+        title="Vertical field of view"
+        value={orbit.yfov}
+        minimum={MIN_YFOV}
+        maximum={MAX_YFOV}
+        scale="log"
+        onChange={(yfov) => change((now) => withAngle(now, yfov))}
+      />
+      <div class="finder-keep">
+        <label for={field}>Name</label>
+        <input id={field} value={called} maxLength={MAX_NAME} onInput={(event) => setCalled(event.currentTarget.value)} />
+        <button class="primary" disabled={called.trim() === ""}>
+          Keep camera
+        </button>
+      </div>
+      <p class="finder-problem" role="alert">
+        {problem}
+      </p>
+    </form>
+  );
+}

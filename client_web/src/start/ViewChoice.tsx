@@ -1,0 +1,90 @@
+/** Which views are baked; cameras that people place stand among them, and are moved and deleted here. */
+import { useState } from "preact/hooks";
+import { deleteCamera, keepCamera, listCameras } from "../cameras/calls";
+import { Finder } from "../cameras/Finder";
+import type { Frame } from "../cameras/orbit";
+import { getScene } from "../net/api";
+import { MAX_VIEWS_SHOWN, type SceneBody, type SceneView } from "../protocol";
+import { IconButton } from "../ui/Button";
+import { attempt, note } from "../ui/toasts";
+
+interface Props {
+  scene: SceneBody;
+  /** Where a new camera begins; null: where all is seen. */
+  from: Frame | null;
+  chosen: readonly string[];
+  onChoose(views: string[]): void;
+}
+
+interface Open {
+  /** The camera that is moved; null: a new one. */
+  name: string | null;
+  from: Frame | null;
+}
+
+export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
+  const [views, setViews] = useState<SceneView[]>(scene.views);
+  const [open, setOpen] = useState<Open | null>(null);
+  const choose = (names: readonly string[], all: readonly SceneView[]) =>
+    onChoose(all.map((view) => view.name).filter((name) => names.includes(name)));
+
+  const read = async () => {
+    const found = (await getScene(scene.id)).views;
+    setViews(found);
+    return found;
+  };
+  const toggle = (name: string) =>
+    choose(chosen.includes(name) ? chosen.filter((each) => each !== name) : [...chosen, name], views);
+  const kept = async (name: string) => {
+    setOpen(null);
+    await attempt(async () => choose([...chosen, name], await read()));
+  };
+  const move = (name: string) =>
+    attempt(async () => {
+      const camera = (await listCameras(scene.id)).find((each) => each.name === name);
+      setOpen({ name, from: camera ?? null });
+    });
+  const remove = (name: string) =>
+    attempt(async () => {
+      const gone = (await listCameras(scene.id)).find((each) => each.name === name);
+      await deleteCamera(scene.id, name);
+      const left = await read();
+      const rest = chosen.filter((each) => each !== name);
+      choose(rest.length > 0 ? rest : left.slice(0, 1).map((view) => view.name), left);
+      if (gone === undefined) return;
+      note(`The camera “${name}” is deleted.`, {
+        label: "Undo",
+        run: () => void keepCamera(scene.id, name, gone).then(() => kept(name)),
+      });
+    });
+  const isLast = (name: string) => chosen.length === 1 && chosen[0] === name;
+  return (
+    <fieldset class="bake-views">
+      <legend>
+        Views{views.length > MAX_VIEWS_SHOWN && `, of which the editor shows ${MAX_VIEWS_SHOWN} at once`}
+      </legend>
+      {views.map(({ name, is_placed }) => (
+        <span class="bake-view" key={name}>
+          <label>
+            <input type="checkbox" checked={chosen.includes(name)} disabled={isLast(name)} onChange={() => toggle(name)} />
+            {name}
+          </label>
+          {is_placed && <IconButton icon="handles" label={`Move ${name}`} onClick={() => void move(name)} />}
+          {is_placed && <IconButton icon="trash" label={`Delete ${name}`} onClick={() => void remove(name)} />}
+        </span>
+      ))}
+      <button type="button" onClick={() => setOpen({ name: null, from })}>
+        Place a camera…
+      </button>
+      {open !== null && (
+        <Finder
+          scene={{ ...scene, views }}
+          from={open.from}
+          name={open.name}
+          onKept={(name) => void kept(name)}
+          onClose={() => setOpen(null)}
+        />
+      )}
+    </fieldset>
+  );
+}

@@ -1,0 +1,107 @@
+import { describe, expect, it } from "vitest";
+import { freeName } from "../src/cameras/calls";
+import { Pictures } from "../src/cameras/pictures";
+import { approached, between, frameOf, isNear, orbitOf, panned, turned, withAngle, type Orbit } from "../src/cameras/orbit";
+
+const bounds = { lowest: [-1, 0, -1] as const, highest: [1, 2, 1] as const } as never;
+const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, yfov: 40 };
+const eyeOf = (of: Orbit) => [3, 7, 11].map((k) => frameOf(of).to_world[k] as number);
+const column = (of: Orbit, k: number) => [0, 4, 8].map((row) => frameOf(of).to_world[row + k] as number);
+const dot = (a: number[], b: number[]) => a.reduce((sum, value, k) => sum + value * (b[k] as number), 0);
+
+describe("a camera that goes round a place", () => {
+  it("is a rigid frame that looks at its target and stands upright", () => {
+    const [x, y, z] = [0, 1, 2].map((k) => column(orbit, k)) as [number[], number[], number[]];
+    for (const axis of [x, y, z]) expect(dot(axis, axis)).toBeCloseTo(1, 12);
+    for (const [a, b] of [[x, y], [y, z], [z, x]] as const) expect(dot(a, b)).toBeCloseTo(0, 12);
+    expect(x[1]).toBe(0);
+    expect(y[1]).toBeGreaterThan(0);
+    const eye = eyeOf(orbit);
+    orbit.target.forEach((at, k) => expect((eye[k] as number) - 4 * (z[k] as number)).toBeCloseTo(at, 12));
+    const determinant = dot(x, [
+      (y[1] as number) * (z[2] as number) - (y[2] as number) * (z[1] as number),
+      (y[2] as number) * (z[0] as number) - (y[0] as number) * (z[2] as number),
+      (y[0] as number) * (z[1] as number) - (y[1] as number) * (z[0] as number),
+    ]);
+    expect(determinant).toBeCloseTo(1, 12);
+  });
+
+  it("is found again from its frame", () => {
+    const again = orbitOf(frameOf(orbit), bounds);
+    frameOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(frameOf(orbit).to_world[k] as number, 9));
+    expect(again.yfov).toBe(40);
+  });
+
+  it("turns round its target and never over the top", () => {
+    const next = turned(orbit, 1, 9);
+    expect(next.target).toEqual(orbit.target);
+    expect(next.elevation).toBeLessThan(Math.PI / 2);
+    expect(column(next, 1)[1]).toBeGreaterThan(0);
+  });
+
+  it("slides so that what is at its target's depth follows the hand", () => {
+    const next = panned(orbit, 0.25, 0.1);
+    const [x, y, z] = [0, 1, 2].map((k) => column(next, k)) as [number[], number[], number[]];
+    const towards = orbit.target.map((at, k) => at - (eyeOf(next)[k] as number));
+    const height = 2 * 4 * Math.tan((20 * Math.PI) / 180);
+    expect(dot(towards, x) / height).toBeCloseTo(0.25, 9); // it is seen that much farther right
+    expect(-dot(towards, y) / height).toBeCloseTo(0.1, 9); // and farther down
+    expect(-dot(towards, z)).toBeCloseTo(4, 9);
+  });
+
+  it("goes neither through its target nor out of sight", () => {
+    expect(approached(orbit, 0, bounds).distance).toBeGreaterThan(0);
+    expect(approached(orbit, 1e9, bounds).distance).toBeLessThan(1e4);
+    expect(withAngle(orbit, 0).yfov).toBe(1);
+    expect(withAngle(orbit, 500).yfov).toBe(120);
+  });
+
+  it("comes to where it is sent, the short way round", () => {
+    const goal = { ...orbit, azimuth: orbit.azimuth + 2 * Math.PI - 0.2, distance: 1 };
+    const half = between(orbit, goal, 0.5);
+    expect(half.azimuth).toBeCloseTo(orbit.azimuth - 0.1, 9);
+    expect(half.distance).toBeCloseTo(2, 9);
+    expect(isNear(between(orbit, goal, 1), goal)).toBe(true);
+    expect(isNear(orbit, goal)).toBe(false);
+  });
+});
+
+describe("pictures of where a camera is", () => {
+  it("are asked for one at a time, then the newest; what fails does not end it", async () => {
+    const asked: number[] = [];
+    const drawn: unknown[] = [];
+    const failed: unknown[] = [];
+    const answers: ((picture: Blob | null) => void)[] = [];
+    const pictures = new Pictures(
+      (_, size) =>
+        new Promise((resolve, reject) => {
+          asked.push(size[0]);
+          answers.push((picture) => (picture === null ? reject(new Error("gone")) : resolve(picture)));
+        }),
+      async (picture) => void drawn.push(picture),
+      (error) => failed.push(error),
+    );
+    const settle = () => new Promise((resolve) => setTimeout(resolve));
+    for (const width of [1, 2, 3]) pictures.show(frameOf(orbit), [width, 1]);
+    expect(asked).toEqual([1]);
+    answers[0]?.(null);
+    await settle();
+    expect(asked).toEqual([1, 3]);
+    expect(failed).toHaveLength(1);
+    answers[1]?.(new Blob());
+    await settle();
+    expect(drawn).toHaveLength(1);
+    pictures.show(frameOf(orbit), [4, 1]);
+    pictures.close();
+    answers[2]?.(new Blob());
+    await settle();
+    expect(drawn).toHaveLength(1);
+  });
+});
+
+describe("names of new cameras", () => {
+  it("are the first that is free", () => {
+    expect(freeName([])).toBe("View 1");
+    expect(freeName(["front", "View 1", "View 3"])).toBe("View 2");
+  });
+});

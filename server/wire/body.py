@@ -1,0 +1,23 @@
+"""What all bodies of the REST calls have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Id = Annotated[str, Field(min_length=16, max_length=16, pattern=r"^[0-9a-f]{16}$")]
+MAX_NAME = 256
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+
+
+class Body(BaseModel):
+    """The base of all bodies."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @classmethod
+    def of(cls, status: object, **more: Any) -> Self:
+        """A body whose fields are the attributes of `status` with the same names, and `more`."""
+        own = {name: getattr(status, name) for name in cls.model_fields if name not in more}
+        return cls(**own, **more)

@@ -1,0 +1,114 @@
+"""Cameras that people placed: kept, listed, deleted with their scene, and part of recipes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_scenes import still_life
+
+from relume.bake import Recipe
+from relume.errors import NotFoundError, ParameterError, PlanError
+from relume.methods.registry import METHODS
+from relume.scene.model import Scene
+from relume.scene.placed_camera import PlacedCamera, placed_camera
+from relume.store import bake_here, open_store
+from relume.store.publish import array_paths
+from worker import cameras
+from worker.cameras import chosen_views, delete_camera, keep_camera, kept_cameras, placed_names
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import SceneRecord, delete_scene, get_scene, register_scene
+from worker.status import recipe_from_json, recipe_json
+
+METHOD = METHODS["direct"]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return still_life()
+
+
+def alike(scene: Scene, name: str, yfov: float | None = None) -> PlacedCamera:
+    """Where the scene's first camera is, under another name."""
+    first = scene.cameras[0]
+    return placed_camera(name, first.to_world.ravel().tolist(), yfov or math.degrees(first.yfov))
+
+
+@pytest.fixture
+def ledger(tmp_path: Path, scene: Scene) -> Ledger:
+    ledger = Ledger(open_database(f"sqlite:///{tmp_path / 'relume.db'}"))
+    register_scene(tmp_path, ledger, scene)
+    return ledger
+
+
+@pytest.fixture
+def record(ledger: Ledger, scene: Scene) -> SceneRecord:
+    return get_scene(ledger, scene.id)
+
+
+def test_cameras_are_kept_replaced_and_deleted_with_their_scene(tmp_path: Path, ledger: Ledger, scene: Scene) -> None:
+    wide, narrow = alike(scene, "Hero", 60), alike(scene, "Hero", 20)
+    assert keep_camera(ledger, scene.id, wide)
+    assert not keep_camera(ledger, scene.id, narrow)
+    keep_camera(ledger, scene.id, alike(scene, "Behind"))
+    assert kept_cameras(ledger, scene.id) == [alike(scene, "Behind"), narrow]
+    assert placed_names(ledger) == {scene.id: ["Behind", "Hero"]}
+    delete_camera(ledger, scene.id, "Behind")
+    with pytest.raises(NotFoundError):
+        delete_camera(ledger, scene.id, "Behind")
+    delete_scene(tmp_path, ledger, scene.id)
+    assert placed_names(ledger) == {}
+
+
+def test_names_of_the_scene_itself_and_too_many_are_refused(
+    ledger: Ledger, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = scene.cameras[0].name
+    with pytest.raises(ParameterError, match="own cameras"):
+        keep_camera(ledger, scene.id, alike(scene, own))
+    with pytest.raises(ParameterError, match="own cameras"):
+        delete_camera(ledger, scene.id, own)
+    monkeypatch.setattr(cameras, "MAX_CAMERAS", 1)
+    keep_camera(ledger, scene.id, alike(scene, "Hero"))
+    keep_camera(ledger, scene.id, alike(scene, "Hero", 60))
+    with pytest.raises(ParameterError, match="or delete one"):
+        keep_camera(ledger, scene.id, alike(scene, "Behind"))
+    with pytest.raises(NotFoundError):
+        keep_camera(ledger, "0" * 16, alike(scene, "Hero"))
+
+
+def test_views_are_chosen_by_name_or_as_they_are(ledger: Ledger, scene: Scene, record: SceneRecord) -> None:
+    own, hero, behind = scene.cameras[0].name, alike(scene, "Hero"), alike(scene, "Behind")
+    keep_camera(ledger, scene.id, hero)
+    assert chosen_views(ledger, record, []) == (record.views, ())
+    assert chosen_views(ledger, record, ["Hero", own, behind, own]) == (("Hero", own, "Behind"), (hero, behind))
+    with pytest.raises(ParameterError, match="Hero"):
+        chosen_views(ledger, record, ["Nobody"])
+    with pytest.raises(ParameterError, match="a name of its own"):
+        chosen_views(ledger, record, ["Hero", alike(scene, "Hero", 60)])
+    with pytest.raises(ParameterError, match="own cameras"):
+        chosen_views(ledger, record, [alike(scene, own)])
+
+
+def test_a_recipe_with_cameras_is_the_same_after_it_was_written_down(scene: Scene) -> None:
+    recipe = Recipe("direct", ("Hero",), (64, 48), 100, cameras=(alike(scene, "Hero", 31.7),))
+    assert recipe_from_json(recipe_json(recipe)) == recipe
+
+
+def test_view_of_a_placed_camera_is_what_the_scenes_own_gives_there(scene: Scene, tmp_path: Path) -> None:
+    own = Recipe("direct", (scene.cameras[0].name,), (32, 24), 50)
+    placed = Recipe("direct", ("Hero",), (32, 24), 50, cameras=(alike(scene, "Hero"),))
+    stores = [
+        open_store(bake_here(METHOD, scene, recipe, tmp_path / f"{recipe.views[0]}.zarr")) for recipe in (own, placed)
+    ]
+    paths = array_paths(tmp_path / "Hero.zarr")
+    assert "views/0/visibility" in paths
+    for path in paths:
+        np.testing.assert_array_equal(stores[0].read(path), stores[1].read(path))
+    assert stores[1].attributes["views"][0]["name"] == "Hero"
+
+
+def test_view_of_a_camera_that_the_recipe_does_not_bring_is_refused(scene: Scene) -> None:
+    with pytest.raises(PlanError, match="Hero"):
+        METHOD.plan(scene, Recipe("direct", ("Hero",), (32, 24), 50))

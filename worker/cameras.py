@@ -1,0 +1,102 @@
+"""Cameras that people placed in a scene, beside those that came with it."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session
+
+from relume.errors import NotFoundError, ParameterError
+from relume.scene.placed_camera import PlacedCamera, read_placed
+from worker.ledger import Ledger
+from worker.models import CameraRow
+from worker.scenes import SceneRecord, get_scene
+
+Views: TypeAlias = tuple[tuple[str, ...], tuple[PlacedCamera, ...]]
+"""Names of views, and those of them that somebody placed, as a recipe has them."""
+
+MAX_CAMERAS = 200  # of a scene, placed by people
+
+
+def kept_cameras(ledger: Ledger, scene_id: str) -> list[PlacedCamera]:
+    """The cameras that people placed in a scene, by name."""
+    with ledger.sessions() as session:
+        rows = session.scalars(select(CameraRow).where(CameraRow.scene_id == scene_id).order_by(CameraRow.name))
+        return [read_placed(json.loads(row.document)) for row in rows]
+
+
+def placed_names(ledger: Ledger) -> dict[str, list[str]]:
+    """Names of the cameras that people placed, by scene, in order."""
+    names: dict[str, list[str]] = defaultdict(list)
+    with ledger.sessions() as session:
+        for scene_id, name in session.execute(select(CameraRow.scene_id, CameraRow.name).order_by(CameraRow.name)):
+            names[scene_id].append(name)
+    return names
+
+
+def keep_camera(ledger: Ledger, scene_id: str, camera: PlacedCamera) -> bool:
+    """Keep a camera under its name; bakes of an earlier one stay what they are.
+
+    Args:
+        ledger: where it is listed. scene_id: of its scene.
+    Returns:
+        Whether there was none of this name.
+    Raises:
+        NotFoundError: there is no such scene. ParameterError: the file's own camera has this name, or there are too
+            many.
+    """
+    _refuse_own(get_scene(ledger, scene_id), camera.name)
+    with ledger.sessions.begin() as session:
+        row = session.get(CameraRow, (scene_id, camera.name))
+        if row is None and _count(session, scene_id) >= MAX_CAMERAS:
+            raise ParameterError("name", camera.name, f"the name of one of the {MAX_CAMERAS} cameras, or delete one")
+        session.merge(CameraRow(scene_id=scene_id, name=camera.name, document=json.dumps(camera.document())))
+    return row is None
+
+
+def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
+    """Forget a camera that somebody placed. Raises NotFoundError, ParameterError where it is the file's own."""
+    _refuse_own(get_scene(ledger, scene_id), name)
+    with ledger.sessions.begin() as session:
+        gone = delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)
+        if session.scalars(gone).first() is None:
+            raise NotFoundError(f"the scene has no camera {name[:80]!r} that somebody placed")
+
+
+def chosen_views(ledger: Ledger, record: SceneRecord, wanted: Sequence[str | PlacedCamera]) -> Views:
+    """What a recipe says of views.
+
+    Args:
+        ledger: that lists the scene's cameras. record: of the scene.
+        wanted: names of the scene's own or kept cameras, or cameras; empty for all that came with the scene.
+    Returns:
+        Names of all views, each once, in order; and those of them that somebody placed.
+    Raises:
+        ParameterError: there is no such view, or two cameras of one name.
+    """
+    kept = {camera.name: camera for camera in kept_cameras(ledger, record.id)}
+    placed: dict[str, PlacedCamera] = {}
+    for view in wanted:
+        if isinstance(view, str) and view not in record.views and view not in kept:
+            raise ParameterError("views", view, "some of " + ", ".join((*record.views, *kept))[:400])
+        camera = kept.get(view) if isinstance(view, str) else view
+        if camera is None:
+            continue
+        _refuse_own(record, camera.name)
+        if placed.setdefault(camera.name, camera) != camera:
+            raise ParameterError("views", camera.name, "each camera a name of its own")
+    names = dict.fromkeys(view if isinstance(view, str) else view.name for view in wanted or record.views)
+    return tuple(names), tuple(placed.values())
+
+
+def _refuse_own(record: SceneRecord, name: str) -> None:
+    if name in record.views:
+        raise ParameterError("name", name, "a name that none of the scene's own cameras has")
+
+
+def _count(session: Session, scene_id: str) -> int:
+    return session.scalar(select(func.count()).select_from(CameraRow).where(CameraRow.scene_id == scene_id)) or 0
