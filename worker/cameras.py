@@ -59,7 +59,13 @@ def keep_camera(ledger: Ledger, scene_id: str, camera: PlacedCamera) -> bool:
 
 
 def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
-    """Forget a camera that somebody placed. Raises NotFoundError, ParameterError where it is the file's own."""
+    """Forget a camera that somebody placed.
+
+    Args:
+        ledger: where it is listed. scene_id: of its scene. name: its own.
+    Raises:
+        NotFoundError: there is none. ParameterError: the file's own camera has this name.
+    """
     _refuse_own(get_scene(ledger, scene_id), name)
     with ledger.sessions.begin() as session:
         gone = delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)

@@ -151,6 +151,7 @@ BOUNDED = {
     "look/library/navigation.py",
     "measured/asset_store.py",
     "operators/nodes.py",
+    "picture/light.py",
     "scene/cornell.py",
     "scene/demo/__init__.py",
     "scene/gltf/sheen.py",

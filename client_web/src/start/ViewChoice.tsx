@@ -1,5 +1,5 @@
 /** Which views are baked; cameras that people place stand among them, and are moved and deleted here. */
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { deleteCamera, keepCamera, listCameras } from "../cameras/calls";
 import { Finder } from "../cameras/Finder";
 import type { Frame } from "../cameras/orbit";
@@ -33,6 +33,7 @@ export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
     setViews(found);
     return found;
   };
+  useEffect(() => void attempt(read), [scene.id]); // cameras may have come and gone since the scene was listed
   const toggle = (name: string) =>
     choose(chosen.includes(name) ? chosen.filter((each) => each !== name) : [...chosen, name], views);
   const kept = async (name: string) => {
