@@ -32,6 +32,11 @@ describe("a camera that goes round a place", () => {
     expect(again.yfov).toBe(40);
   });
 
+  it("turns about what the middle of the picture shows", () => {
+    const { target } = orbitOf(frameOf({ ...orbit, distance: 3 }), bounds, orbit.target);
+    target.forEach((at, k) => expect(at).toBeCloseTo(orbit.target[k] as number, 9));
+  });
+
   it("turns round its target and never over the top", () => {
     const next = turned(orbit, 1, 9);
     expect(next.target).toEqual(orbit.target);

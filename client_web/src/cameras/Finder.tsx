@@ -1,6 +1,6 @@
 /** Places a camera: the scene in plain colours, moved by hand until it shows what the picture shall show. */
 import { useEffect, useId, useRef, useState } from "preact/hooks";
-import type { FinderBody, SceneBody, Triple } from "../protocol";
+import type { SceneBody, Triple } from "../protocol";
 import type { Size } from "../scene/recipe";
 import { IconButton } from "../ui/Button";
 import { LabelledSlider } from "../ui/LabelledSlider";
@@ -33,18 +33,29 @@ interface Props {
   onClose(): void;
 }
 
-const boundsOf = ({ lowest, highest }: FinderBody): Bounds => ({
-  lowest: lowest as Triple,
-  highest: highest as Triple,
-});
+interface Begun {
+  bounds: Bounds;
+  first: Orbit;
+  /** Sees all of the scene. */
+  whole: Orbit;
+}
+
+/** Where the scene is, and where hands begin: they turn about what the middle of the picture shows. */
+async function begin(scene: string, from: Frame | null): Promise<Begun> {
+  const { lowest, highest, framing } = await getFinder(scene);
+  const bounds: Bounds = { lowest: lowest as Triple, highest: highest as Triple };
+  const frame = from ?? framing;
+  const place = await placeAt(scene, frame, RESTING, RESTING[0] / 2, RESTING[1] / 2);
+  return { bounds, first: orbitOf(frame, bounds, place), whole: orbitOf(framing, bounds) };
+}
 
 export function Finder({ scene, from, name, onKept, onClose }: Props) {
   const dialog = useRef<HTMLDialogElement>(null);
-  const [found, setFound] = useState<FinderBody | null>(null);
+  const [begun, setBegun] = useState<Begun | null>(null);
   const [problem, setProblem] = useState("");
   useEffect(() => {
     dialog.current?.showModal();
-    getFinder(scene.id).then(setFound, (error: Error) => setProblem(error.message));
+    begin(scene.id, from).then(setBegun, (error: Error) => setProblem(error.message));
   }, [scene.id]);
   const title = name === null ? `Place a camera in “${scene.name}”` : `Move “${name}”`;
   return (
@@ -53,10 +64,10 @@ export function Finder({ scene, from, name, onKept, onClose }: Props) {
         <h2>{title}</h2>
         <IconButton icon="close" label="Close" onClick={() => dialog.current?.close()} />
       </header>
-      {found === null ? (
+      {begun === null ? (
         <p class="finder-wait">{problem || "Reading the scene…"}</p>
       ) : (
-        <Placing scene={scene} found={found} from={from} name={name} onKept={onKept} />
+        <Placing scene={scene} {...begun} name={name} onKept={onKept} />
       )}
     </dialog>
   );
@@ -97,23 +108,20 @@ function useMoved(scene: string, canvas: { current: HTMLCanvasElement | null }, 
   return { orbit, change };
 }
 
-interface PlacingProps {
+interface PlacingProps extends Begun {
   scene: SceneBody;
-  found: FinderBody;
-  from: Frame | null;
   name: string | null;
   onKept(name: string): void;
 }
 
-function Placing({ scene, found, from, name, onKept }: PlacingProps) {
-  const bounds = boundsOf(found);
+function Placing({ scene, bounds, first, whole, name, onKept }: PlacingProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const [problem, setProblem] = useState("");
   const [called, setCalled] = useState(name ?? freeName(scene.views.map((view) => view.name)));
-  const { orbit, change } = useMoved(scene.id, canvas, orbitOf(from ?? found.framing, bounds), setProblem);
+  const { orbit, change } = useMoved(scene.id, canvas, first, setProblem);
   const field = useId();
 
-  const seeAll = () => change(() => orbitOf(found.framing, bounds));
+  const seeAll = () => change(() => whole);
   const lookAt = async (u: number, v: number) => {
     try {
       const place = await placeAt(scene.id, frameOf(orbit), RESTING, u * RESTING[0], v * RESTING[1]);

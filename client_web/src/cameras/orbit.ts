@@ -1,6 +1,6 @@
 /** A camera that goes round a place: what hands move. Angles in radians, lengths in metres, +Y up. */
 import type { Triple } from "../protocol";
-import { add, cross, dot, length, scaled, subtract } from "../lights/vector";
+import { add, cross, dot, length, scaled, subtract, unit } from "../lights/vector";
 
 export interface Orbit {
   target: Triple;
@@ -49,13 +49,14 @@ export function frameOf(orbit: Orbit): Frame {
   return { to_world: [...rows, 0, 0, 0, 1], yfov: orbit.yfov };
 }
 
-/** The orbit that sees what a camera sees, level, about what lies in the middle of the scene's depth. */
-export function orbitOf({ to_world: m, yfov }: Frame, bounds: Bounds): Orbit {
+/** The orbit that sees what a camera sees, level, about `place` in the middle of its picture; null where that is empty:
+ * about the middle of the scene's depth. */
+export function orbitOf({ to_world: m, yfov }: Frame, bounds: Bounds, place: Triple | null = null): Orbit {
   const column = (k: number): Triple => [m[k] as number, m[4 + k] as number, m[8 + k] as number];
   const eye = column(3);
-  const backward = scaled(column(2), 1 / (length(column(2)) || 1));
-  const depth = dot(subtract(eye, centreOf(bounds)), backward);
-  const distance = clamp(depth, 0.05 * sizeOf(bounds), FARTHEST * sizeOf(bounds));
+  const backward = unit(column(2));
+  const depth = dot(subtract(eye, place ?? centreOf(bounds)), backward);
+  const distance = clamp(depth, (place === null ? 0.05 : NEAREST) * sizeOf(bounds), FARTHEST * sizeOf(bounds));
   return {
     target: subtract(eye, scaled(backward, distance)),
     distance,
