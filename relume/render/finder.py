@@ -16,7 +16,6 @@ from relume.scene.gltf.cameras import framing_camera
 from relume.scene.model import Camera, Material, Scene
 from relume.trace.geometry import Geometry, merge
 from relume.trace.primary import Hits, camera_directions, trace_from
-from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -68,12 +67,20 @@ class Finder:
         y, x = np.divmod(np.arange(width * height, dtype=np.int64), width)
         directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
         hits = self._hits(camera, directions)
-        normal = surface_at(self.geometry, hits, directions).points.normal
-        facing = np.maximum(-np.einsum("nc,nc->n", normal, directions), 0)
-        share = _AMBIENT + _HEADLIGHT * facing + _SKY * (0.5 + 0.5 * normal[:, 1])
-        color = self.colors[self.geometry.face_material[np.maximum(hits.face, 0)]] * share[:, None]
-        shown = np.where(hits.face[:, None] < 0, np.float32(_BACKGROUND), color).astype(np.float32)
+        seen = np.flatnonzero(hits.face >= 0)
+        shown = np.full((width * height, 3), _BACKGROUND, np.float32)
+        shown[seen] = self._shown(hits.face[seen], hits.uv[seen], directions[seen])
         return np.asarray(np.rint(255 * srgb_encode(shown)), np.uint8).reshape(height, width, 3)
+
+    def _shown(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
+        """Shade hits by their interpolated normals alone; `surface_at` finds more, and takes several times as long. (n, 3)"""
+        corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
+        normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        facing = -np.einsum("nc,nc->n", normal, directions)
+        upward = normal[:, 1] * np.sign(facing)  # of the side that is seen
+        share = _AMBIENT + _HEADLIGHT * np.abs(facing) + _SKY * (0.5 + 0.5 * upward)
+        return np.asarray(self.colors[self.geometry.face_material[face]] * share[:, None], np.float32)
 
     def place_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> F64 | None:
         """Find the place that a position of the picture shows; None where that is the background.
