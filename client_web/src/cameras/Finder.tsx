@@ -4,7 +4,7 @@ import type { SceneBody, Triple } from "../protocol";
 import type { Size } from "../scene/recipe";
 import { IconButton } from "../ui/Button";
 import { LabelledSlider } from "../ui/LabelledSlider";
-import { finderPicture, freeName, getFinder, keepCamera, placeAt } from "./calls";
+import { finderPicture, freeName, getFinder, keepCamera, listCameras, placeAt } from "./calls";
 import { Motion } from "./motion";
 import { frameOf, MAX_YFOV, MIN_YFOV, orbitOf, withAngle, type Bounds, type Frame, type Orbit } from "./orbit";
 import { Pictures } from "./pictures";
@@ -25,7 +25,7 @@ const STEPS = [
 
 interface Props {
   scene: SceneBody;
-  /** Where it begins; null: where the scene is seen whole. */
+  /** Where it begins; null: where the scene's first camera is. */
   from: Frame | null;
   /** The camera that is moved; null: a new one. */
   name: string | null;
@@ -40,11 +40,12 @@ interface Begun {
   whole: Orbit;
 }
 
-/** Where the scene is, and where hands begin: they turn about what the middle of the picture shows. */
+/** Where the scene is, and where hands begin, else at its first camera: they turn about what the middle of the picture
+ * shows. */
 async function begin(scene: string, from: Frame | null): Promise<Begun> {
-  const { lowest, highest, framing } = await getFinder(scene);
+  const [{ lowest, highest, framing }, cameras] = await Promise.all([getFinder(scene), listCameras(scene)]);
   const bounds: Bounds = { lowest: lowest as Triple, highest: highest as Triple };
-  const frame = from ?? framing;
+  const frame = from ?? cameras[0] ?? framing;
   const place = await placeAt(scene, frame, RESTING, RESTING[0] / 2, RESTING[1] / 2);
   return { bounds, first: orbitOf(frame, bounds, place), whole: orbitOf(framing, bounds) };
 }

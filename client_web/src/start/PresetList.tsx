@@ -83,7 +83,7 @@ interface Props {
   action: string;
   /** Where a size of one's own begins. */
   size?: Size;
-  /** Where a new camera begins; else where all is seen. */
+  /** Where a new camera begins; else where the scene's first one is. */
   from?: Frame | null;
   onChoose(choice: BakeChoice): void;
 }

@@ -10,7 +10,7 @@ import { attempt, note } from "../ui/toasts";
 
 interface Props {
   scene: SceneBody;
-  /** Where a new camera begins; null: where all is seen. */
+  /** Where a new camera begins; null: where the scene's first one is. */
   from: Frame | null;
   chosen: readonly string[];
   onChoose(views: string[]): void;
