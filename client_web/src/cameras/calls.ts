@@ -18,13 +18,19 @@ export async function deleteCamera(scene: string, name: string): Promise<void> {
   await request(named(scene, name), { method: "DELETE" });
 }
 
-export async function finderPicture(scene: string, frame: Frame, size: Size): Promise<Blob> {
-  return (await request(`${of(scene)}/finder`, json("POST", { ...frame, size }))).blob();
+export async function finderPicture(scene: string, { to_world, yfov }: Frame, size: Size): Promise<Blob> {
+  return (await request(`${of(scene)}/finder`, json("POST", { to_world, yfov, size }))).blob();
 }
 
 /** The place that a pixel shows; null where that is the background. */
-export async function placeAt(scene: string, frame: Frame, size: Size, x: number, y: number): Promise<Triple | null> {
-  const answer = await request(`${of(scene)}/finder/place`, json("POST", { ...frame, size, x, y }));
+export async function placeAt(
+  scene: string,
+  { to_world, yfov }: Frame,
+  size: Size,
+  x: number,
+  y: number,
+): Promise<Triple | null> {
+  const answer = await request(`${of(scene)}/finder/place`, json("POST", { to_world, yfov, size, x, y }));
   return ((await answer.json()) as PlaceBody).position as Triple | null;
 }
 
