@@ -73,7 +73,7 @@ class Finder:
         return np.asarray(np.rint(255 * srgb_encode(shown)), np.uint8).reshape(height, width, 3)
 
     def _shown(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
-        """Shade hits by their normals alone; `surface_at` finds more, and takes several times as long. (n, 3) float32"""
+        """Shade hits by their normals alone; `surface_at` finds more, and takes several times as long. (n, 3)"""
         corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
         normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
