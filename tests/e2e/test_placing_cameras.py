@@ -4,45 +4,59 @@ from __future__ import annotations
 
 import urllib.request
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from editor_page import WAIT_MS, Editor
 from editor_server import Server
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 SEEN = "canvas => canvas.toDataURL()"
 
 
 @pytest.fixture
-def dialog(editor: Editor, server: Server) -> Iterator[Locator]:
-    """The finder, opened from the bake menu, its first picture drawn."""
-    editor.page.locator(".menu > button", has_text="×").click()
-    editor.page.get_by_role("button", name="Place a camera…").click()
-    finder = editor.page.get_by_role("dialog")
-    expect(finder.locator("canvas")).to_be_visible()
-    editor.page.wait_for_function("() => document.querySelector('.finder canvas').width === 960")
-    yield finder
-    (scene,) = server.call("/api/scenes")
-    cameras = f"/api/scenes/{scene['id']}/cameras"
-    for camera in server.call(cameras):
-        if camera["is_placed"]:
-            request = urllib.request.Request(f"{server.url}{cameras}/{camera['name']}", method="DELETE")
-            urllib.request.urlopen(request, timeout=30).close()
+def scene(server: Server) -> Iterator[str]:
+    """A scene of its own, which is gone afterwards with its bakes: they would be opened instead of the others'."""
+    identity = server.call("/api/built-ins/cornell_box", {})["id"]
+    yield identity
+    request = urllib.request.Request(f"{server.url}/api/scenes/{identity}", method="DELETE")
+    urllib.request.urlopen(request, timeout=30).close()
 
 
-def moved(page: Page, canvas: Locator, before: str) -> str:
-    """Wait until the picture is another one and rests; returns it."""
+@pytest.fixture
+def page(server: Server, scene: str, browser: Browser) -> Iterator[Page]:
+    """The start page with the scene's bake dialog open, and the finder on it, its first picture drawn."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(server.url)
+    page.locator(".scene-card", has_text="Cornell box").get_by_role("button", name="Bake…").click()
+    page.get_by_role("button", name="Place a camera…").click()
+    moved(page, "")
+    yield page
+    context.close()
+    assert errors == []
+
+
+def moved(page: Page, before: str) -> str:
+    """Wait until the finder's picture is another one and rests; returns it."""
     page.wait_for_function(
-        "before => document.querySelector('.finder canvas').width === 960"
-        " && document.querySelector('.finder canvas').toDataURL() !== before",
+        """before => {
+          const canvas = document.querySelector('.finder canvas');
+          if (canvas?.width !== 960) return false;
+          const { data } = canvas.getContext('2d').getImageData(480, 360, 1, 1);
+          return data[3] === 255 && canvas.toDataURL() !== before;
+        }""",
         arg=before,
         timeout=WAIT_MS,
     )
-    return str(canvas.evaluate(SEEN))
+    return str(page.locator(".finder canvas").evaluate(SEEN))
 
 
-def test_every_gesture_moves_the_camera_twice(editor: Editor, dialog: Locator) -> None:
-    page, canvas = editor.page, dialog.locator("canvas")
+def test_every_gesture_moves_the_camera_twice(page: Page) -> None:
+    dialog = page.get_by_role("dialog")
+    canvas = dialog.locator("canvas")
     box = canvas.bounding_box()
     assert box is not None
     x, y, seen = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, str(canvas.evaluate(SEEN))
@@ -56,62 +70,60 @@ def test_every_gesture_moves_the_camera_twice(editor: Editor, dialog: Locator) -
             page.mouse.up(button=button)
             if shift:
                 page.keyboard.up("Shift")
-            seen = moved(page, canvas, seen)
+            seen = moved(page, seen)
         page.mouse.wheel(0, -120)
-        seen = moved(page, canvas, seen)
+        seen = moved(page, seen)
         page.mouse.click(x + 30, y + 20)
-        seen = moved(page, canvas, seen)
+        seen = moved(page, seen)
         for key in ("ArrowLeft", "Shift+ArrowUp", "+", "-"):
             canvas.press(key)
-            seen = moved(page, canvas, seen)
+            seen = moved(page, seen)
         for name in ("Turn right", "Turn down", "Nearer", "See everything"):
             dialog.get_by_role("button", name=name).click()
-            seen = moved(page, canvas, seen)
-        editor.drag(dialog.get_by_role("slider", name="Angle"), 0.6, 0.8)
-        seen = moved(page, canvas, seen)
+            seen = moved(page, seen)
+        Editor(page).drag(dialog.get_by_role("slider", name="Angle"), 0.6, 0.8)
+        seen = moved(page, seen)
 
 
-def test_a_camera_is_kept_baked_moved_and_deleted(editor: Editor, dialog: Locator, server: Server) -> None:
-    page, canvas = editor.page, dialog.locator("canvas")
-    seen = str(canvas.evaluate(SEEN))
+def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, scene: str) -> None:
+    dialog, views = page.get_by_role("dialog"), page.locator(".bake-views")
+    canvas, url = dialog.locator("canvas"), f"/api/scenes/{scene}/cameras"
     canvas.press("ArrowRight")
-    moved(page, canvas, seen)
     dialog.get_by_label("Name").fill("front")
     dialog.get_by_role("button", name="Keep camera").click()
     expect(dialog.get_by_role("alert")).to_contain_text("own cameras")
     dialog.get_by_label("Name").fill("Aside")
     dialog.get_by_role("button", name="Keep camera").click()
     expect(dialog).to_be_hidden()
-    menu = page.locator(".menu-body")
-    expect(menu.get_by_label("Aside", exact=True)).to_be_checked()
+    expect(views.get_by_label("Aside", exact=True)).to_be_checked()
+    before = placed(server.call(url))
 
-    (scene,) = server.call("/api/scenes")
-    url = f"/api/scenes/{scene['id']}/cameras"
-    before = next(camera for camera in server.call(url) if camera["name"] == "Aside")
-    menu.get_by_role("button", name="Move Aside").click()
-    page.wait_for_function("() => document.querySelector('.finder canvas')?.width === 960")
+    views.get_by_role("button", name="Move Aside").click()
+    seen = moved(page, "")
     canvas.press("ArrowUp")
+    moved(page, seen)
     dialog.get_by_role("button", name="Keep camera").click()
     expect(dialog).to_be_hidden()
-    after = next(camera for camera in server.call(url) if camera["name"] == "Aside")
+    views.get_by_label("front", exact=True).uncheck()  # at once: what is chosen meanwhile stays chosen
+    after = placed(server.call(url))
     assert after["to_world"] != before["to_world"]
 
-    for own in ("front", "left"):
-        menu.get_by_label(own, exact=True).uncheck()
-    queued = [bake["id"] for bake in server.call("/api/bakes")]
-    menu.get_by_role("button", name="Bake", exact=True).first.click()
-    page.wait_for_function(
-        "known => fetch('/api/bakes').then((all) => all.json())"
-        ".then((all) => all.some(({id, state}) => !known.includes(id) && state === 'ready'))",
-        arg=queued,
-        timeout=WAIT_MS,
-    )
-    editor.wait_until_exact()
-    (baked,) = [bake for bake in server.call("/api/bakes") if bake["id"] not in queued]
-    assert baked["recipe"]["cameras"] == [{key: after[key] for key in ("name", "to_world", "yfov")}]
+    views.get_by_role("button", name="Delete Aside").click()
+    expect(views.get_by_label("Aside", exact=True)).to_have_count(0)
+    expect(views.get_by_label("front", exact=True)).to_be_checked()
+    page.get_by_role("button", name="Undo", exact=True).click()
+    expect(views.get_by_label("Aside", exact=True)).to_be_checked()
+    assert placed(server.call(url)) == after
 
-    page.locator(".menu > button", has_text="×").click()
-    menu.get_by_role("button", name="Delete Aside").click()
-    expect(menu.get_by_label("Aside", exact=True)).to_have_count(0)
-    page.get_by_role("button", name="Undo", exact=True).last.click()
-    expect(menu.get_by_label("Aside", exact=True)).to_have_count(1)
+    views.get_by_label("front", exact=True).uncheck()
+    page.get_by_role("button", name="Open and bake").first.click()
+    Editor(page).wait_until_exact()
+    (bake,) = server.call(f"/api/bakes?scene={scene}")
+    assert bake["recipe"]["views"] == ["Aside"]
+    assert bake["recipe"]["cameras"] == [{key: after[key] for key in ("name", "to_world", "yfov")}]
+
+
+def placed(cameras: list[dict[str, Any]]) -> dict[str, Any]:
+    """The one that somebody placed."""
+    (camera,) = [camera for camera in cameras if camera["is_placed"]]
+    return camera

@@ -13,7 +13,8 @@ interface Props {
   /** Where a new camera begins; null: where the scene's first one is. */
   from: Frame | null;
   chosen: readonly string[];
-  onChoose(views: string[]): void;
+  /** By what is chosen by then: cameras are kept and deleted while people go on choosing. */
+  onChoose(change: (chosen: readonly string[]) => string[]): void;
 }
 
 interface Open {
@@ -25,8 +26,8 @@ interface Open {
 export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
   const [views, setViews] = useState<SceneView[]>(scene.views);
   const [open, setOpen] = useState<Open | null>(null);
-  const choose = (names: readonly string[], all: readonly SceneView[]) =>
-    onChoose(all.map((view) => view.name).filter((name) => names.includes(name)));
+  const inOrder = (names: readonly string[], all: readonly SceneView[]) =>
+    all.map((view) => view.name).filter((name) => names.includes(name));
 
   const read = async () => {
     const found = (await getScene(scene.id)).views;
@@ -35,10 +36,11 @@ export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
   };
   useEffect(() => void attempt(read), [scene.id]); // cameras may have come and gone since the scene was listed
   const toggle = (name: string) =>
-    choose(chosen.includes(name) ? chosen.filter((each) => each !== name) : [...chosen, name], views);
+    onChoose((now) => inOrder(now.includes(name) ? now.filter((each) => each !== name) : [...now, name], views));
   const kept = async (name: string) => {
     setOpen(null);
-    await attempt(async () => choose([...chosen, name], await read()));
+    const all = await attempt(read);
+    if (all !== undefined) onChoose((now) => inOrder([...now, name], all));
   };
   const move = (name: string) =>
     attempt(async () => {
@@ -50,8 +52,10 @@ export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
       const gone = (await listCameras(scene.id)).find((each) => each.name === name);
       await deleteCamera(scene.id, name);
       const left = await read();
-      const rest = chosen.filter((each) => each !== name);
-      choose(rest.length > 0 ? rest : left.slice(0, 1).map((view) => view.name), left);
+      onChoose((now) => {
+        const rest = inOrder(now, left);
+        return rest.length > 0 ? rest : left.slice(0, 1).map((view) => view.name);
+      });
       if (gone === undefined) return;
       note(`The camera “${name}” is deleted.`, {
         label: "Undo",
