@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from relume.scene.built_in import BUILT_IN
 from relume.scene.importer import import_scene
 from relume.scene.model import Scene
 from worker.executor import ONE_THREAD
+from worker.status import recipe_json
 
 _NAMES = ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")
 _PLANNED = ("peak_bytes", "num_view_samples", "store_bytes", "num_rays")
@@ -58,7 +58,7 @@ def taken(scene: Scene, recipe: Recipe) -> dict[str, Any]:
     """What a bake takes in a process of its own; see `bench.plan_process`."""
     with tempfile.TemporaryDirectory() as folder:
         save_scene(scene, folder)
-        command = [sys.executable, "-m", "bench.plan_process", folder, json.dumps(asdict(recipe))]
+        command = [sys.executable, "-m", "bench.plan_process", folder, recipe_json(recipe)]
         done = subprocess.run(command, env=os.environ | ONE_THREAD, stdout=subprocess.PIPE, check=True)
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer

@@ -1,6 +1,6 @@
 """Bakes a saved scene as a worker process does, and says what it took: `python -m bench.plan_process FOLDER RECIPE`.
 
-RECIPE is JSON with the fields of `relume.bake.Recipe`. Prints one line of JSON: bytes of memory at the most, samples
+RECIPE is JSON as `worker.status.recipe_json` writes it. Prints one line of JSON: bytes of memory at the most, samples
 of all views, rays, bytes of the store's arrays. Linux only: the system counts the memory.
 """
 
@@ -10,22 +10,20 @@ import json
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import distributed.worker  # noqa: F401  a worker process holds it too
 
-from relume.bake import Recipe, Task, Written
+from relume.bake import Task, Written
 from relume.methods.registry import METHODS
 from relume.scene.archive import load_scene
 from relume.store import bake_here, open_store
 from relume.store.publish import array_paths
+from worker.status import recipe_from_json
 
 
 def main(folder: str, recipe: str) -> None:
     """Bake, look at the store, print."""
-    fields: dict[str, Any] = json.loads(recipe)
-    wanted = Recipe(**(fields | {key: tuple(fields[key]) for key in ("views", "size")}))
-    rays = 0
+    wanted, rays = recipe_from_json(recipe), 0
 
     def count(_: Task, written: Written) -> None:
         nonlocal rays
