@@ -16,6 +16,8 @@ from editor_server import SIZE, Server
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
+pytestmark = pytest.mark.slow  # by themselves they take minutes of a browser
+
 SQUARES = {69, 92}
 
 

@@ -19,6 +19,8 @@ from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 
+pytestmark = pytest.mark.slow  # by themselves they take minutes of a browser
+
 # Of every picture that is drawn: its mean, and which shares of its pixels are red and blue. The surround is left out.
 RECORD = """() => {
   const draw = WebGL2RenderingContext.prototype.drawArrays;

@@ -7,6 +7,8 @@ from editor_page import SETTLE, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
+pytestmark = pytest.mark.slow  # by themselves they take minutes of a browser
+
 # the last is a window of 1280×800 at 200 %
 SIZES = [(1280, 800), (1024, 768), (900, 600), (640, 400)]
 # Controls that are outside the window, or outside something that does not scroll them into view.
