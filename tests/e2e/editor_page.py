@@ -16,6 +16,14 @@ SETTLE = """() => new Promise((done) => {
   const tick = () => (left-- > 0 ? requestAnimationFrame(tick) : done());
   tick();
 })"""
+# Controls that a screen reader has no word for.
+NAMELESS = """() => {
+  const controls = "button, input, select, canvas:not([aria-hidden]), a, [role=slider], [role=option], [tabindex='0']";
+  const text = (e) => [e.getAttribute("aria-label"), ...[...(e.labels ?? [])].map((l) => l.textContent), e.innerText,
+    e.querySelector?.("img[alt]:not([alt=''])")?.alt].map((t) => (t ?? "").trim()).filter(Boolean);
+  return [...document.querySelectorAll(controls)]
+    .filter((e) => e.checkVisibility() && text(e).length === 0).map((e) => e.outerHTML.slice(0, 200));
+}"""
 
 
 class Editor:

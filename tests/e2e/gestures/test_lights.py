@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from editor_page import Editor, changed
+from editor_page import Editor, NAMELESS, changed
 from playwright.sync_api import Locator, expect
-from test_accessibility import NAMELESS
 
 ON_THE_FLOOR = (0.5, 0.85)
 

@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from editor_page import WAIT_MS, Editor
+from editor_page import Editor, NAMELESS, WAIT_MS
 from editor_server import Server
 from playwright.sync_api import Browser, Page
 
-NAMELESS = """() => {
-  const controls = "button, input, select, canvas:not([aria-hidden]), a, [role=slider], [role=option], [tabindex='0']";
-  const text = (e) => [e.getAttribute("aria-label"), ...[...(e.labels ?? [])].map((l) => l.textContent), e.innerText,
-    e.querySelector?.("img[alt]:not([alt=''])")?.alt].map((t) => (t ?? "").trim()).filter(Boolean);
-  return [...document.querySelectorAll(controls)]
-    .filter((e) => e.checkVisibility() && text(e).length === 0).map((e) => e.outerHTML.slice(0, 200));
-}"""
 FOCUSED = """() => {
   const e = document.activeElement;
   if (e === null || e === document.body) return null;
