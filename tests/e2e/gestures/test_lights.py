@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from editor_page import Editor, NAMELESS, changed
+from editor_page import NAMELESS, Editor, changed
 from playwright.sync_api import Locator, expect
 
 ON_THE_FLOOR = (0.5, 0.85)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from editor_page import Editor, NAMELESS, WAIT_MS
+from editor_page import NAMELESS, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Page
 
