@@ -15,6 +15,7 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 from zarr.codecs import Crc32cCodec, ZstdCodec
+from zarr.errors import ContainsGroupError
 from zarr.storage import LocalStore
 
 from relume.bake import ArraySpec
@@ -54,7 +55,7 @@ class StoreWriter:
             return
         parent, _, _ = spec.path.rpartition("/")
         if parent:
-            self._root.require_group(parent)
+            self._require_group(parent)
         self._root.create_array(
             spec.path,
             shape=spec.shape,
@@ -67,6 +68,13 @@ class StoreWriter:
             overwrite=True,
             config={"write_empty_chunks": True},
         )
+
+    def _require_group(self, path: str) -> None:
+        """Have a group, which another process may make at the same moment."""
+        try:
+            self._root.require_group(path)
+        except ContainsGroupError:
+            self._root.require_group(path)
 
     def write(self, path: str, rows: NDArray[Any], start: int = 0) -> None:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.

@@ -208,7 +208,7 @@ def hear_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-LONG = ["bake", "quad", "--size", "480x360", "--lights", "200"]  # long enough for a cluster to start
+LONG = ["bake", "quad", "--size", "320x240", "--lights", "200"]  # long enough for a cluster to start
 
 
 def wait_for_state(data: Path, state: str) -> None:
