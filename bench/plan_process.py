@@ -34,7 +34,9 @@ def main(folder: str, recipe: str) -> None:
         store = bake_here(METHODS[wanted.method], scene, wanted, Path(target) / "s.zarr", count)
         peak_bytes = _peak_bytes()
         reader = open_store(store)
-        samples = sum(reader.shape(f"views/{k}/pixel")[0] for k in range(len(wanted.views)))
+        of_views = [f"views/{k}/pixel" for k in range(len(wanted.views))]
+        of_method = ["points/material"] if wanted.method == "surface" else of_views
+        samples = sum(reader.shape(path)[0] for path in of_method)
         store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
     print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))
 

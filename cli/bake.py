@@ -32,6 +32,9 @@ def bake(
     ] = None,
     size: Size = None,
     lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: 2000]")] = None,
+    points: Annotated[
+        int | None, typer.Option(metavar="N", help="Points of a moving view, method surface. [default: 50000]")
+    ] = None,
     relightable: Annotated[
         bool, typer.Option("--relightable", help="Divide the light so that the environment can be turned or exchanged.")
     ] = False,
@@ -54,7 +57,7 @@ def bake(
     try:
         record = find_scene(service.ledger, scene)
         views = chosen_views(service.ledger, record, [*(view or ()), *(read_camera(path) for path in camera or ())])
-        identity = service.submit(record.id, _recipe(method, views, size, lights, relightable))
+        identity = service.submit(record.id, _recipe(method, views, size, lights, points, relightable))
         if not watch:
             typer.echo(identity)
             return 0
@@ -63,16 +66,20 @@ def bake(
         service.close()
 
 
-def _recipe(method: str, views: Views, size: str | None, lights: int | None, relightable: bool) -> Recipe:
+def _recipe(
+    method: str, views: Views, size: str | None, lights: int | None, points: int | None, relightable: bool
+) -> Recipe:
     from relume.bake import Recipe
     from relume.errors import ParameterError
     from worker.presets import PRESETS
 
     if lights is not None and lights < 1:
         raise ParameterError("--lights", lights, "a number of at least 1")
+    if points is not None and points < 1:
+        raise ParameterError("--points", points, "a number of at least 1")
     preset, (names, cameras) = PRESETS["good"], views
     pixels = parse_size(size) if size else preset.size
-    return Recipe(method, names, pixels, lights or preset.num_lights, relightable, cameras)
+    return Recipe(method, names, pixels, lights or preset.num_lights, relightable, cameras, points or Recipe.num_points)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:

@@ -27,7 +27,7 @@ def render(
     from relume.errors import ParameterError
     from relume.exr.attributes import Origin
     from relume.memory import Memory
-    from relume.methods.registry import open_transfer
+    from relume.methods.registry import open_bake
     from relume.render.image import render_image
 
     check_output(output)
@@ -39,7 +39,7 @@ def render(
     try:
         record = find_scene(service.ledger, scene)
         bake, view_name = find_bake(service, record, view)
-        transfer = open_transfer(service.store_path(bake.id), Memory(4 << 30))
+        transfer = open_bake(service.store_path(bake.id), Memory(4 << 30))
         if not bake.is_current:
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
         document = complete_look(partial, transfer.default_look)

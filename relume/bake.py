@@ -29,6 +29,7 @@ class Recipe:
         num_lights: triangles that the environment is divided into.
         relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
         cameras: those of `views` that somebody placed; the others came with the scene.
+        num_points: that light is kept at for an eye that moves; methods of fixed views have none.
     """
 
     method: str
@@ -37,6 +38,7 @@ class Recipe:
     num_lights: int
     relightable: bool = False
     cameras: tuple[PlacedCamera, ...] = ()
+    num_points: int = 50_000
 
     def seen(self, scene: Scene) -> Scene:
         """The scene with the cameras that this recipe brings: what its method plans and bakes."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from relume.bake import Recipe
 from relume.brdf.registry import TERMS
@@ -16,7 +17,9 @@ from relume.brdf.sweep import moved_curves
 from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
 from relume.memory import Memory
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.moving_views import MovingViews
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.picture import MovingPicture
 from relume.picture.picture import Picture
 from relume.picture.transfer import Transfer
 from relume.scene.archive import load_scene, save_scene
@@ -38,9 +41,12 @@ def warm() -> None:
         scene = load_scene(folder / "scene")  # as the worker has it
         for method in METHODS.values():
             recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS)
-            transfer = open_transfer(
+            transfer: Any = open_bake(
                 bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES)
             )
+            if isinstance(transfer, MovingViews):
+                _move_eyes(transfer, MovingPicture(transfer, recipe.views[0]))
+                continue
             _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
             _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
 
@@ -69,6 +75,15 @@ def _move_lights(transfer: Transfer, picture: Picture) -> None:
             partial = {"lights": {"Lamp": {"kind": kind, "scale": height, **geometry}}}
             picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
             _show(picture)
+
+
+def _move_eyes(transfer: MovingViews, picture: MovingPicture) -> None:
+    """See what a moving eye sees: the kernels are the same whatever the terms and the lights."""
+    partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
+    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    picture.advance(None)
+    for form in ("rgb9e5", "f32"):
+        picture.encode(picture.all_tiles(), form)
 
 
 def _show(picture: Picture) -> None:

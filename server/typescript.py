@@ -35,6 +35,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.ProbeMessage,
     protocol.BrushMessage,
     protocol.TouchMessage,
+    protocol.EyeMessage,
 )
 SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,

@@ -109,6 +109,7 @@ def recipe_from_json(text: str) -> Recipe:
         int(document["num_lights"]),
         bool(document["relightable"]),
         tuple(read_placed(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
+        int(document.get("num_points", Recipe.num_points)),
     )
 
 

@@ -15,7 +15,7 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `relightable`: divide the light so that turning or exchanging the environment errs little. */
+/** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none. `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
   method?: string;
@@ -23,6 +23,7 @@ export interface BakeRequest {
   preset?: "preview" | "good" | "final" | null;
   size?: [number, number] | null;
   lights?: number | null;
+  points?: number | null;
   relightable?: boolean;
   dry_run?: boolean;
 }
@@ -49,6 +50,18 @@ export interface EditMessage {
   patch: PatchOperation[];
   hand?: string | null;
   solo?: string[] | null;
+}
+
+/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "stay", a moving picture is not replaced when the eye rests. */
+export interface EyeMessage {
+  type: "eye";
+  view: string;
+  eye: number;
+  to_world: number[];
+  yfov: number;
+  size: [number, number];
+  hand?: string | null;
+  rest?: "stay";
 }
 
 /** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
@@ -240,7 +253,7 @@ export interface FinderBody {
   framing: CameraFrame;
 }
 
-/** Header of a binary frame. */
+/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -254,6 +267,7 @@ export interface FrameHeader {
   complete: boolean;
   kind: "picture" | "brush";
   alpha: boolean;
+  eye: number | null;
   ms: FrameTimes;
 }
 
@@ -402,6 +416,7 @@ export interface RecipeBody {
   views: string[];
   size: [number, number];
   lights: number;
+  points: number;
   relightable: boolean;
   cameras: CameraBody[];
 }
@@ -521,13 +536,14 @@ export interface TruthPlanBody {
   seconds: number;
 }
 
-/** A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. */
+/** A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. Then `bounds` are the lowest and the highest corner of what there is to see, metres. */
 export interface ViewInfo {
   name: string;
   width: number;
   height: number;
   camera: CameraInfo;
   eye: "baked" | "free";
+  bounds: [number[], number[]] | null;
 }
 
 export type ClientMessage =
@@ -539,7 +555,8 @@ export type ClientMessage =
   | StreamMessage
   | ProbeMessage
   | BrushMessage
-  | TouchMessage;
+  | TouchMessage
+  | EyeMessage;
 
 export type ServerMessage =
   | HelloMessage

@@ -16,6 +16,7 @@ export function onePixel(view: string, complete: boolean, at = 0, width = 1): Fr
       complete,
       kind: "picture",
       alpha: false,
+  eye: null,
       ms: { wait: 0, update: 0, encode: 0 },
     },
     payload: new Uint8Array(new Uint32Array([at]).buffer),

@@ -17,6 +17,7 @@ const camera = cameraOf({
   width: 200,
   height: 100,
   eye: "baked",
+  bounds: null,
   camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2 },
 });
 const close = (a: readonly number[], b: readonly number[]) => a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from relume.bake import BakeMethod, StoreReader
 from relume.memory import Memory
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 
 
 class TransferMethod(BakeMethod, Protocol):
@@ -16,7 +16,7 @@ class TransferMethod(BakeMethod, Protocol):
     line in `relume.methods.registry`, and inherits the contract suite in tests/contract.
     """
 
-    def open(self, store: StoreReader, key: str, memory: Memory) -> Transfer:
+    def open(self, store: StoreReader, key: str, memory: Memory) -> Opened:
         """A store of this method, opened for freezing and frames.
 
         Args:

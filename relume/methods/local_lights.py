@@ -52,20 +52,23 @@ class LocalLights:
         self._store, self._memory, self._key = store, memory, key
 
     @cached_property
-    def _positions(self) -> F32:
+    def positions(self) -> F32:
+        """Corners of the scene's triangles. (num_vertices, 3) float32"""
         return np.asarray(self._store.read("scene/positions"), np.float32)
 
     @cached_property
-    def _faces(self) -> NDArray[np.uint32]:
+    def faces(self) -> NDArray[np.uint32]:
+        """The triangles. (num_faces, 3) uint32"""
         return np.asarray(self._store.read("scene/faces"), np.uint32)
 
     @cached_property
-    def _embree(self) -> EmbreeScene:
-        return EmbreeScene.build(self._positions, self._faces)
+    def embree(self) -> EmbreeScene:
+        """Their search tree."""
+        return EmbreeScene.build(self.positions, self.faces)
 
     @cached_property
     def _off_surface(self) -> float:
-        return off_surface(self._positions)
+        return off_surface(self.positions)
 
     def all_rays(
         self,
@@ -95,7 +98,7 @@ class LocalLights:
     def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
         """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
         pattern = pattern_of(geometry, PREVIEW_SAMPLES)
-        return preview_light(self._embree, self._off_surface, self._light(geometry), pattern, points)
+        return preview_light(self.embree, self._off_surface, self._light(geometry), pattern, points)
 
     def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
         """Make rays of a previewed light, for terms that ask where light comes from. seen: `PreviewLight.visible`"""
@@ -144,11 +147,11 @@ class LocalLights:
         """
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)
-        return is_front(self._embree, self._positions, self._faces, eye, position)
+        return is_front(self.embree, self.positions, self.faces, eye, position)
 
     def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
         light, pattern = self._light(geometry), pattern_of(geometry, num_samples)
-        return trace_local(self._embree, self._off_surface, light, pattern, points)
+        return trace_local(self.embree, self._off_surface, light, pattern, points)
 
     def _light(self, geometry: LightGeometry) -> LocalLight:
         return self._memory.keep((self._key, "local light", geometry), lambda: self._make(geometry))
@@ -157,8 +160,8 @@ class LocalLights:
         if geometry.kind != "mesh":
             return make_local(geometry)
         material = list(self._store.attributes["materials"]).index(geometry.material)
-        faces = self._faces[self._store.read("scene/face_material") == material]
-        return make_local(geometry, Triangles(self._positions[faces], self._is_two_sided(material)))
+        faces = self.faces[self._store.read("scene/face_material") == material]
+        return make_local(geometry, Triangles(self.positions[faces], self._is_two_sided(material)))
 
     def _is_two_sided(self, material: int) -> bool:
         return bool(self._store.attributes["double_sided"][material])

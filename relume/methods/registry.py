@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 from relume.errors import StoreError
 from relume.memory import Memory
 from relume.methods.base import TransferMethod
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
-from relume.picture.transfer import Transfer
+from relume.methods.surface import SurfaceMethod
+from relume.picture.transfer import Eyes, Opened, Transfer
 from relume.store import open_store
 
-METHODS: dict[str, TransferMethod] = {method.name: method for method in (DirectMethod(), GatherMethod())}
+METHODS: dict[str, TransferMethod] = {
+    method.name: method for method in (DirectMethod(), GatherMethod(), SurfaceMethod())
+}
 
 
-def open_transfer(path: Path, memory: Memory) -> Transfer:
+def open_bake(path: Path, memory: Memory) -> Opened:
     """Open a published store by the method that baked it.
 
     Args:
@@ -28,3 +32,17 @@ def open_transfer(path: Path, memory: Memory) -> Transfer:
     if method is None:
         raise StoreError(f"no method of this version bakes like {path.name}; delete the bake, bake again")
     return method.open(store, str(path.resolve()), memory)
+
+
+def open_transfer(path: Path, memory: Memory) -> Transfer:
+    """Open a published store of fixed views.
+
+    Args:
+        memory: of all that is made from the bake and may be made again.
+    Raises:
+        StoreError: its eyes move. Else as `open_bake`.
+    """
+    opened = open_bake(path, memory)
+    if opened.eyes is not Eyes.BAKED:
+        raise StoreError(f"{path.name} has no fixed views; bake the scene by another method")
+    return cast("Transfer", opened)

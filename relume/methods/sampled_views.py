@@ -142,7 +142,7 @@ class SampledViews:
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
-            return Written({**self._lights(scene, recipe), **self._triangles(scene)}, 0, 0.0)
+            return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene))}, 0, 0.0)
         samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
         points = samples.surface.points
         arrays: dict[str, NDArray[Any]] = {
@@ -152,23 +152,6 @@ class SampledViews:
         }  # fmt: skip
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
-
-    @staticmethod
-    def _lights(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
-        radiance = scene.environment.radiance
-        tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
-        lights = weigh(tiles, radiance)
-        return {
-            "lights/nodes": lights.nodes,
-            "lights/direction": lights.direction,
-            "lights/power": lights.irradiance,
-            "lights/tiles": tiles.codes,
-            "lights/environment": radiance,
-        }
-
-    def _triangles(self, scene: Scene) -> dict[str, NDArray[Any]]:
-        geometry = self.geometry_of(scene)
-        return {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         prefix = f"views/{k}"
@@ -192,14 +175,34 @@ class SampledViews:
             if self._sampled is None or self._sampled.store is not store:
                 views = range(len(store.attributes["views"]))
                 rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
-                self._sampled = Sampled(store, _targets(store), rows)
+                self._sampled = Sampled(store, read_targets(store), rows)
             return self._sampled
+
+
+def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+    """The light triangles of a scene's environment, as arrays of a store."""
+    radiance = scene.environment.radiance
+    tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
+    lights = weigh(tiles, radiance)
+    return {
+        "lights/nodes": lights.nodes,
+        "lights/direction": lights.direction,
+        "lights/power": lights.irradiance,
+        "lights/tiles": tiles.codes,
+        "lights/environment": radiance,
+    }
+
+
+def triangles_of(geometry: Geometry) -> dict[str, NDArray[Any]]:
+    """A scene's triangles, as arrays of a store."""
+    return {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+
+
+def read_targets(store: StoreReader) -> Targets:
+    """What shadow rays of a store are sent to."""
+    return targets_of(read_traced_directions(store), read_lights(store).irradiance)
 
 
 def _described(camera: Camera) -> dict[str, Any]:
     """A view among a store's attributes."""
     return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
-
-
-def _targets(store: StoreReader) -> Targets:
-    return targets_of(read_traced_directions(store), read_lights(store).irradiance)

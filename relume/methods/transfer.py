@@ -197,9 +197,12 @@ class BakedViews:
 
     def seen_in(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
         """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3) float32"""
-        name = environment.map
-        radiance = self._blurred(name, blur) if blur else self.radiance_of(name)
+        radiance = self.map_of(environment.map, blur)
         return lookup(radiance, turned(directions, -environment.rotation).astype(np.float32))
+
+    def map_of(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        return self._blurred(name, blur) if blur else self.radiance_of(name)
 
     def _blurred(self, name: str | None, degrees: float) -> F32:
         owner = self._owner_of(name)
@@ -301,6 +304,19 @@ def described(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
     Raises:
         StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
     """
+    fields = described_light(store, key, memory)
+    views = (open_view(store, k, memory, key) for k in range(len(store.attributes["views"])))
+    return {**fields, "views": {view.name: view for view in views}}
+
+
+def described_light(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
+    """Those of them that light needs: no views.
+
+    Args:
+        store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+    Raises:
+        StoreError: its description is not of this form.
+    """
     found = store.attributes
     try:
         return {
@@ -312,7 +328,7 @@ def described(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
             "num_lights": found["num_lights"],
             "default_look": complete({}, found["look"]),
             "material_names": tuple(found["materials"]),
-            "views": {view["name"]: open_view(store, k, memory, key) for k, view in enumerate(found["views"])},
+            "views": {},
         }
     except (KeyError, TypeError, IndexError, ParameterError) as error:
         raise StoreError(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.picture.light import Light, Source
     from relume.points import Points
     from relume.project.receivers import LocalRays, Receivers
+    from relume.scene.model import Camera
     from relume.trace.preview_light import PreviewLight
     from relume.views.view import View
 
@@ -88,23 +89,33 @@ class Local(Protocol):
         ...
 
 
-class Transfer(Protocol):
-    """One opened bake, shared by all its pictures.
+class AnyView(Protocol):
+    """What is seen from a camera: where it is, or where it begins if it moves; and its size in pixels."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+
+
+class Opened(Protocol):
+    """One opened bake, shared by all its pictures, whether their eyes move or not.
 
     Attributes:
         memory: of all that is made from the bake and may be made again.
         key: tells what is made from this bake from what is made from others in the memory.
-        default_look: the complete look of the scene as it was imported. derived, edited: images of it, and of others.
+        default_look: the complete look of the scene as it was imported.
         eyes, axes: what its pictures can do; nobody asks for the method's name.
-        reflected: light between surfaces; None where none was baked.
     """
 
     @property
     def memory(self) -> Memory: ...
     @property
     def key(self) -> str: ...
-    @property
-    def store(self) -> StoreReader: ...
     @property
     def scene_id(self) -> str: ...
     @property
@@ -114,11 +125,28 @@ class Transfer(Protocol):
     @property
     def material_names(self) -> Sequence[str]: ...
     @property
-    def views(self) -> Mapping[str, View]: ...
+    def views(self) -> Mapping[str, AnyView]: ...
     @property
     def eyes(self) -> Eyes: ...
     @property
     def axes(self) -> frozenset[Axis]: ...
+    def radiance_of(self, name: str | None) -> F32:
+        """Radiance of an environment, None for the scene's own. (height, width, 3)"""
+        ...
+
+
+class Transfer(Opened, Protocol):
+    """One opened bake of fixed views.
+
+    Attributes:
+        derived, edited: images of the look that the scene was imported with, and of others.
+        reflected: light between surfaces; None where none was baked.
+    """
+
+    @property
+    def store(self) -> StoreReader: ...
+    @property
+    def views(self) -> Mapping[str, View]: ...
     @property
     def derived(self) -> ImageFiles: ...
     @property
@@ -157,10 +185,6 @@ class Transfer(Protocol):
 
     def shines_at(self, view: View, material: int) -> NDArray[np.bool_]:
         """Whether the samples of a material that shines are seen from a side that does."""
-        ...
-
-    def radiance_of(self, name: str | None) -> F32:
-        """Radiance of an environment, None for the scene's own. (height, width, 3)"""
         ...
 
     def background_in(self, environment: EnvironmentKey, view: View) -> F32:

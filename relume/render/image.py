@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import CancelledError, PlanError
 from relume.look import Look
+from relume.methods.moving_views import MovingViews
+from relume.moving.picture import MovingPicture
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened, Transfer
 
 
 def render_image(
-    transfer: Transfer,
+    transfer: Opened,
     view_name: str,
     look: Look,
     size: tuple[int, int] | None = None,
@@ -25,9 +28,11 @@ def render_image(
 ) -> NDArray[np.float32]:
     """Render a look exactly; what is made for it is kept in passing in the memory that the bake was opened with.
 
+    Where the bake's eyes move it is as true as the picture from there is.
+
     Args:
         transfer: an opened bake. view_name: one of its views.
-        size: width and height; only the baked one is possible, None means it.
+        size: width and height; None means the baked one, and none else is possible where the view is fixed.
         progress: called with about the share done. cancelled: asked now and then.
         for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
     Returns:
@@ -37,10 +42,13 @@ def render_image(
         PlanError: another size than the baked one.
         CancelledError: `cancelled` said so.
     """
-    view = transfer.views[view_name]
+    if isinstance(transfer, MovingViews):
+        return _moving_image(transfer, view_name, look, size)
+    fixed = cast("Transfer", transfer)
+    view = fixed.views[view_name]
     if size is not None and tuple(size) != (view.width, view.height):
         raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
-    picture = Picture(transfer, view_name, transfer.memory.passing)
+    picture = Picture(fixed, view_name, fixed.memory.passing)
     picture.set_look(look)
     num_terms, made = sum(len(material.terms) for material in look.materials.values()), 0
     while True:
@@ -59,7 +67,7 @@ def render_image(
         made += 1
 
 
-def render_small(transfer: Transfer, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
+def render_small(transfer: Opened, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
     """Render a look at no more pixels than a small picture needs: whole steps of the baked ones are left out.
 
     Args:
@@ -68,5 +76,20 @@ def render_small(transfer: Transfer, view_name: str, look: Look, width: int) -> 
     Returns:
         Linear radiance, at least `width` wide where the bake is. (h, w, 3) float32
     """
-    step = transfer.views[view_name].width // width
-    return render_image(transfer if step < 2 else transfer.thinned(view_name, step), view_name, look)
+    view = transfer.views[view_name]
+    step = max(1, view.width // width)
+    if isinstance(transfer, MovingViews):
+        return _moving_image(transfer, view_name, look, (view.width // step, max(1, view.height // step)))
+    return render_image(transfer if step < 2 else cast("Transfer", transfer).thinned(view_name, step), view_name, look)
+
+
+def _moving_image(
+    transfer: MovingViews, view_name: str, look: Look, size: tuple[int, int] | None
+) -> NDArray[np.float32]:
+    """What is seen from where the eye of a view begins. (height, width, 3) float32"""
+    picture = MovingPicture(transfer, view_name)
+    picture.set_look(look)
+    if size is not None:
+        picture.set_eye(transfer.views[view_name].camera, size)
+    picture.advance(None)
+    return picture.image()

@@ -93,7 +93,17 @@ def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: Ar
     Raises:
         ParameterError: another format.
     """
-    pixels = resolve(view, radiance, tiles, gain)
+    return encode_pixels(resolve(view, radiance, tiles, gain), form)
+
+
+def encode_pixels(pixels: F32, form: str) -> bytes:
+    """Encode pixels as a frame's payload.
+
+    Args:
+        pixels: radiance. (n, 3) float32. form: "rgb9e5" or "f32" (see docs/api.md).
+    Raises:
+        ParameterError: another format.
+    """
     if form == "f32":
         return pixels.tobytes()
     if form != "rgb9e5":

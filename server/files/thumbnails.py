@@ -10,7 +10,7 @@ from relume import look as looks
 from relume.code_version import image_code
 from relume.imageio import write_image
 from relume.imageio.shrink import shrink
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
@@ -39,7 +39,7 @@ class Thumbnails:
                 await asyncio.get_running_loop().run_in_executor(self.threads.long, self._paint, transfer, path)
         return path
 
-    def _paint(self, transfer: Transfer, path: Path) -> None:
+    def _paint(self, transfer: Opened, path: Path) -> None:
         if path.exists():  # somebody else asked at the same time
             return
         view = next(iter(transfer.views.values()))

@@ -20,8 +20,10 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     # Imported here because they load compiled kernels, which a process that only describes the API can do without.
     from relume.code_version import image_code
     from relume.memory import Memory
-    from relume.methods.registry import open_transfer
+    from relume.methods.registry import open_bake
+    from relume.moving.picture import MovingPicture
     from relume.picture.picture import Picture
+    from relume.picture.transfer import Eyes
     from relume.reference import reference_image
     from relume.render.finder import Finder
     from relume.render.image import render_image, render_small
@@ -34,12 +36,16 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     def finder(scene: Path) -> Finder:
         return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(scene)))
 
+    def picture(transfer: Any, view: str) -> Any:
+        moves = transfer.eyes is Eyes.FREE
+        return MovingPicture(transfer, view) if moves else Picture(transfer, view, memory, is_watched=True)
+
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)
     return Library(
-        open_transfer=lambda path: open_transfer(path, memory),
-        open_in_passing=lambda path: open_transfer(path, memory.passing),
-        make_picture=lambda transfer, view: Picture(transfer, view, memory, is_watched=True),
+        open_transfer=lambda path: open_bake(path, memory),
+        open_in_passing=lambda path: open_bake(path, memory.passing),
+        make_picture=picture,
         render=render_image,
         render_small=render_small,
         reference=reference,

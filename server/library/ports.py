@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.memory import Holder
 from relume.picture.fidelity import Word
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 
 if TYPE_CHECKING:
     from relume.picture.jobs import Job
@@ -57,6 +57,12 @@ class Picture(Protocol):
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
 
 
+class MovingPicture(Picture, Protocol):
+    """One whose eye moves."""
+
+    def set_eye(self, camera: Camera, size: tuple[int, int]) -> None: ...
+
+
 class Finder(Protocol):
     """A scene as cameras are placed in it; see `relume.render.finder`."""
 
@@ -91,8 +97,8 @@ class Library:
         shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
     """
 
-    open_transfer: Callable[[Path], Transfer]
-    open_in_passing: Callable[[Path], Transfer]
+    open_transfer: Callable[[Path], Opened]
+    open_in_passing: Callable[[Path], Opened]
     make_picture: Callable[[Any, str], Picture]
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 
 MAX_IDLE = 2
 
@@ -18,7 +18,7 @@ MAX_IDLE = 2
 @dataclass
 class _Entry:
     path: Path
-    future: asyncio.Future[Transfer]
+    future: asyncio.Future[Opened]
     num_users: int = 0
 
 
@@ -30,7 +30,7 @@ class TransferPool:
 
     def __init__(
         self,
-        open_transfer: Callable[[Path], Transfer],
+        open_transfer: Callable[[Path], Opened],
         executor: Executor,
         idle_s: float,
         clock: Callable[[], float],
@@ -45,7 +45,7 @@ class TransferPool:
         self._left_s: dict[Path, float] = {}  # when somebody left it last
 
     @asynccontextmanager
-    async def using(self, bake: str, path: Path) -> AsyncIterator[Transfer]:
+    async def using(self, bake: str, path: Path) -> AsyncIterator[Opened]:
         """The transfer of a bake for as long as the block runs. Raises what opening raises (StoreError)."""
         entry = self._entries.get(bake)
         if entry is None:
@@ -64,7 +64,7 @@ class TransferPool:
             self._trim(bake, entry)
 
     @property
-    def opened(self) -> list[Transfer]:
+    def opened(self) -> list[Opened]:
         """Those that are open now; may be asked from any thread."""
         futures = [entry.future for entry in list(self._entries.values()) if entry.future.done()]
         return [future.result() for future in futures if not future.cancelled() and future.exception() is None]

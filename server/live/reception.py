@@ -6,16 +6,22 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import ParameterError, ProtocolError, RelumeError
+from relume.picture.transfer import Eyes
+from relume.scene.checks import check_camera
+from relume.scene.model import Camera
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.session_state import SessionState
+from server.live.state.target import Eye
 from server.wire import protocol
 
 MAX_BAD_MESSAGES = 50
+MAX_EYE_PIXELS = 1920 * 1200
 
 
 class Reception:
@@ -82,6 +88,8 @@ class Reception:
                 self._pending.brush = message
             case protocol.TouchMessage():
                 self._touch(message)
+            case protocol.EyeMessage():
+                self._see_from(message, received_s)
 
     def _touch(self, message: protocol.TouchMessage) -> None:
         if message.curve is not None:
@@ -99,10 +107,27 @@ class Reception:
             raise
         self._metrics.edits.labels("applied").inc()
 
+    def _see_from(self, message: protocol.EyeMessage, received_s: float) -> None:
+        """Take note of an eye; a number that is not newer than the last says nothing."""
+        if self._transfer.eyes is not Eyes.FREE:
+            raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method surface")
+        self._check_view(message.view)
+        width, height = message.size
+        if not (width >= 1 and height >= 1 and width * height <= MAX_EYE_PIXELS):
+            raise ParameterError("size", list(message.size), f"at least 1×1 pixels, at most {MAX_EYE_PIXELS} in all")
+        camera = Camera(message.view, np.array(message.to_world, np.float64).reshape(4, 4), message.yfov)
+        check_camera(camera)
+        known = self._pending.eyes.get(message.view)
+        if known is None or message.eye > known.number:
+            self._pending.eyes[message.view] = Eye(message.eye, camera, message.size, received_s)
+
+    def _check_view(self, name: str) -> None:
+        if name not in self._transfer.views:
+            raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+
     def _show(self, names: Sequence[str], space: tuple[int, int] | None) -> None:
         for name in names:
-            if name not in self._transfer.views:
-                raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+            self._check_view(name)
         self._shown.show(names)
         self._pending.space = space
 

@@ -8,12 +8,12 @@ import secrets
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import RelumeError
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import AnyView, Eyes, Opened
 from server.errors import close_code_of, problem_of
 from server.library.ports import Library
 from server.library.threads import Threads
@@ -31,7 +31,7 @@ from server.metrics import Metrics
 from server.wire.protocol import CameraInfo, HelloMessage, ViewInfo
 
 if TYPE_CHECKING:
-    from relume.views.view import View
+    from relume.moving.view import FreeView
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ class SessionServices:
 
 
 async def serve(
-    services: SessionServices, websocket: WebSocket, bake: str, transfer: Transfer, resume: str | None
+    services: SessionServices, websocket: WebSocket, bake: str, transfer: Opened, resume: str | None
 ) -> None:
     """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
     kept = services.resumes.take(resume, bake, time.monotonic()) if resume else None
@@ -77,10 +77,8 @@ async def serve(
         services.resumes.close(token, time.monotonic())
 
 
-def _hello(
-    bake: str, transfer: Transfer, look: LookState, shown: ShownViews, token: str, resumed: bool
-) -> HelloMessage:
-    views = [_view_info(view, transfer.eyes.value) for view in transfer.views.values()]
+def _hello(bake: str, transfer: Opened, look: LookState, shown: ShownViews, token: str, resumed: bool) -> HelloMessage:
+    views = [_view_info(view, transfer) for view in transfer.views.values()]
     return HelloMessage(
         session=secrets.token_hex(8),
         bake=bake,
@@ -99,9 +97,14 @@ def _hello(
     )
 
 
-def _view_info(view: View, eye: Any) -> ViewInfo:
+def _view_info(view: AnyView, transfer: Opened) -> ViewInfo:
     camera = CameraInfo(to_world=view.camera.to_world.ravel().tolist(), yfov=view.camera.yfov)
-    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera, eye=eye)
+    bounds = None
+    if transfer.eyes is Eyes.FREE:
+        lowest, highest = cast("FreeView", view).bounds
+        bounds = lowest.tolist(), highest.tolist()
+    eye = transfer.eyes.value
+    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera, eye=eye, bounds=bounds)
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:

@@ -21,7 +21,7 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume import look as looks
 from relume.code_version import truth_code
 from relume.imageio import write_image
-from relume.picture.transfer import Axis, Transfer
+from relume.picture.transfer import Axis, Opened
 from relume.reference.truth import Comparison, Estimate, compare, error_map
 from relume.replacing import replacing
 from server.errors import BusyError
@@ -62,7 +62,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         """As passes of this view took before."""
         return self._pass_s.get((request.bake, request.view))
 
-    def seconds(self, request: TruthRequest, transfer: Transfer) -> float:
+    def seconds(self, request: TruthRequest, transfer: Opened) -> float:
         """What a comparison will take: as passes of this view took before, or as a small picture takes now.
 
         Raises:
@@ -79,7 +79,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
                 self._sampling.release()
         return request.passes * self._pass_s[key]
 
-    def _sampled_pass(self, request: TruthRequest, transfer: Transfer) -> float:
+    def _sampled_pass(self, request: TruthRequest, transfer: Opened) -> float:
         """Seconds of a pass, by one of a small picture."""
         look = looks.validate(request.look, transfer.default_look).on_the_map()
         view = transfer.views[request.view]
@@ -123,7 +123,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
             self._pass_s[request.bake, request.view] = timer.next_step()
 
     def _pass(
-        self, transfer: Transfer, view: str, look: Any, size: tuple[int, int], index: int, tell: Any, is_stopped: Any
+        self, transfer: Opened, view: str, look: Any, size: tuple[int, int], index: int, tell: Any, is_stopped: Any
     ) -> F32:
         return self._library.reference(
             scene_path(self._data, transfer.scene_id), transfer.views[view].camera, look, size, SPP, tell, is_stopped,

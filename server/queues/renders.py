@@ -16,7 +16,7 @@ from relume.exr.layers import layers_of
 from relume.exr.picture import Progress, export_exr
 from relume.imageio import write_image
 from relume.imageio.shrink import shrink
-from relume.picture.transfer import Axis, Transfer
+from relume.picture.transfer import Axis, Opened
 from relume.replacing import replacing
 from server.files.downloads import safe_stem
 from server.library.ports import F32, Library
@@ -81,7 +81,7 @@ class RenderQueue(WorkQueue[RenderRequest]):
         self._pack(work)
 
     def _paint_frame(
-        self, transfer: Transfer, work: Render, index: int, partial: dict[str, Any], tell: Progress
+        self, transfer: Opened, work: Render, index: int, partial: dict[str, Any], tell: Progress
     ) -> None:
         path, request = self.frame_path(work, index), work.request
         if path.exists():
@@ -101,7 +101,7 @@ class RenderQueue(WorkQueue[RenderRequest]):
             write_image(path, render(look, tell), look.display.exposure, look.display.tone_map)
 
     def _export(
-        self, path: Path, render: Any, look: Any, transfer: Transfer, request: RenderRequest, progress: Progress
+        self, path: Path, render: Any, look: Any, transfer: Opened, request: RenderRequest, progress: Progress
     ) -> None:
         view = transfer.views[request.view]
         layers = layers_of(look, reflects=Axis.BOUNCES in transfer.axes) if request.layers else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
-from typing import Annotated
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
@@ -16,6 +16,7 @@ from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError
 from relume.imageio import png_bytes
+from relume.picture.transfer import Eyes, Transfer
 from relume.scene.placed_camera import placed_camera
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
@@ -94,7 +95,10 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
         if view not in transfer.views:
             raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
-        png = await run_in_threadpool(lambda: png_bytes(transfer.views[view].material_ids()))
+        if transfer.eyes is Eyes.FREE:
+            raise NotFoundError(f"the eye of view {view[:80]!r} moves; ask what a pixel shows by a probe")
+        seen = cast("Transfer", transfer).views[view]
+        png = await run_in_threadpool(lambda: png_bytes(seen.material_ids()))
     return PngResponse(png, headers=FOREVER)
 
 
@@ -125,7 +129,8 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     views, cameras = chosen_views(ledger, get_scene(ledger, request.scene), wanted)
     preset = PRESETS[request.preset or "good"]
     lights = request.lights or preset.num_lights
-    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable, cameras)
+    points = request.points or Recipe.num_points
+    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable, cameras, points)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
@@ -141,6 +146,7 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         views=list(recipe.views),
         size=recipe.size,
         lights=recipe.num_lights,
+        points=recipe.num_points,
         relightable=recipe.relightable,
         cameras=[CameraBody(**camera.document()) for camera in recipe.cameras],
     )

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 from server.errors import NotReadyError
 from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
@@ -36,7 +36,7 @@ async def submit_comparison(request: TruthRequest, services: Shared, response: R
     return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
 
 
-def _check(request: TruthRequest, transfer: Transfer) -> None:
+def _check(request: TruthRequest, transfer: Opened) -> None:
     baked_view(request.view, transfer)
     check_look(request.look, transfer, "/look")
 

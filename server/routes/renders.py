@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 from server.errors import NotReadyError
 from server.queues.renders import Render
 from server.routes.bakes import ready_bake
@@ -37,14 +37,14 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
     return _body(await run_in_threadpool(services.renders.get, identity))
 
 
-def baked_view(name: str, transfer: Transfer) -> Any:
+def baked_view(name: str, transfer: Opened) -> Any:
     """A view of a bake that a body names. Raises ParameterError."""
     if name not in transfer.views:
         raise ParameterError("view", name, "one of " + ", ".join(transfer.views)[:400])
     return transfer.views[name]
 
 
-def check_look(partial: dict[str, Any], transfer: Transfer, pointer: str) -> None:
+def check_look(partial: dict[str, Any], transfer: Opened, pointer: str) -> None:
     """A look that stands at `pointer` of a body. Raises ParameterError."""
     try:
         looks.complete(partial, transfer.default_look)
@@ -52,7 +52,7 @@ def check_look(partial: dict[str, Any], transfer: Transfer, pointer: str) -> Non
         raise ParameterError(f"{pointer}{error.name}", error.value, error.allowed) from None
 
 
-def _check(request: RenderRequest, transfer: Transfer) -> None:
+def _check(request: RenderRequest, transfer: Opened) -> None:
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false for this format; only EXR files have layers")

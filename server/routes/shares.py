@@ -11,7 +11,7 @@ from relume import environments
 from relume import look as looks
 from relume.errors import NotFoundError
 from relume.measured.asset_store import STORE as MEASURED
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
 from server.routes.renders import baked_view, check_look
@@ -36,7 +36,7 @@ async def make_share(request: ShareRequest, services: Shared, response: Response
     return ShareEntry(id=identity, url=f"/?share={identity}")
 
 
-def _complete(request: ShareRequest, transfer: Transfer) -> dict[str, Any]:
+def _complete(request: ShareRequest, transfer: Opened) -> dict[str, Any]:
     """The whole look, so that it stays what it is whatever defaults become."""
     for name in {request.view, *request.views}:
         baked_view(name, transfer)

@@ -192,7 +192,8 @@ class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
-    where none are named. `relightable`: divide the light so that turning or exchanging the environment errs little.
+    where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none.
+    `relightable`: divide the light so that turning or exchanging the environment errs little.
     """
 
     scene: Id
@@ -201,6 +202,7 @@ class BakeRequest(Body):
     preset: Preset | None = None
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    points: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     relightable: bool = False
     dry_run: bool = False
 
@@ -222,6 +224,7 @@ class RecipeBody(Body):
     views: list[str]
     size: tuple[int, int]
     lights: int
+    points: int
     relightable: bool
     cameras: list[CameraBody]
 

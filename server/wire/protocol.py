@@ -10,6 +10,7 @@ already.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
@@ -30,6 +31,7 @@ Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
 Revision = Annotated[int, Field(ge=0, le=2**53)]
 Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
 Pixel = Annotated[int, Field(ge=0, le=65535)]
+Coordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 
 
 class Message(BaseModel):
@@ -144,6 +146,21 @@ class TouchMessage(Message):
         return self
 
 
+class EyeMessage(Message):
+    """client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames
+    name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as
+    in an edit; nothing is prepared for it. `rest`: "stay", a moving picture is not replaced when the eye rests."""
+
+    type: Literal["eye"]
+    view: Name
+    eye: Revision
+    to_world: Annotated[list[Coordinate], Field(min_length=16, max_length=16)]
+    yfov: Annotated[float, Field(gt=0, lt=math.pi, allow_inf_nan=False)]
+    size: tuple[Pixel, Pixel]
+    hand: Pointer | None = None
+    rest: Literal["stay"] = "stay"
+
+
 ClientMessage = Annotated[
     EditMessage
     | ViewMessage
@@ -153,7 +170,8 @@ ClientMessage = Annotated[
     | StreamMessage
     | ProbeMessage
     | BrushMessage
-    | TouchMessage,
+    | TouchMessage
+    | EyeMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -178,13 +196,15 @@ class CameraInfo(Message):
 
 
 class ViewInfo(Message):
-    """A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere."""
+    """A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. Then
+    `bounds` are the lowest and the highest corner of what there is to see, metres."""
 
     name: str
     width: int
     height: int
     camera: CameraInfo
     eye: Literal["baked", "free"]
+    bounds: tuple[list[float], list[float]] | None = None
 
 
 class HelloMessage(Message):
@@ -283,7 +303,7 @@ class FrameTimes(Message):
 
 
 class FrameHeader(Message):
-    """Header of a binary frame."""
+    """Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views."""
 
     frame: int
     revision: int
@@ -297,4 +317,5 @@ class FrameHeader(Message):
     complete: bool
     kind: Literal["picture", "brush"]
     alpha: bool = False
+    eye: int | None = None
     ms: FrameTimes

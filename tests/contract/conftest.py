@@ -10,13 +10,13 @@ from furnace_method import FurnaceMethod
 from relume.bake import Recipe
 from relume.memory import Memory
 from relume.methods.base import TransferMethod
-from relume.methods.registry import METHODS, open_transfer
-from relume.picture.transfer import Transfer
+from relume.methods.registry import METHODS, open_bake
+from relume.picture.transfer import Eyes, Opened
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
 from relume.store import bake_here
 
-SIZE, NUM_LIGHTS = (48, 36), 100
+SIZE, NUM_LIGHTS, NUM_POINTS = (48, 36), 100, 6000
 
 
 def _quad(name: str, corners: list[list[float]], material: int) -> Mesh:
@@ -59,7 +59,9 @@ def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
 
 @pytest.fixture(scope="session")
 def recipe(method: TransferMethod, scene: Scene) -> Recipe:
-    return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS)
+    return Recipe(
+        method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS, num_points=NUM_POINTS
+    )
 
 
 @pytest.fixture(scope="session")
@@ -69,6 +71,22 @@ def baked(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory
 
 
 @pytest.fixture(scope="session")
-def transfer(baked: Path) -> Transfer:
+def opened(baked: Path) -> Opened:
     """The bake, opened."""
-    return open_transfer(baked, Memory(1 << 30))
+    return open_bake(baked, Memory(1 << 30))
+
+
+@pytest.fixture(scope="session")
+def transfer(opened: Opened) -> Opened:
+    """A bake of fixed views, opened."""
+    if opened.eyes is not Eyes.BAKED:
+        pytest.skip("its eyes move: test_moving_pictures.py has their clauses")
+    return opened
+
+
+@pytest.fixture(scope="session")
+def moving(opened: Opened) -> Opened:
+    """A bake whose eyes move, opened."""
+    if opened.eyes is not Eyes.FREE:
+        pytest.skip("its views are fixed: test_method_pictures.py has their clauses")
+    return opened

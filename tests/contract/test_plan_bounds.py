@@ -57,7 +57,7 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
 @linux
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
-    took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40))
+    took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_points=3000))
     assert took["view_samples"] > 3 * 16 * 16  # nearly every pixel is an edge, and all flights are short beside one
 
 

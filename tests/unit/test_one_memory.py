@@ -150,6 +150,8 @@ BOUNDED = {
     "look/library/materials.py",
     "look/library/navigation.py",
     "measured/asset_store.py",
+    "moving/out_factors.py",
+    "moving/zernike.py",
     "operators/nodes.py",
     "picture/light.py",
     "scene/cornell.py",

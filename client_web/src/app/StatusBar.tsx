@@ -11,6 +11,7 @@ import { settled } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
 import { bakedLight, look } from "../state/look";
 import { shownPanels } from "../state/room";
+import { moves } from "../state/views";
 import { toggleTruth } from "../truth/truth";
 import { formatBytes, formatSeconds } from "../ui/scale";
 import { attempt } from "../ui/toasts";
@@ -35,6 +36,7 @@ function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
+  if (moves.value) return "approximate, as moving views are";
   if (!settled.value) return "refining…";
   return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
 }

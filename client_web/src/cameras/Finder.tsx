@@ -8,20 +8,13 @@ import { finderPicture, freeName, getFinder, keepCamera, listCameras, placeAt } 
 import { Motion } from "./motion";
 import { frameOf, MAX_YFOV, MIN_YFOV, orbitOf, withAngle, type Bounds, type Frame, type Orbit } from "./orbit";
 import { Pictures } from "./pictures";
+import { STEPS } from "./steps";
 import { step, useHand } from "./useHand";
 import "./cameras.css";
 
 const MOVING: Size = [400, 300];
 const RESTING: Size = [960, 720];
 const MAX_NAME = 80;
-const STEPS = [
-  { key: "ArrowLeft", sign: "◂", label: "Turn left" },
-  { key: "ArrowRight", sign: "▸", label: "Turn right" },
-  { key: "ArrowUp", sign: "▴", label: "Turn up" },
-  { key: "ArrowDown", sign: "▾", label: "Turn down" },
-  { key: "+", sign: "+", label: "Nearer" },
-  { key: "-", sign: "−", label: "Farther" },
-];
 
 interface Props {
   scene: SceneBody;

@@ -31,6 +31,12 @@ export class Motion {
     this.frame = requestAnimationFrame((now) => this.step(now));
   }
 
+  /** Describe where it is and where it goes otherwise; nothing moves. */
+  restate(by: (orbit: Orbit) => Orbit): void {
+    this.shown = by(this.shown);
+    this.wanted = by(this.wanted);
+  }
+
   end(): void {
     cancelAnimationFrame(this.frame);
     this.frame = 0;

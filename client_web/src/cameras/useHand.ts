@@ -5,8 +5,9 @@ import { approached, panned, turned, type Bounds, type Orbit } from "./orbit";
 type Pulled = PointerEvent & { readonly currentTarget: HTMLElement };
 type Change = (by: (orbit: Orbit) => Orbit) => void;
 
-const TURN = Math.PI; // over the height of the picture
+export const TURN = Math.PI; // over the height of the picture
 const WHEEL = 0.0015; // of the logarithm of the distance, for each pixel
+const LINE_PX = 30;
 const CLICK_PX = 4;
 const KEY_TURN = Math.PI / 24;
 const KEY_SLIDE = 0.05;
@@ -32,6 +33,10 @@ export function step(change: Change, bounds: Bounds, key: string, slides: boolea
   change((orbit) => approached(orbit, key === "-" ? 1 / KEY_NEARER : KEY_NEARER, bounds));
   return true;
 }
+
+/** How many times as far a camera is after a turn of the wheel. */
+export const nearer = (event: WheelEvent): number =>
+  Math.exp(WHEEL * event.deltaY * (event.deltaMode === 1 ? LINE_PX : 1));
 
 const middle = (points: { x: number; y: number }[]) => ({
   x: points.reduce((sum, { x }) => sum + x, 0) / points.length,
@@ -82,7 +87,7 @@ export function useHand(change: Change, bounds: Bounds, click: (u: number, v: nu
     onContextMenu: (event: Event) => event.preventDefault(),
     onWheel(event: WheelEvent) {
       event.preventDefault();
-      change((orbit) => approached(orbit, Math.exp(WHEEL * event.deltaY), bounds));
+      change((orbit) => approached(orbit, nearer(event), bounds));
     },
   };
 }

@@ -38,7 +38,8 @@ async function arrive(from: BakeConnection, frame: Frame): Promise<void> {
   const { view } = frame.header;
   const isNew = from.arrivals.get(view) === undefined;
   const arrival = from.arrivals.take(frame);
-  if (isNew && stage.of(view).idsOf !== from.bake) void loadIds(from.bake, view, arrival);
+  const isFixed = from.hello?.views.find(({ name }) => name === view)?.eye !== "free"; // else its pixels are of no place
+  if (isNew && isFixed && stage.of(view).idsOf !== from.bake) void loadIds(from.bake, view, arrival);
   if (!arrival.isWhole) return;
   if (from === connections.shown) return showArrived(from, view);
   await swapWhereWhole();

@@ -1,5 +1,5 @@
 /** What a bake may follow of light, in words. */
-export type Method = "direct" | "gather";
+export type Method = "direct" | "gather" | "surface";
 
 interface MethodWords {
   name: Method;
@@ -21,6 +21,12 @@ export const METHODS: readonly MethodWords[] = [
     label: "With reflected light",
     short: "reflected",
     help: "Surfaces light each other too, and take on each other’s colours. Takes longer and more memory.",
+  },
+  {
+    name: "surface",
+    label: "Moving view",
+    short: "moving",
+    help: "Look from anywhere while you edit, with reflected light. Fine shadows and sharp highlights are approximate.",
   },
 ];
 

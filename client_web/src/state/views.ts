@@ -51,3 +51,6 @@ export function toggleSideBySide(): void {
 export function workIn(name: string): void {
   if (shownViews.peek().includes(name)) viewName.value = name;
 }
+
+/** Whether the eye of a shown view moves. */
+export const moves = computed(() => views.value.some(({ name, eye }) => eye === "free" && shownViews.value.includes(name)));

@@ -1,19 +1,24 @@
 /** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
 import { useEffect, useRef, useState } from "preact/hooks";
+import { eyeOf } from "../cameras/eye";
+import { approached, panned, turned } from "../cameras/orbit";
+import { nearer, step, TURN } from "../cameras/useHand";
 import { acceptMaterials } from "../library/drop";
 import { LightHandles } from "../lights/LightHandles";
 import { placeAt, placing } from "../lights/placing";
+import { askProbe } from "../live/probing";
 import { hitAt } from "../picture/hit";
 import { Screen } from "../picture/screen";
 import { stage } from "../picture/stage";
 import { pan, zoomAt } from "../picture/transform";
 import { moveTo, transformOf } from "../picture/viewTransforms";
+import type { Triple } from "../protocol";
 import { wipe } from "../state/display";
 import { scene } from "../state/scene";
 import { hoveredMaterial, select } from "../state/selection";
-import { pointedView, showAlone, sideBySide, viewName, workIn } from "../state/views";
+import { pointedView, showAlone, sideBySide, viewName, views, workIn } from "../state/views";
 import { useDrag } from "../ui/drag";
-import { showError } from "../ui/toasts";
+import { attempt, showError } from "../ui/toasts";
 import { Waiting } from "./Waiting";
 import { WipeHandle } from "./WipeHandle";
 import { leavePicture, probeAt } from "./probe";
@@ -29,6 +34,8 @@ function panBy(screen: Screen, dx: number, dy: number): void {
 function onWheel(screen: Screen, event: WheelEvent): void {
   event.preventDefault();
   const { view } = screen.picture;
+  const eye = eyeOf(view);
+  if (eye !== null && !event.ctrlKey) return eye.change((orbit) => approached(orbit, nearer(event), eye.bounds));
   const { x, y } = hitAt(screen, event);
   const lines = event.deltaMode === 1 ? 30 : 1;
   const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
@@ -82,11 +89,28 @@ function useScreen(view: string) {
   return { canvas, screen, failure };
 }
 
+/** Select what a pixel shows: where the eye moves, the server knows. */
+async function selectAt(view: string, x: number, y: number): Promise<void> {
+  const { material } = await askProbe(view, x, y);
+  if (material !== null) select(material);
+}
+
+/** Look at what a pixel shows; beside others, the view is shown alone first. */
+async function onDoubleClick(screen: Screen, view: string, event: MouseEvent): Promise<void> {
+  const eye = eyeOf(view);
+  if (sideBySide.peek() || eye === null) return sideBySide.peek() ? showAlone(view) : undefined;
+  const { px, py } = hitAt(screen, event);
+  const { position } = await askProbe(view, px, py);
+  if (position !== null) eye.lookAt(position as Triple);
+}
+
 function usePointer(screen: Screen | null, view: string) {
   const drag = useRef({ x: 0, y: 0, moved: false });
   const begin = (event: PointerEvent) => {
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
-    return event.button <= 1;
+    const eye = eyeOf(view);
+    if (eye !== null) void attempt(() => eye.grasp());
+    return event.button <= (eye === null ? 1 : 2);
   };
   const move = (event: PointerEvent) => {
     if (screen === null) return;
@@ -95,7 +119,11 @@ function usePointer(screen: Screen | null, view: string) {
     const [dx, dy] = [event.clientX - x, event.clientY - y];
     if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
     drag.current = { x: event.clientX, y: event.clientY, moved: true };
-    panBy(screen, dx, dy);
+    const eye = eyeOf(view);
+    if (eye === null) return panBy(screen, dx, dy);
+    const { height } = screen.size();
+    if (event.shiftKey || (event.buttons & 6) !== 0) eye.change((orbit) => panned(orbit, dx / height, dy / height));
+    else eye.change((orbit) => turned(orbit, (-TURN * dx) / height, (TURN * dy) / height));
   };
   const hover = (event: PointerEvent) => {
     if (screen === null) return;
@@ -108,6 +136,7 @@ function usePointer(screen: Screen | null, view: string) {
     if (screen === null || !released || drag.current.moved || event.button !== 0) return;
     const { px, py, material } = hitAt(screen, event);
     if (placing.peek() !== null) void placeAt(view, px, py);
+    else if (eyeOf(view) !== null) void selectAt(view, px, py);
     else if (material !== null) select(material);
   };
   const leave = () => {
@@ -119,8 +148,17 @@ function usePointer(screen: Screen | null, view: string) {
 
 function onKey(screen: Screen, event: KeyboardEvent): void {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-  if (step !== undefined) panBy(screen, (step[0] as number) * PAN_PX, (step[1] as number) * PAN_PX);
+  const eye = eyeOf(screen.picture.view);
+  if (eye !== null && event.key === "Home") return (eye.restart(), event.preventDefault());
+  if (eye !== null && event.key !== "Enter") {
+    if (step(eye.change, eye.bounds, event.key, event.shiftKey)) {
+      event.preventDefault();
+      event.stopPropagation();
+    }
+    return;
+  }
+  const pans = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (pans !== undefined) panBy(screen, (pans[0] as number) * PAN_PX, (pans[1] as number) * PAN_PX);
   else if (event.key === "Enter" && sideBySide.value) showAlone(screen.picture.view);
   else return;
   event.preventDefault();
@@ -144,6 +182,7 @@ export function Cell({ view }: { view: string }) {
   const { canvas, screen, failure } = useScreen(view);
   const pointer = usePointer(screen, view);
   const beside = sideBySide.value;
+  const moves = views.value.find(({ name }) => name === view)?.eye === "free";
   const label = beside ? `The view ${view}. Enter shows it alone.` : "The picture.";
   return (
     <div class={`cell ${beside && view === viewName.value ? "active" : ""}`}>
@@ -151,10 +190,11 @@ export function Cell({ view }: { view: string }) {
         ref={canvas}
         tabIndex={0}
         role="img"
-        aria-label={`${label} Arrow keys pan, plus and minus zoom; choose materials in the list.`}
+        aria-label={`${label} ${moves ? "Arrow keys turn the eye, with Shift they slide it, plus and minus go nearer and farther, Home goes back" : "Arrow keys pan, plus and minus zoom"}; choose materials in the list.`}
         onKeyDown={(event) => screen !== null && onKey(screen, event)}
         onFocus={() => workIn(view)}
-        onDblClick={() => beside && showAlone(view)}
+        onDblClick={(event) => screen !== null && void attempt(() => onDoubleClick(screen, view, event))}
+        onContextMenu={(event) => eyeOf(view) !== null && event.preventDefault()}
         {...pointer}
       />
       {failure !== null && <p class="failure">{failure}</p>}

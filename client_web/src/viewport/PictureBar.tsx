@@ -15,7 +15,7 @@ function Probe() {
   const radiance = at === null ? null : (picture?.radiance(at.x, at.y) ?? null);
   if (at === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
   const shown = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
-  const material = picture?.material(at.x, at.y);
+  const material = picture?.ids ? picture.material(at.x, at.y) : at.answer?.material;
   return (
     <span class="probe">
       <i class="chip" style={{ background: `rgb(${shown.join(" ")})` }} />

@@ -1,5 +1,6 @@
 /** The picture of one view, or those of several side by side, with what is said about them. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { EyeBar } from "../cameras/EyeBar";
 import { PlacingBar } from "../lights/PlacingBar";
 import { shownViews, view } from "../state/views";
 import { Cell } from "./Cell";
@@ -37,6 +38,7 @@ export function PictureView() {
             <Cell key={place} view={name} />
           ))}
         </div>
+        <EyeBar />
         <PlacingBar />
         <Limits />
         <HistogramView />

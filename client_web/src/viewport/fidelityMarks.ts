@@ -4,6 +4,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Fidelity } from "../protocol";
 import { fidelity, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
+import { moves } from "../state/views";
 
 export interface Mark {
   words: string;
@@ -19,6 +20,11 @@ const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
 const OTHER_LIGHT: Mark = {
   words: "Baked for other light",
   title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
+};
+
+const MOVING: Mark = {
+  words: "Moving view, approximate",
+  title: "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer. A bake of a camera is exact.",
 };
 
 const SHOWN_AFTER_MS = 300;
@@ -45,6 +51,7 @@ effect(() => {
 
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
+  if (moves.value) return [MOVING];
   const ofPicture = rough.value === null ? [] : [MARKS[rough.value]];
   return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
 }

@@ -12,6 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from relume.errors import RelumeError
+from relume.picture.transfer import Eyes
 from server.library.ports import Library, Picture
 from server.library.threads import OneAtATime, Threads
 from server.live.sending import painter
@@ -103,7 +104,7 @@ class FrameLoop:
 
     def _due_s(self, viewport: Viewport) -> float:
         """When a view is to be painted: at once with a new look, refined when the hand rests."""
-        if viewport.is_behind(self._pending.target):
+        if viewport.is_behind(self._pending.target) or viewport.has_to_move(self._pending):
             return 0.0
         return float("inf") if viewport.is_settled else max(self._rest_until_s, viewport.not_before_s)
 
@@ -137,7 +138,7 @@ class FrameLoop:
                 await self._work.quick(painter.touch, [picture], self._answers.touched)
             except RelumeError as error:  # the view is shown all the same
                 await self._socket.refuse(error)
-        self._viewports[name] = Viewport(self._transfer.views[name], picture)
+        self._viewports[name] = Viewport(self._transfer.views[name], picture, moves=self._transfer.eyes is Eyes.FREE)
 
     def _pictures(self) -> list[Picture]:
         return [viewport.picture for viewport in self._viewports.values()]
@@ -229,7 +230,8 @@ class FrameLoop:
             await self._take_back(target, error)
             return
         self._accepted, viewport.served_s = target, time.perf_counter()
-        if viewport.is_behind(target) and target.received_s is not None:
+        is_moved = viewport.is_behind(target) and target.received_s is not None
+        if is_moved or request.eye is not None:
             self._rest_until_s = time.perf_counter() + REST_S
             self._settle_at_s = time.perf_counter() + SETTLE_S
         viewport.painted(request, painted, self._pending)

@@ -7,15 +7,15 @@ import struct
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from numpy.typing import NDArray
 from PIL import Image
 
 from relume.imageio import to_bytes, tone_map
 from relume.imageio.shrink import shrink
-from server.library.ports import Advance, Picture, Tile
-from server.live.state.target import Target
+from server.library.ports import Advance, MovingPicture, Picture, Tile
+from server.live.state.target import Eye, Target
 from server.wire.protocol import FrameHeader, FrameTimes
 
 if TYPE_CHECKING:
@@ -36,7 +36,9 @@ class FrameRequest:
         is_due: there is something to send even where this step changes nothing.
         is_told: the client knows that what it has is exact.
         size: of the picture. jpeg_size: of a JPEG of it, no larger.
-        received_s: when the edit came in that no frame has answered yet, if there is one.
+        received_s: when the edit or the eye came in that no frame has answered yet, if there is one.
+        eye: that the picture is given before; None where it has its eye, or has none that moves.
+        shown_eye: number of the eye that the frame shows.
     """
 
     target: Target
@@ -49,6 +51,8 @@ class FrameRequest:
     is_due: bool
     is_told: bool
     received_s: float | None
+    eye: Eye | None
+    shown_eye: int | None
     frame: int
     view: str
     size: tuple[int, int]
@@ -99,6 +103,8 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
     start_s = time.perf_counter()
     accept(request.accepting, request.target)
+    if request.eye is not None:
+        cast("MovingPicture", picture).set_eye(request.eye.camera, request.eye.size)
     advance = picture.advance(request.max_coefficients)
     job = picture.next_job()
     updated_s = time.perf_counter()
@@ -123,6 +129,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
         complete=advance.complete,
         kind="picture",
         alpha=alpha is not None,
+        eye=request.shown_eye,
         ms=times(wait_ms, update_ms, encode_ms),
     )
     return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)

@@ -11,12 +11,12 @@ from server.live.sending.coefficient_budget import CoefficientBudget
 from server.live.sending.painter import Format, FrameRequest, Painted
 from server.live.state.frame_window import FrameWindow
 from server.live.state.pending_requests import PendingRequests
-from server.live.state.target import Target
+from server.live.state.target import Eye, Target
 from server.wire.protocol import BrushMessage
 
 if TYPE_CHECKING:
     from relume.picture.jobs import Job
-    from relume.views.view import View
+    from relume.picture.transfer import AnyView
 
 REFINE_SEND_S = 0.100
 
@@ -38,10 +38,15 @@ class Viewport:
         is_settled: painting again would show nothing new.
         is_exact: the client's picture of it is exact. advance: what the picture shows since it was painted last.
         not_before_s: no refined frame goes out earlier.
+        eye: that the picture was painted with last, where it moves.
         brush: a stretch of a curve whose pixels are to be sent. served_s: when it had its last turn.
     """
 
-    def __init__(self, view: View, picture: Picture) -> None:
+    def __init__(self, view: AnyView, picture: Picture, *, moves: bool) -> None:
+        """
+        Args:
+            moves: its eye does; then it shows something at once.
+        """
         self.name, self.size, self.picture = view.name, (view.width, view.height), picture
         self.target: Target | None = None
         self.job: Job | None = None
@@ -51,12 +56,17 @@ class Viewport:
         self.brush: BrushMessage | None = None
         self.served_s = 0.0
         self._all_tiles = self._lacking = frozenset(picture.all_tiles())
-        self._is_blank = True  # nothing of it has been shaded: a frame would be black
+        self.eye: Eye | None = None
+        self._is_blank = not moves  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False
         self._answered: Target | None = None
         self._moving_bytes = 0
         self._sent_s = 0.0
         self._budget = CoefficientBudget()
+
+    def has_to_move(self, pending: PendingRequests) -> bool:
+        """Whether it has not been painted with its newest eye."""
+        return pending.eyes.get(self.name) is not self.eye
 
     def is_behind(self, newest: Target) -> bool:
         """Whether it has not been painted with this look."""
@@ -77,9 +87,13 @@ class Viewport:
         self, newest: Target, pending: PendingRequests, window: FrameWindow, accepting: Sequence[Picture]
     ) -> FrameRequest:
         """The next frame: of a new look whatever can be shown, else what refines it."""
-        is_new = self.is_behind(newest)
+        eye = pending.eyes.get(self.name)
+        has_moved = self.has_to_move(pending)
+        is_new = self.is_behind(newest) or has_moved
+        size = self.size if eye is None else eye.size
+        received_s = eye.received_s if eye is not None and has_moved else newest.received_s
         self._is_link_slow = is_slow = window.is_slow_for(self._moving_bytes)
-        is_moving_slowly = pending.form == "auto" and is_slow and is_new and newest.received_s is not None
+        is_moving_slowly = pending.form == "auto" and is_slow and is_new and received_s is not None
         form: Format = "jpeg" if pending.form == "jpeg" or is_moving_slowly else "rgb9e5"
         is_early = is_slow or time.perf_counter() - self._sent_s < REFINE_SEND_S
         is_answered = self._answered is newest
@@ -87,17 +101,19 @@ class Viewport:
             target=newest,
             accepting=accepting,
             max_coefficients=self._budget.max_coefficients,
-            lacking=self._lacking,
+            lacking=frozenset() if has_moved else self._lacking,
             form=form,
             quality=pending.quality,
             only_exact=self._is_blank or (not is_new and is_early),
             is_due=self._has_unsent or (self._has_other_display(newest) if is_new else self._is_owed(pending)),
             is_told=self.is_exact and is_answered,
-            received_s=None if is_answered else newest.received_s,
+            received_s=None if is_answered and not has_moved else received_s,
+            eye=eye if has_moved else None,
+            shown_eye=None if eye is None else eye.number,
             frame=window.next_frame,
             view=self.name,
-            size=self.size,
-            jpeg_size=self.size if pending.space is None else fitted(self.size, pending.space),
+            size=size,
+            jpeg_size=size if pending.space is None else fitted(size, pending.space),
         )
 
     def _has_other_display(self, newest: Target) -> bool:
@@ -110,6 +126,9 @@ class Viewport:
     def painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
         """Remember what the client has when `painted` is sent."""
         tiles, exact = painted.advance.tiles, painted.advance.exact
+        if request.eye is not None:
+            self.eye, self.size = request.eye, request.size
+            self._lacking, self._all_tiles = frozenset(), frozenset(self.picture.all_tiles())
         if tiles:
             self._budget.learn(painted.update_ms, exact)
         if self.is_behind(request.target) and tiles and request.received_s is not None:

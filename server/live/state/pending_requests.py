@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import Literal
 
-from server.live.state.target import Target
+from server.live.state.target import Eye, Target
 from server.wire.protocol import BrushMessage, ProbeMessage
 
 
@@ -17,10 +17,12 @@ class PendingRequests:
     Attributes:
         target: the newest look; it stays, each view is painted with it once.
         space: width and height that the client has for the view that it shows alone; None: as much as it is large.
+        eyes: newest eye of each view that has been given one; it stays.
         touch, hold: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 
     target: Target
+    eyes: dict[str, Eye] = field(default_factory=dict)
     touch: str | None = None
     hold: str | None = None
     probe: ProbeMessage | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import Opened
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
@@ -22,5 +22,5 @@ class SessionState:
     shown: ShownViews
     window: FrameWindow
     look: LookState
-    transfer: Transfer
+    transfer: Opened
     metrics: Metrics

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from relume.scene.model import Camera
 
 
 @dataclass(frozen=True)
@@ -23,3 +26,17 @@ class Target:
     received_s: float | None
     hand: str | None = None
     solo: frozenset[str] | None = None
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Where a moving view is to be seen from.
+
+    Attributes:
+        number: that frames name. size: of their pictures, pixels. received_s: when it came in.
+    """
+
+    number: int
+    camera: Camera
+    size: tuple[int, int]
+    received_s: float

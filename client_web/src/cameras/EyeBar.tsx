@@ -1,0 +1,50 @@
+/** Over a picture whose eye moves: what hands can do, as buttons, and keeping the camera. */
+import { useState } from "preact/hooks";
+import { scene } from "../state/scene";
+import { viewName, views } from "../state/views";
+import { attempt, note } from "../ui/toasts";
+import { freeName, keepCamera, listCameras } from "./calls";
+import { eyeOf, type Eye } from "./eye";
+import { frameOf } from "./orbit";
+import { STEPS } from "./steps";
+import { step } from "./useHand";
+
+async function keep(eye: Eye): Promise<void> {
+  const of = scene.peek();
+  if (of === null) return;
+  await attempt(async () => {
+    const name = freeName([...of.views, ...(await listCameras(of.id))].map((camera) => camera.name));
+    await keepCamera(of.id, name, eye.isFirst ? eye.first : frameOf(eye.orbit));
+    note(`The camera is kept as “${name}”. Choose it under Bake to have its exact picture.`);
+  });
+}
+
+export function EyeBar() {
+  const [open, setOpen] = useState(true);
+  const name = viewName.value;
+  const moves = views.value.find((view) => view.name === name)?.eye === "free";
+  const eye = moves ? eyeOf(name) : null;
+  if (eye === null) return null;
+  return (
+    <div class="eye-bar" role="group" aria-label="Move the eye">
+      <button aria-expanded={open} title="Drag turns, Shift or the right button slides, the wheel goes nearer" onClick={() => setOpen(!open)}>
+        Eye {open ? "▾" : "▸"}
+      </button>
+      {open && (
+        <>
+          {STEPS.map(({ key, sign, label }) => (
+            <button key={key} title={label} aria-label={label} onClick={() => step(eye.change, eye.bounds, key, false)}>
+              {sign}
+            </button>
+          ))}
+          <button title="Back to where the eye began (Home)" onClick={() => eye.restart()}>
+            Back
+          </button>
+          <button title="Keep this camera with the scene" onClick={() => void keep(eye)}>
+            Keep camera
+          </button>
+        </>
+      )}
+    </div>
+  );
+}

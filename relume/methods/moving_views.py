@@ -1,0 +1,135 @@
+"""An opened bake of the method `surface`: what a moving eye sees, and what arrives there under any light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.memory import Memory
+from relume.methods.store_io import read_cells
+from relume.methods.transfer import BouncedViews, described_light
+from relume.moving.light_vectors import light_vectors
+from relume.moving.surface import Surface, pattern_of_points, read_surface
+from relume.moving.view import FreeView
+from relume.picture.light import Light
+from relume.picture.transfer import Axis, Eyes
+from relume.project.receivers import GatherRays, Rays
+from relume.trace.embree import EmbreeScene
+from relume.views.store_io import read_camera
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class MovingViews:
+    """Pictures from anywhere; a `relume.picture.transfer.Opened`, and what `relume.moving.picture` asks.
+
+    Attributes:
+        lit: the light of the bake, in which no view was baked.
+        surface: what the eye sees.
+        views: where eyes begin.
+    """
+
+    lit: BouncedViews
+    surface: Surface
+    views: dict[str, FreeView]
+
+    eyes = Eyes.FREE
+    axes = BouncedViews.axes | {Axis.EYE}
+
+    @classmethod
+    def of(cls, store: StoreReader, key: str, memory: Memory) -> Self:
+        """Open a store.
+
+        Args:
+            store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+        Raises:
+            StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
+        """
+        lit = BouncedViews(**described_light(store, key, memory), cells=read_cells(store))
+        width, height = store.attributes["size"]
+        cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
+        surface = read_surface(store)
+        place = surface.points.position
+        bounds = place.min(axis=0).astype(np.float64), place.max(axis=0).astype(np.float64)
+        return cls(lit, surface, {camera.name: FreeView(camera, width, height, bounds) for camera in cameras})
+
+    @property
+    def memory(self) -> Memory:
+        """Of all that is made from the bake and may be made again."""
+        return self.lit.memory
+
+    @property
+    def key(self) -> str:
+        """Path of the store."""
+        return self.lit.key
+
+    @property
+    def scene_id(self) -> str:
+        """Of the scene that was baked."""
+        return self.lit.scene_id
+
+    @property
+    def method(self) -> str:
+        """That it was baked by."""
+        return self.lit.method
+
+    @property
+    def default_look(self) -> dict[str, Any]:
+        """The complete look of the scene as it was imported."""
+        return self.lit.default_look
+
+    @property
+    def material_names(self) -> Sequence[str]:
+        """In the scene's order."""
+        return self.lit.material_names
+
+    def radiance_of(self, name: str | None) -> F32:
+        """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
+        return self.lit.radiance_of(name)
+
+    @property
+    def embree(self) -> EmbreeScene:
+        """The triangles' search tree."""
+        return self.lit.local.embree
+
+    @property
+    def positions(self) -> F32:
+        """Corners of the triangles. (num_vertices, 3) float32"""
+        return self.lit.local.positions
+
+    @property
+    def faces(self) -> NDArray[np.uint32]:
+        """The triangles. (num_faces, 3) uint32"""
+        return self.lit.local.faces
+
+    @cached_property
+    def _visible(self) -> NDArray[np.uint8]:
+        return np.asarray(self.lit.store.read("points/visibility"), np.uint8)
+
+    @cached_property
+    def _links(self) -> NDArray[np.uint16]:
+        return np.asarray(self.lit.store.read("points/links"), np.uint16)
+
+    def vectors(self, element: Light) -> F32:
+        """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32"""
+        key = self.key, "light vectors", element
+        return self.memory.keep(key, lambda: self._vectors(element))
+
+    def _vectors(self, element: Light) -> F32:
+        points = self.surface.points
+        rays: list[Rays] = list(self.lit.local.all_rays(element, points))
+        radiance = self.lit.reflected_in(element)
+        if radiance is not None:
+            rays.append(GatherRays(self._links, pattern_of_points(self.lit.store, self._links.shape[1]), radiance))
+        return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
+
+    def map_of(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        return self.lit.map_of(name, blur)

@@ -1,0 +1,193 @@
+"""Method `surface`: pictures whose eye moves (Mahajan 2008, Sun 2007); light is kept at points of all surfaces.
+
+What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
+and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
+points, the cells), then "visibility and gather rays" (rows of cells and of points).
+
+    scene/positions, faces, face_material, uvs, textures, …  what the eye sees: relume.moving.surface
+    lights/…                                                 as in relume.methods.sampled_views
+    cells/…                                                  as in relume.methods.gather
+    lattice/num_rows, first, node                            relume.moving.lattice.Lattice
+    points/position, normal, tangent, material               relume.moving.lattice.Placed
+    points/visibility, points/links                          lights that a point sees, cells that its rays hit
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.errors import PlanError
+from relume.light.gather_rays import make_pattern
+from relume.memory import Memory
+from relume.methods import bounds
+from relume.methods.moving_views import MovingViews
+from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
+from relume.methods.store_io import read_gather_samples, read_tree
+from relume.moving.lattice import MAX_POINTS, most_nodes, place_points
+from relume.moving.sides import open_sides
+from relume.moving.surface import pattern_of_points, read_surface_points, textures_of
+from relume.scene.model import Scene
+from relume.trace.cells import POINTS_A_CELL, choose_cells
+from relume.trace.coherent import trace_coherent
+from relume.trace.links import trace_links
+
+ROWS_A_SHARD = 4096
+RAYS_A_POINT = 256
+RAYS_A_CELL_POINT = 55
+_FEWEST_CELLS, _MOST_CELLS, _POINTS_A_CELL = 512, 8192, 6
+MIN_POINTS = 64
+_MOST_ALIKE = 54  # points of a material, on both sides, in each of 27 directions
+_MORE_POINTS = 1.05  # than asked for, at most
+_POINT_BYTES = 3 * 12 + 2 + 2 * RAYS_A_POINT
+_MAKING_BYTES_A_NODE = 300  # while nodes are shared: their surface, their keys, and the order of these
+_CELL_BYTES = POINTS_A_CELL * (24 + 2 * RAYS_A_CELL_POINT) + 64
+_MAKING_BYTES_A_CELL = 4000
+
+
+class SurfaceMethod:
+    """Implements `relume.methods.base.TransferMethod`."""
+
+    name = "surface"
+    stages = ("points", "visibility and gather rays")
+
+    def __init__(self) -> None:
+        self._views = SampledViews()
+
+    def prepare(self, scene: Scene) -> None:
+        """Build the triangles' search tree."""
+        self._views.prepare(scene)
+
+    def open(self, store: StoreReader, key: str, memory: Memory) -> MovingViews:
+        """Views from anywhere, lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
+        return MovingViews.of(store, key, memory)
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Upper bounds from the recipe alone."""
+        checked = self._views.plan(scene, recipe)
+        if not MIN_POINTS <= recipe.num_points <= MAX_POINTS:
+            raise PlanError(f"{recipe.num_points} points were asked for; give {MIN_POINTS} to {MAX_POINTS:,}")
+        most_alike = _MOST_ALIKE * len(scene.materials)  # that cannot be shared, however few are asked for
+        points, bits = int(_MORE_POINTS * recipe.num_points) + most_alike, (recipe.num_lights + 7) // 8
+        num_cells = _num_cells(recipe)
+        of_cells = POINTS_A_CELL * num_cells
+        nodes = most_nodes(bounds.num_triangles(scene), recipe.num_points)
+        triangles = bounds.num_triangles(scene)
+        textures = bounds.texture_bytes(scene)
+        return Plan(
+            num_view_samples=points,
+            num_rays=points * (recipe.num_lights + RAYS_A_POINT) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT),
+            store_bytes=points * (_POINT_BYTES + bits)
+            + of_cells * bits
+            + num_cells * _CELL_BYTES
+            + 4 * nodes
+            + triangles * 10
+            + bounds.triangles_bytes(scene)
+            + bounds.uv_bytes(scene)
+            + textures
+            + bounds.lights_bytes(scene, recipe)
+            + (1 << 20),
+            peak_bytes=checked.peak_bytes + nodes * _MAKING_BYTES_A_NODE + num_cells * _MAKING_BYTES_A_CELL + textures,
+        )
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """What opening the store needs besides its arrays."""
+        return {
+            **self._views.attributes(scene, recipe),
+            "gather_seed": int(scene.id[:7], 16),
+            **textures_of(scene).described,
+        }
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The lights, the points, the cells; then whole shards of cells and of points. See `BakeMethod`."""
+        if stage == 0:
+            return [Task(0, index, part, 0, 0) for index, part in enumerate(("lights", "points", "cells"))]
+        rows = {part: store.shape(f"{part}/material")[0] for part in ("cells", "points")}
+        ranges = [
+            (part, start, min(start + ROWS_A_SHARD, num))
+            for part, num in rows.items()
+            for start in range(0, num, ROWS_A_SHARD)
+        ]
+        return [Task(1, index, *where) for index, where in enumerate(ranges)]
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """What cells and points see, and their links; the first stage makes its own. See `BakeMethod`."""
+        if stage == 0:
+            return []
+        bits = (store.shape("lights/power")[0] + 7) // 8
+        widths = {
+            "cells": (POINTS_A_CELL * bits, POINTS_A_CELL * RAYS_A_CELL_POINT),
+            "points": (bits, RAYS_A_POINT),
+        }
+        return [
+            ArraySpec(
+                f"{part}/{name}",
+                (store.shape(f"{part}/material")[0], width),
+                dtype,
+                (CHUNK_ROWS, width),
+                (ROWS_A_SHARD, width),
+            )
+            for part, both in widths.items()
+            for name, width, dtype in zip(("visibility", "links"), both, ("uint8", "uint16"), strict=True)
+        ]
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+        """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
+        if task.stage == 0:
+            make = {"lights": self._lights, "points": self._points, "cells": self._cells}
+            return Written(make[task.view](scene, recipe), 0, 0.0)
+        if task.view not in ("cells", "points"):
+            raise ValueError(f"{task.view!r} is not in the stage")
+        return self._rows(scene, task, store)
+
+    def _lights(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        geometry = self._views.geometry_of(scene)
+        of_scene = {"scene/uvs": geometry.uvs, **textures_of(scene).arrays}
+        return {**lights_of(scene, recipe), **triangles_of(geometry), **of_scene}
+
+    def _points(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        geometry = self._views.geometry_of(scene)
+        cameras = [camera for camera in scene.cameras if camera.name in recipe.views]
+        is_open = open_sides(geometry, cameras, int(scene.id[:7], 16))
+        eyes = np.array([camera.to_world[:3, 3] for camera in cameras])
+        placed = place_points(geometry, is_open, eyes, recipe.num_points)
+        fields = {name: getattr(placed.points, name) for name in ("position", "normal", "tangent")}
+        return {
+            **{f"lattice/{name}": array for name, array in placed.lattice._asdict().items()},
+            **{f"points/{name}": array for name, array in fields.items()},
+            "points/material": placed.material,
+        }
+
+    def _cells(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        cells = choose_cells(scene, self._views.geometry_of(scene), recipe.views, recipe.size, _num_cells(recipe))
+        fields: dict[str, NDArray[Any]] = {**vars(cells), **cells.tree._asdict()}
+        del fields["tree"]
+        return {f"cells/{name}": array for name, array in fields.items()}
+
+    def _rows(self, scene: Scene, task: Task, store: StoreReader) -> Written:
+        """What some cells or points see, and what their rays hit."""
+        geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
+        if task.view == "cells":
+            points, pattern = (
+                read_gather_samples(store, task.start, task.stop),
+                make_pattern(RAYS_A_CELL_POINT, 0, seed),
+            )
+        else:
+            points, pattern = read_surface_points(store, task.start, task.stop), pattern_of_points(store, RAYS_A_POINT)
+        seen = trace_coherent(geometry.embree, points.position, points.normal, read_targets(store))
+        links = trace_links(geometry, read_tree(store), points, points.normal, pattern)
+        num_rows = task.stop - task.start
+        arrays: dict[str, NDArray[Any]] = {
+            f"{task.view}/visibility": seen.visible.reshape(num_rows, -1),
+            f"{task.view}/links": links.cell.reshape(num_rows, -1),
+        }
+        return Written(arrays, seen.rays.traced + links.num_rays, seen.trace_s + links.trace_s)
+
+
+def _num_cells(recipe: Recipe) -> int:
+    """Fewer than points: what they send is gathered over hemispheres, which blurs it."""
+    return min(_MOST_CELLS, max(_FEWEST_CELLS, recipe.num_points // _POINTS_A_CELL))

@@ -1,0 +1,203 @@
+"""Points on all surfaces of a scene: a grid inside each face, shared between faces (mesh colours, Yuksel 2010).
+
+A face whose longest edge is R spacings long has (R + 1)(R + 2) / 2 nodes, rows parallel to its first edge. Nodes of
+different faces that lie together, look the same way and are of one material are one point, so that light is continuous
+across edges, and a mesh finer than the spacing has fewer points than corners. Each side of a face that can be seen has
+nodes of its own (`relume.moving.sides`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import PlanError
+from relume.points import Points
+from relume.trace.geometry import Geometry
+from relume.trace.primary import Hits
+from relume.trace.surface import surface_at
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+MAX_POINTS = 2_000_000
+MOST_ROWS = 255  # of the grid in one face
+_TOGETHER = 0.35  # of the spacing: nodes as near as this are one point
+_ALIKE, _LEAST_ALIKE = 6, 1  # steps of a unit normal's components, within which points look the same way
+_TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough
+_WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
+_NODES_A_POINT = 8  # more where faces are thin
+_MOST_COARSE = 4.0  # or fine, beside a middling distance from the eye
+_CLOSE_ENOUGH = 0.05  # of the number of points asked for
+
+
+class Lattice(NamedTuple):
+    """The grid of every side of every face; side 0 is the one where the corners are counter-clockwise.
+
+    Attributes:
+        num_rows: R; 0 where the side has no points. (faces, 2) uint8
+        first: where its nodes begin in `node`. (faces, 2) uint32
+        node: the point of each. (nodes,) uint32
+    """
+
+    num_rows: NDArray[np.uint8]
+    first: NDArray[np.uint32]
+    node: NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Points on surfaces and the lattice that shares them.
+
+    Attributes:
+        points: n of them, neighbours mostly next to each other, material after material.
+        material: of each. (n,) uint16
+        spacing: about the distance of neighbours, metres.
+    """
+
+    lattice: Lattice
+    points: Points
+    material: NDArray[np.uint16]
+    spacing: float
+
+
+class _Nodes(NamedTuple):
+    """Nodes before they are shared: face, side, and barycentric coordinates of the second and third corner."""
+
+    face: NDArray[np.int32]
+    side: NDArray[np.uint8]
+    uv: F32
+
+
+def num_nodes(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+    """How many nodes grids with so many rows have; none where there are no rows."""
+    wide = rows.astype(np.int64)
+    return np.where(wide > 0, (wide + 1) * (wide + 2) // 2, 0)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def node_of(rows, i, j):  # type: ignore[no-untyped-def]
+    """Number of a node in a grid of so many rows: i steps towards the second corner, j towards the third."""
+    return i * (rows + 1) - (i * (i - 1)) // 2 + j
+
+
+def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_points: int) -> Placed:
+    """Spread about `num_points` points over all sides that can be seen, more where eyes begin.
+
+    Args:
+        geometry: the scene's triangles. is_open: which sides of faces can be seen. (faces, 2)
+        eyes: places that the scene is seen from at first; what is twice as far from them has a quarter of the points.
+            (eyes, 3)
+        num_points: at most `MAX_POINTS`.
+    Raises:
+        PlanError: no surface has any area.
+    """
+    corners = geometry.positions[geometry.faces].astype(np.float64)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    is_open = is_open & (area > 0)[:, None]
+    total = float((is_open * area[:, None]).sum())
+    if total <= 0:
+        raise PlanError("no surface of the scene has any area; there is nothing to put points on")
+    longest, count = edges.max(axis=1) / _coarseness(corners.mean(axis=1), area, eyes), is_open.sum(axis=1)
+    spacing = math.sqrt(total / num_points)
+    most = most_nodes(len(geometry.faces), num_points)
+    while int((num_nodes(_rows(longest, spacing)) * count).sum()) > most and spacing < longest.max():
+        spacing *= 1.25
+    for trial in range(_MOST_TRIALS):
+        alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
+        placed = _placed(geometry, is_open, _rows(longest, spacing), spacing, alike)
+        ratio = placed.points.num_points / num_points
+        if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
+            break
+        finer = spacing * math.sqrt(ratio) * (1 + 0.02 * trial)  # in the end it has to be coarse enough
+        if ratio < 1 and int((num_nodes(_rows(longest, finer)) * count).sum()) > most:
+            break
+        spacing = min(finer, _WIDEST * float(longest.max()))
+    return placed
+
+
+def _coarseness(centre: F64, area: F64, eyes: F64) -> F64:
+    """How many times farther apart the points of each face are than those at a middling distance. (faces,)"""
+    distance = np.min([np.linalg.norm(centre - eye, axis=1) for eye in eyes], axis=0)
+    middling = np.sqrt(np.average(distance**2, weights=area))
+    return np.asarray(np.clip(distance / max(middling, 1e-30), 1 / _MOST_COARSE, _MOST_COARSE))
+
+
+def most_nodes(num_faces: int, num_points: int) -> int:
+    """How many nodes a scene's lattice has at most: the corners of all sides, and what is between."""
+    return 6 * num_faces + _NODES_A_POINT * num_points
+
+
+def _rows(longest: F64, spacing: float) -> NDArray[np.int64]:
+    return np.clip(np.ceil(longest / spacing), 1, MOST_ROWS).astype(np.int64)
+
+
+def _placed(
+    geometry: Geometry, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: float, alike: int
+) -> Placed:
+    """Place all nodes and share them."""
+    num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
+    counts = num_nodes(num_rows).ravel()
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).reshape(num_rows.shape)
+    nodes = _nodes_of(num_rows, counts)
+    normal = _face_normals(geometry)[nodes.face] * np.where(nodes.side == 0, 1, -1)[:, None].astype(np.float32)
+    hits = Hits(nodes.face, nodes.uv, np.ones(len(nodes.face), np.float32))
+    points = surface_at(geometry, hits, -normal).points
+    material = geometry.face_material[nodes.face].astype(np.uint16)
+    chosen, node = _shared(points, material, nodes.side, spacing, alike)
+    seeds = np.arange(len(chosen), dtype=np.uint32)
+    kept = points.rows(chosen)._replace(seed=seeds)
+    lattice = Lattice(num_rows, first.astype(np.uint32), node.astype(np.uint32))
+    return Placed(lattice, kept, material[chosen], spacing)
+
+
+def _nodes_of(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Nodes:
+    """List the nodes of all grids, in the order of `node_of`."""
+    side_of = np.repeat(np.arange(len(counts)), counts)
+    uv = np.empty((int(counts.sum()), 2), np.float32)
+    ends = np.cumsum(counts)
+    flat = num_rows.ravel()
+    for rows in map(int, np.unique(flat[flat > 0])):
+        i, j = np.array([(i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]).T
+        begin = (ends - counts)[flat == rows]
+        where = begin[:, None] + np.arange(len(i))
+        uv[where, 0], uv[where, 1] = (i / rows).astype(np.float32), (j / rows).astype(np.float32)
+    return _Nodes((side_of // 2).astype(np.int32), (side_of % 2).astype(np.uint8), uv)
+
+
+def _face_normals(geometry: Geometry) -> F32:
+    a, b, c = geometry.positions[geometry.faces].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30), np.float32)
+
+
+def _shared(
+    points: Points, material: NDArray[np.uint16], side: NDArray[np.uint8], spacing: float, alike: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find which nodes stand for all, in the order of their points, and the point of each node."""
+    size = _TOGETHER * spacing
+    place = np.floor((points.position - points.position.min(axis=0)) / size).astype(np.int64)
+    way = np.rint(points.normal * alike).astype(np.int64) + alike
+    base = 2 * alike + 1
+    kind = ((way[:, 0] * base + way[:, 1]) * base + way[:, 2]) * 2 + side
+    order = np.lexsort((kind, _interleaved(place), material))
+    keys = np.column_stack([place, kind, material.astype(np.int64)])[order]
+    is_new = np.concatenate([[True], np.any(keys[1:] != keys[:-1], axis=1)])
+    node = np.empty(len(order), np.intp)
+    node[order] = np.cumsum(is_new) - 1
+    return order[is_new], node
+
+
+def _interleaved(place: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Order places along a Morton curve: neighbours come mostly next to each other. (n,) uint64"""
+    code = np.zeros(len(place), np.uint64)
+    for bit in range(21):
+        for axis in range(3):
+            code |= (place[:, axis].astype(np.uint64) >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return code

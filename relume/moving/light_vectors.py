@@ -1,0 +1,134 @@
+"""Light vectors: what arrives at points, in the in-basis of their own hemispheres.
+
+    t_k(x) = ∫ L(x, ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s w_s h_k(ω_s)
+
+where s are light triangles that the point sees, and rays from cells and local lights. Nothing of it knows a BRDF or an
+eye: they multiply it (`relume.moving.out_factors`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.light.triangles import TriangleLights
+from relume.moving.zernike import NUM_FUNCTIONS, add_light, in_basis, ladder
+from relume.parallel import for_ranges, for_shares
+from relume.points import Points
+from relume.project.receivers import Listed, Rays, Receivers
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_POINTS_A_RANGE = 512
+_LISTED_A_RANGE = 128
+_AT_ONCE = 128  # lights whose functions are summed together; they stay in the cache
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_triangles(rungs, normal, tangent, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
+    """Add the light triangles that points [start, stop) see. out: (n, 3, K)"""
+    wi, light = np.empty((2, _AT_ONCE), np.float32), np.empty((3, _AT_ONCE), np.float32)
+    scratch = np.empty((6, _AT_ONCE), np.float32)
+    for p in range(start, stop):
+        n, t = normal[p], tangent[p]
+        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+        waiting = 0
+        for m in range(direction.shape[0]):
+            if not (visible[p, m >> 3] >> (m & 7)) & 1:
+                continue
+            x, y, z = direction[m, 0], direction[m, 1], direction[m, 2]
+            cosine = n[0] * x + n[1] * y + n[2] * z
+            if cosine <= 0:
+                continue
+            wi[0, waiting] = t[0] * x + t[1] * y + t[2] * z
+            wi[1, waiting] = bx * x + by * y + bz * z
+            for channel in range(3):
+                light[channel, waiting] = cosine * irradiance[m, channel]
+            waiting += 1
+            if waiting == _AT_ONCE:
+                add_light(rungs, waiting, wi, light, scratch, out[p])
+                waiting = 0
+        if waiting:
+            add_light(rungs, waiting, wi, light, scratch, out[p])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_listed(rungs, num_points, first, wi, irradiance, scratch, out):  # type: ignore[no-untyped-def]
+    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (num_points, 3, K)"""
+    for p in range(num_points):
+        begin, end = first[p], first[p + 1]
+        if end > begin:
+            add_light(rungs, end - begin, wi[:, begin:end], irradiance[:, begin:end], scratch, out[p])
+
+
+def light_vectors(points: Points, visible: NDArray[np.uint8], lights: TriangleLights, rays: Sequence[Rays]) -> F32:
+    """Find what arrives at points, as vectors.
+
+    Args:
+        points: n of them. visible: which of the lights each sees, as in `Receivers`. (n, bytes) uint8
+        lights: triangles of the environment. rays: what brings light besides.
+    Returns:
+        t, radiance times solid angle. (n, 3, K) float32
+    Cost: O(n · (lights + rays) · K) time.
+    """
+    out = np.zeros((points.num_points, 3, NUM_FUNCTIONS), np.float32)
+    if lights.num_lights:
+        args = (ladder(), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
+        for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
+    receivers = Receivers(points, points.normal, visible)  # no ray of a point depends on where it is seen from
+    for some in rays:
+        for_ranges(
+            lambda start, stop, some=some: _list_and_add(some, receivers, start, stop, out),  # type: ignore[misc]
+            points.num_points,
+            _LISTED_A_RANGE,
+        )
+    return out
+
+
+def _list_and_add(rays: Rays, receivers: Receivers, start: int, stop: int, out: F32) -> None:
+    """Add rays of points [start, stop)."""
+    most = (stop - start) * rays.rays_a_point
+    listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
+    rays.list_into(listed, receivers, start, stop)
+    scratch = np.empty((6, rays.rays_a_point), np.float32)
+    _from_listed(ladder(), stop - start, listed.first, listed.wi, listed.irradiance, scratch, out[start:stop])
+
+
+def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
+    """Do as `light_vectors` for light triangles alone, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, lights: as there.
+    Returns:
+        (n, 3, K) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    frame = np.stack([t, np.cross(n, t), n], axis=1)
+    wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
+    sees = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
+    weight = sees * np.maximum(wi[..., 2], 0)
+    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), in_basis(wi)))
+
+
+def add_scaled(total: F32 | None, part: F32, gain: F32) -> F32:
+    """Add light vectors times a gain of each channel to others, or begin with them.
+
+    Args:
+        total: what they are added to, which is written; None where there is nothing yet. (n, 3, K) float32
+        part: that is added. (n, 3, K) float32. gain: (3,) float32
+    """
+    out = np.zeros_like(part) if total is None else total
+    for_shares(lambda start, stop: _add_scaled(part, gain, start, stop, out), len(part))
+    return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_scaled(part, gain, start, stop, out):  # type: ignore[no-untyped-def]
+    for p in range(start, stop):
+        for channel in range(3):
+            for k in range(part.shape[2]):
+                out[p, channel, k] += gain[channel] * part[p, channel, k]

@@ -1,0 +1,272 @@
+"""One live picture whose eye moves, under a look that changes: evaluated whole for every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.registry import TERMS
+from relume.errors import EditNotSupportedError, ParameterError
+from relume.look import Look
+from relume.memory import Memory
+from relume.moving.evaluate import Tables, send, tables_of
+from relume.moving.light_vectors import add_scaled
+from relume.moving.look_up import Seen, combine, look
+from relume.moving.sky import fill_sky
+from relume.moving.surface import Surface
+from relume.moving.view import FreeView
+from relume.moving.zernike import NUM_FUNCTIONS
+from relume.picture.fidelity import Word
+from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
+from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
+from relume.scene.model import Camera
+from relume.trace.embree import EmbreeScene
+from relume.views.resolve import encode_pixels
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+
+
+class MovingTransfer(Protocol):
+    """What it asks of an opened bake."""
+
+    @property
+    def memory(self) -> Memory: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def default_look(self) -> dict[str, Any]: ...
+    @property
+    def material_names(self) -> Sequence[str]: ...
+    @property
+    def views(self) -> Mapping[str, FreeView]: ...
+    @property
+    def surface(self) -> Surface: ...
+    @property
+    def embree(self) -> EmbreeScene: ...
+    @property
+    def positions(self) -> F32: ...
+    @property
+    def faces(self) -> NDArray[np.uint32]: ...
+    def vectors(self, element: Light) -> F32:
+        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32"""
+        ...
+
+    def map_of(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        ...
+
+
+@dataclass(frozen=True)
+class MovingAdvance:
+    """What one step changed; a `server.library.ports.Advance`."""
+
+    tiles: list[Tile]
+    exact: bool = False
+    fidelity: Word = "approximate"
+    complete: bool = True
+
+    @property
+    def changed(self) -> bool:
+        """Whether any pixel may be new."""
+        return bool(self.tiles)
+
+
+class MovingPicture:
+    """State of one session's picture; used from one thread at a time."""
+
+    def __init__(self, transfer: MovingTransfer, view_name: str) -> None:
+        view = transfer.views[view_name]
+        self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
+        self._num_eyes = 0  # that it has been given: tells them apart
+        self._look: Look | None = None
+        self._light: Light | None = None
+        self._solo: Solo = None
+        self._shown: tuple[Any, ...] | None = None
+        self._image = np.zeros((view.height, view.width, 3), np.float32)
+        self._seen: tuple[int, Seen] | None = None
+        self._tables: tuple[Any, Tables] | None = None
+        self._vectors: tuple[Light, F32] | None = None
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
+
+    def set_look(self, look: Look, *, hand: str | None = None, solo: Solo = None) -> None:
+        """A new target; nothing is computed yet.
+
+        Args:
+            look: that is to be shown. hand: pointer to what the user's hand is on, or None.
+            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+        Raises:
+            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment
+                cannot be had. The picture stays as it was.
+        """
+        if hand is not None:
+            parse_pointer(hand)
+        light = light_of(look, self._transfer.material_names, has_bounces=True, solo=solo)
+        self._transfer.map_of(light.environment.map)  # what cannot be had is said now
+        self._look, self._light, self._solo = look, light, solo
+
+    def set_eye(self, camera: Camera, size: tuple[int, int]) -> None:
+        """See from elsewhere, in a picture of another size; nothing is computed yet.
+
+        Args:
+            camera: that `check_camera` lets pass. size: width and height in pixels.
+        """
+        self._camera, self._size = camera, size
+        self._num_eyes += 1
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the next picture, pixels."""
+        return self._size
+
+    def touch(self, pointer: str) -> None:
+        """Take note of what a hand holds; nothing needs to be prepared.
+
+        Raises:
+            ParameterError: there is no such thing.
+        """
+        found = parse_pointer(pointer)
+        if isinstance(found, CurvePointer | ParameterPointer) and self._look is not None:
+            self._check_there(found, self._look)
+
+    @staticmethod
+    def _check_there(pointer: CurvePointer | ParameterPointer, shown: Look) -> None:
+        material = shown.materials.get(pointer.material)
+        if material is None or not 0 <= pointer.term < len(material.terms):
+            raise ParameterError("pointer", str(pointer), "a term of this look")
+        declared = TERMS[material.terms[pointer.term]["model"]]
+        names = declared.curves if isinstance(pointer, CurvePointer) else declared.parameters
+        if pointer.name not in [one.name for one in names]:
+            raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")
+
+    def next_job(self) -> None:
+        """Nothing is made beside the frames."""
+        return
+
+    def install(self, job: Any, made: Any) -> None:
+        """Nothing was asked for."""
+
+    def advance(self, max_coefficients: int | None) -> MovingAdvance:
+        """Bring the picture to its look and its eye."""
+        wanted = (self._look, self._solo, self._num_eyes)
+        if self._look is None or wanted == self._shown:
+            return MovingAdvance([])
+        self._image = self._evaluate(self._look)
+        self._shown = wanted
+        return MovingAdvance(self.all_tiles())
+
+    def _evaluate(self, shown: Look) -> F32:
+        """The picture, (height, width, 3) float32."""
+        transfer, camera = self._transfer, self._camera
+        width, height = self._size
+        seen = self._look_around()
+        eye = camera.to_world[:3, 3].astype(np.float32)
+        sent = send(transfer.surface, self._vectors_now(), self._tables_of(shown), eye, seen.is_needed)
+        emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
+        pixel_angle = camera.yfov / height
+        out = combine(transfer.surface, transfer.positions, transfer.faces, seen, pixel_angle, sent, emission)
+        out *= np.array(gain_of(shown, self._solo), np.float32)
+        self._fill_background(shown, seen, out)
+        return out.reshape(height, width, 3)
+
+    def _fill_background(self, shown: Look, seen: Seen, out: F32) -> None:
+        """What is seen past all surfaces; transparent backgrounds are black."""
+        background, light = shown.background, self._now()
+        if background.kind == "color":
+            out[seen.hits.face < 0] = np.array(background.color, np.float32)
+        elif background.kind != "transparent" and light.paths.direct:
+            blur = background.blur if background.kind == "blurred" else 0.0
+            gain = np.array(light.environment_gain, np.float32) * np.array(gain_of(shown, self._solo), np.float32)
+            radiance = self._transfer.map_of(light.environment.map, blur)
+            fill_sky(radiance, light.environment.rotation, gain, seen.hits.face, seen.directions, out)
+
+    def _now(self) -> Light:
+        assert self._light is not None
+        return self._light
+
+    def _look_around(self) -> Seen:
+        if self._seen is None or self._seen[0] != self._num_eyes:
+            transfer = self._transfer
+            found = look(
+                transfer.surface, transfer.embree, transfer.positions, transfer.faces, self._camera, self._size
+            )
+            self._seen = self._num_eyes, found
+        return self._seen[1]
+
+    def _tables_of(self, shown: Look) -> Tables:
+        terms = [[dict(term) for term in shown.materials[name].terms] for name in self._transfer.material_names]
+        if self._tables is None or self._tables[0] != terms:
+            self._tables = terms, tables_of(terms)
+        return self._tables[1]
+
+    def _vectors_now(self) -> F32:
+        """Light vectors in the light of the look: transport is linear in its sources."""
+        light = self._now()
+        if self._vectors is None or self._vectors[0] != light:
+            total: F32 | None = None
+            for element, gain in vector_of(light).items():
+                part = self._transfer.vectors(element)
+                total = add_scaled(total, part, np.array(gain, np.float32))
+            if total is None:
+                total = np.zeros((self._transfer.surface.points.num_points, 3, NUM_FUNCTIONS), np.float32)
+            self._vectors = light, total
+        return self._vectors[1]
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture: one, for all of it changes together."""
+        return [(0, 0, *self._size)]
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame: the tiles one after another, row-major."""
+        parts = [self._image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
+        return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """Moving pictures hide all that is behind them."""
+        return None
+
+    def image(self) -> F32:
+        """Linear radiance. (height, width, 3) float32"""
+        return self._image
+
+    def probe(self, x: int, y: int) -> dict[str, Any]:
+        """What a pixel shows, and where its surface is.
+
+        Raises:
+            ParameterError: it lies outside the picture.
+        """
+        height, width, _ = self._image.shape
+        if not (0 <= x < width and 0 <= y < height):
+            raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
+        found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
+        found["radiance"] = self._image[y, x]
+        if self._seen is None or self._seen[1].hits.face[y * width + x] < 0:
+            return found
+        seen, pixel, surface = self._seen[1], y * width + x, self._transfer.surface
+        face = int(seen.hits.face[pixel])
+        place = self._camera.to_world[:3, 3] + float(seen.hits.distance[pixel]) * seen.directions[pixel]
+        normal = seen.weight[pixel] @ surface.points.normal[seen.point[pixel]]
+        return found | {
+            "material": self._transfer.material_names[int(surface.face_material[face])],
+            "position": place,
+            "normal": normal / max(float(np.linalg.norm(normal)), 1e-12),
+        }
+
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Refuse: no curve is frozen in pictures whose eye moves.
+
+        Args:
+            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+
+        Raises:
+            EditNotSupportedError: always.
+        """
+        raise EditNotSupportedError(
+            self._transfer.method, "a brush over a curve; open a fixed view of the scene for it"
+        )

@@ -1,0 +1,160 @@
+"""What a moving eye sees of a store: triangles, the lattice of points on them, textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.brdf.albedo import TEXTURES
+from relume.errors import ChunkDamagedError, StoreError
+from relume.light.gather_rays import Pattern, make_pattern
+from relume.moving.lattice import Lattice, num_nodes
+from relume.points import Points
+from relume.scene.model import Scene, Texture
+from relume.trace.texture import MipMap
+
+F32 = NDArray[np.float32]
+
+MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
+_WRAPS = ("repeat", "mirror", "clamp")
+
+
+class StoredTextures(NamedTuple):
+    """Textures as a store keeps them.
+
+    Attributes:
+        arrays: "textures/<k>", (height, width, 3) float16.
+        described: attributes of the store: which texture each material has in each of `TEXTURES`, −1 for none, and how
+            each texture continues outside.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    described: dict[str, Any]
+
+
+def textures_of(scene: Scene) -> StoredTextures:
+    """Collect the textures of a scene's materials, each once, at most `MAX_TEXTURE_SIDE` wide and high."""
+    known: dict[int, int] = {}
+    kept: list[Texture] = []
+    for material in scene.materials:
+        for texture in (material.textures[name] for name in TEXTURES if name in material.textures):
+            if id(texture) not in known:
+                known[id(texture)] = len(kept)
+                kept.append(texture)
+    of_material = [
+        [known[id(material.textures[name])] if name in material.textures else -1 for name in TEXTURES]
+        for material in scene.materials
+    ]
+    arrays = {f"textures/{k}": _level(texture).astype(np.float16) for k, texture in enumerate(kept)}
+    wraps = [[_WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
+    return StoredTextures(arrays, {"textures": of_material, "wraps": wraps})
+
+
+def _level(texture: Texture) -> F32:
+    return next(level for level in MipMap.of(texture).levels if max(level.shape[:2]) <= MAX_TEXTURE_SIDE)
+
+
+class Textures(NamedTuple):
+    """All textures with their halvings, one after another.
+
+    Attributes:
+        texels: (texels, 3) float32
+        levels: first texel, height, width of each level, finest first. (levels, 3) int64
+        first: of each texture, where its levels begin; one more at the end. (textures + 1,) int64
+        wraps: how u and v continue: repeat, mirror, clamp. (textures, 2) int64
+        of_material: texture of each material in each of `TEXTURES`, −1 for none. (materials, 2) int64
+    """
+
+    texels: F32
+    levels: NDArray[np.int64]
+    first: NDArray[np.int64]
+    wraps: NDArray[np.int64]
+    of_material: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The surfaces of a bake as an eye sees them.
+
+    Attributes:
+        points: that light is kept at. material: of each. (n,) uint16
+        uvs: places in textures, of the triangles' corners. (num_vertices, 2) float32
+        face_material: (num_faces,) int32
+    """
+
+    lattice: Lattice
+    points: Points
+    material: NDArray[np.uint16]
+    uvs: F32
+    face_material: NDArray[np.int32]
+    textures: Textures
+
+
+def read_surface_points(store: StoreReader, start: int = 0, stop: int | None = None) -> Points:
+    """Read points [start, stop) of a store.
+
+    All have one seed: their rays go alike, so that what few rays miss changes smoothly from point to point.
+    """
+    position, normal, tangent = (
+        store.read(f"points/{name}", start, stop) for name in ("position", "normal", "tangent")
+    )
+    return Points(position, normal, tangent, np.zeros(len(position), np.uint32))
+
+
+def pattern_of_points(store: StoreReader, num_rays: int) -> Pattern:
+    """Make the pattern of the points' gather rays again."""
+    return make_pattern(num_rays, 0, int(store.attributes["gather_seed"]) + 1)
+
+
+def read_surface(store: StoreReader) -> Surface:
+    """Read all of it.
+
+    Raises:
+        ChunkDamagedError: arrays of the store do not fit each other. StoreError: its description is not of this form.
+    """
+    lattice = Lattice(*(store.read(f"lattice/{name}") for name in Lattice._fields))
+    surface = Surface(
+        lattice,
+        read_surface_points(store),
+        store.read("points/material"),
+        store.read("scene/uvs"),
+        store.read("scene/face_material"),
+        _read_textures(store),
+    )
+    num_points, num_materials = surface.points.num_points, len(store.attributes["materials"])
+    ends = lattice.first.astype(np.int64) + num_nodes(lattice.num_rows)
+    fits = lattice.num_rows.shape == lattice.first.shape == (len(surface.face_material), 2)
+    if not fits or num_points == 0 or int(lattice.node.max(initial=0)) >= num_points or ends.max() > len(lattice.node):
+        raise ChunkDamagedError("lattice", "its nodes do not fit the points")
+    if max(int(surface.material.max()), int(surface.face_material.max())) >= num_materials:
+        raise ChunkDamagedError("points", "a point has a material that the scene has not")
+    return surface
+
+
+def _read_textures(store: StoreReader) -> Textures:
+    try:
+        of_material = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
+        wraps = np.array(store.attributes["wraps"], np.int64).reshape(-1, 2)
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error
+    if of_material.size and not -1 <= of_material.min() <= of_material.max() < len(wraps):
+        raise ChunkDamagedError("textures", "a material has a texture that the store has not")
+    texels, levels, first, end = [], [], [0], 0
+    for k in range(len(wraps)):
+        pixels = store.read(f"textures/{k}").astype(np.float32)
+        for level in MipMap(Texture(pixels)).levels:
+            levels.append((end, *level.shape[:2]))
+            texels.append(level.reshape(-1, 3))
+            end += len(texels[-1])
+        first.append(len(levels))
+    return Textures(
+        np.concatenate(texels) if texels else np.empty((0, 3), np.float32),
+        np.array(levels, np.int64).reshape(-1, 3),
+        np.array(first, np.int64),
+        wraps,
+        of_material,
+    )

@@ -1,0 +1,157 @@
+"""The in-basis: Zernike's polynomials, orthonormal over the hemisphere weighed by its cosine.
+
+A direction (x, y, z) above a surface is a place (x, y) of the unit disc, and dx dy = cos θ dω. What is orthonormal on
+the disc keeps most of a BRDF by its cosine-weighted error:
+
+    h_nm(ω) = N_nm · (Re | Im)(x + iy)^m · P_s^(0,m)(2 (x² + y²) − 1),   s = (n − m) / 2,   N² = (n + 1) (1 or 2) / π
+
+with Jacobi's polynomials P. They are nested: those of degree n ≤ N are the first (N + 1)(N + 2) / 2
+(docs/adr/0042-zernike-in-basis.md).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+DEGREE = 7
+NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
+
+
+class Ladder(NamedTuple):
+    """How functions follow from each other; one rung for each degree n and order m ≥ 0, orders outermost.
+
+    Attributes:
+        order: m. (rungs,) int32. norm: N. (rungs,) float32
+        cosine, sine: which of the K functions its two parts are; the same where m is 0. (rungs,) int32
+        a, b, c: P_s = (a · x + b) P_(s−1) − c P_(s−2), with P_0 = 1; `a` is 0 where s is. (rungs,) float32
+    """
+
+    order: NDArray[np.int32]
+    norm: F32
+    cosine: NDArray[np.int32]
+    sine: NDArray[np.int32]
+    a: F32
+    b: F32
+    c: F32
+
+
+def num_functions(degree: int) -> int:
+    """How many functions have at most a degree."""
+    return (degree + 1) * (degree + 2) // 2
+
+
+@lru_cache(maxsize=1)
+def ladder() -> Ladder:
+    """The rungs of all functions up to `DEGREE`."""
+    rows: list[tuple[float, ...]] = []
+    for m in range(DEGREE + 1):
+        for s, n in enumerate(range(m, DEGREE + 1, 2)):
+            first = num_functions(n - 1) + sum(1 if k == 0 else 2 for k in range(n % 2, m, 2))
+            scale = math.sqrt((n + 1) * (2 if m else 1) / math.pi)
+            rows.append((m, scale, first, first + (1 if m else 0), *_recurrence(s, m)))
+    table = np.array(rows)
+    order, cosine, sine = (np.ascontiguousarray(table[:, k], np.int32) for k in (0, 2, 3))
+    norm, a, b, c = (np.ascontiguousarray(table[:, k], np.float32) for k in (1, 4, 5, 6))
+    return Ladder(order=order, norm=norm, cosine=cosine, sine=sine, a=a, b=b, c=c)
+
+
+def _recurrence(s: int, m: int) -> tuple[float, float, float]:
+    """Find the factors a, b, c of `Ladder` for P_s^(0,m)."""
+    if s == 0:
+        return 0.0, 0.0, 0.0
+    if s == 1:
+        return (m + 2) / 2, -m / 2, 0.0
+    t = 2 * s + m
+    divisor = 2 * s * (s + m) * (t - 2)
+    return (t - 1) * t * (t - 2) / divisor, -(t - 1) * m * m / divisor, 2 * (s - 1) * (s + m - 1) * t / divisor
+
+
+def in_basis(wi: F64) -> F64:
+    """Evaluate all functions.
+
+    Args:
+        wi: local directions, unit, z = normal. (..., 3)
+    Returns:
+        (..., K) float64, zero below the horizon
+    """
+    rungs, power = ladder(), np.ones(wi.shape[:-1], np.complex128)
+    place = wi[..., 0] + 1j * wi[..., 1]
+    x = 2 * np.abs(place) ** 2 - 1
+    out = np.zeros((*wi.shape[:-1], NUM_FUNCTIONS))
+    before = last = np.ones_like(x)
+    for rung, m in enumerate(rungs.order):
+        if rungs.a[rung] == 0:
+            power = place**m
+            before, last = np.zeros_like(x), np.ones_like(x)
+        else:
+            before, last = last, (rungs.a[rung] * x + rungs.b[rung]) * last - rungs.c[rung] * before
+        value = rungs.norm[rung] * last * power
+        out[..., rungs.sine[rung]] = value.imag
+        out[..., rungs.cosine[rung]] = value.real
+    return out * (wi[..., 2:] > 0)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def add_light(rungs, num, wi, light, scratch, out):  # type: ignore[no-untyped-def]
+    """Add the light of rays to a point's light vector, t_k += Σ w h_k(ωi).
+
+    Args:
+        rungs: the `ladder`. num: how many rays there are.
+        wi: their local directions. (≥ 2, ≥ num) float32. light: of each channel. (3, ≥ num) float32
+        scratch: (6, ≥ num) float32, written. out: added to. (3, K) float32
+    """
+    x, re, im, before, last, value = scratch
+    for n in range(num):
+        x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)
+    for rung in range(rungs.order.shape[0]):
+        m, a, b, c = rungs.order[rung], rungs.a[rung], rungs.b[rung], rungs.c[rung]
+        if a == 0:
+            _next_power(m, num, wi, re, im)
+            for n in range(num):
+                before[n], last[n] = np.float32(0), np.float32(1)
+        else:
+            for n in range(num):
+                old = last[n]
+                last[n] = (a * x[n] + b) * old - c * before[n]
+                before[n] = old
+        norm, cosine, sine = rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
+        for n in range(num):
+            value[n] = norm * last[n] * re[n]
+        _add(num, value, light, cosine, out)
+        if m > 0:
+            for n in range(num):
+                value[n] = norm * last[n] * im[n]
+            _add(num, value, light, sine, out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _next_power(m, num, wi, re, im):  # type: ignore[no-untyped-def]
+    """Go from (x + iy)^(m − 1) to (x + iy)^m."""
+    if m == 0:
+        for n in range(num):
+            re[n], im[n] = np.float32(1), np.float32(0)
+        return
+    for n in range(num):
+        r, i = re[n], im[n]
+        re[n], im[n] = r * wi[0, n] - i * wi[1, n], r * wi[1, n] + i * wi[0, n]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _add(num, value, light, k, out):  # type: ignore[no-untyped-def]
+    red = green = blue = np.float32(0)
+    for n in range(num):
+        red += value[n] * light[0, n]
+        green += value[n] * light[1, n]
+        blue += value[n] * light[2, n]
+    out[0, k] += red
+    out[1, k] += green
+    out[2, k] += blue

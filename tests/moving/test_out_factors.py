@@ -1,0 +1,80 @@
+"""Out-factors: what a term sends of each function of the in-basis, for every term of the library."""
+
+import numpy as np
+import pytest
+from analytic_terms import ANALYTIC
+from test_zernike import hemisphere
+
+from relume.brdf.evaluate import eval_brdf
+from relume.moving.evaluate import tables_of
+from relume.moving.out_factors import NUM_ROWS, cosines, out_factors, turned
+from relume.moving.zernike import NUM_FUNCTIONS, in_basis
+
+
+def document(model, **fields):
+    return {"model": model, "color": [1.0, 1.0, 1.0], "params": {}, "texture": None} | fields
+
+
+def test_a_diffuse_surface_is_one_number():
+    found = out_factors(document("lambert", color=[0.2, 0.4, 0.8]))
+    assert found.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
+    np.testing.assert_allclose(
+        found.table[:, 0, :, 0], np.tile(np.array([0.2, 0.4, 0.8]) / np.sqrt(np.pi), (32, 1)), rtol=1e-5
+    )
+    assert np.abs(found.table[..., 1:]).max() < 1e-6
+    assert found.missed < 1e-3
+
+
+@pytest.mark.parametrize("model", ANALYTIC)
+def test_factors_are_the_integrals_of_the_term(model):
+    """By another quadrature, finer than the one under test; highlights that no quadrature of it resolves are blurred by
+    the same functions."""
+    term = document(model)
+    found = out_factors(term)
+    wi, weight = hemisphere(96, 192)
+    row = 18
+    cosine = cosines()[row]
+    phi = 2 * np.pi * 5 / found.table.shape[1] if found.table.shape[1] > 1 else 0.0
+    column = 5 if found.table.shape[1] > 1 else 0
+    sine = np.sqrt(1 - cosine**2)
+    wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
+    value = eval_brdf(term, wi, wo)
+    expected = np.einsum("nc,n,nk->ck", value, weight, in_basis(wi))
+    scale = np.sqrt((value**2 * weight[:, None]).sum(axis=0).max())
+    assert np.abs(found.table[row, column] - expected).max() < 0.05 * scale
+
+
+def test_factors_turn_with_the_eye():
+    term, wi_weights = document("blinn_phong", params={"exponent": 20.0}), hemisphere(48, 96)
+    found, (wi, weight) = out_factors(term), wi_weights
+    row, phi = 14, 1.1
+    cosine = cosines()[row]
+    sine = np.sqrt(1 - cosine**2)
+    wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
+    expected = np.einsum("nc,n,nk->ck", eval_brdf(term, wi, wo), weight, in_basis(wi))
+    np.testing.assert_allclose(turned(found.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_what_is_missed_grows_with_the_exponent():
+    missed = [out_factors(document("blinn_phong", params={"exponent": e})).missed for e in (5.0, 20.0, 80.0, 300.0)]
+    assert missed == sorted(missed)
+    assert missed[0] < 0.05
+    assert missed[-1] > 0.5
+
+
+def test_terms_with_a_highlight_along_the_tangent_have_tables_over_both_angles():
+    uneven = {model for model in ANALYTIC if out_factors(document(model)).table.shape[1] > 1}
+    assert "ward_anisotropic" in uneven
+    assert not uneven & {"lambert", "oren_nayar", "blinn_phong", "cook_torrance", "ggx"}
+
+
+def test_terms_of_one_texture_are_summed_and_others_kept_apart():
+    terms = [
+        document("lambert"),
+        document("lambert", texture="diffuse"),
+        document("lambert", texture="diffuse", color=[0, 0, 1.0]),
+        document("ward_anisotropic"),
+    ]
+    tables = tables_of([terms, []])
+    assert tables.of.tolist() == [[[0, 0], [1, -1], [-1, -1]], [[-1, -1]] * 3]
+    np.testing.assert_allclose(tables.even[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)

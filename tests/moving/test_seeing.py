@@ -1,0 +1,160 @@
+"""From points to pixels: the lattice, the sides that have points, what an eye sees, and what is sent there."""
+
+import math
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, mesh, scene_of, sphere, still_life
+
+from relume.bake import Recipe
+from relume.environments.equirect import lookup, turned
+from relume.errors import PlanError
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.evaluate import send, send_numpy, tables_of
+from relume.moving.lattice import node_of, num_nodes, place_points
+from relume.moving.look_up import combine, look
+from relume.moving.sides import open_sides
+from relume.moving.sky import fill_sky
+from relume.scene.model import Camera
+from relume.store import bake_here
+from relume.trace.geometry import merge
+from relume.trace.texture import MipMap
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    recipe = Recipe("surface", ("front",), (48, 36), 60, num_points=3000)
+    store = bake_here(METHODS["surface"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
+    return open_bake(store, Memory(1 << 30))
+
+
+def placed(scene, num_points=500):
+    geometry = merge(scene)
+    eyes = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
+    return geometry, place_points(geometry, open_sides(geometry, scene.cameras, 1), eyes, num_points)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 7, 255])
+def test_nodes_are_numbered_once_each(rows):
+    numbers = [node_of(rows, i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]
+    assert numbers == list(range(int(num_nodes(np.array([rows]))[0])))
+
+
+@pytest.mark.parametrize("num_points", [200, 500, 5000])
+def test_about_as_many_points_as_asked_for_and_none_twice(num_points):
+    _, found = placed(still_life(), num_points)
+    assert 0.5 * num_points < found.points.num_points <= 1.05 * num_points + 1
+    together = np.column_stack([found.points.position, found.points.normal, found.material])
+    assert len(np.unique(together, axis=0)) == len(together)
+
+
+def test_nodes_lie_where_their_points_are():
+    """Nowhere farther than points are shared over, and on their side."""
+    geometry, found = placed(still_life(), 4000)
+    lattice, points = found.lattice, found.points
+    for face, side in np.argwhere(lattice.num_rows > 0)[::37]:
+        rows, first = int(lattice.num_rows[face, side]), int(lattice.first[face, side])
+        a, b, c = geometry.positions[geometry.faces[face]]
+        for i, j in ((0, 0), (rows, 0), (0, rows), (rows // 2, rows // 3 if rows > 2 else 0)):
+            place = a + (b - a) * (i / rows) + (c - a) * (j / rows)
+            point = lattice.node[first + node_of(rows, i, j)]
+            assert np.linalg.norm(points.position[point] - place) < found.spacing
+            outward = np.cross(b - a, c - a) * (1 if side == 0 else -1)
+            assert points.normal[point] @ outward > 0
+
+
+def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
+    solid = scene_of(sphere("ball", (0, 0, 0), 1.0, 0), camera=looking("front", (0, 0, 4), (0, 0, 0), 0.7))
+    sides = open_sides(merge(solid), solid.cameras, 3)
+    assert sides[:, 0].all()
+    assert not sides[:, 1].any()
+    room = scene_of(sphere("room", (0, 0, 0), 1.0, 0), camera=looking("front", (0, 0, 0.2), (0, 0, -1), 1.2))
+    assert open_sides(merge(room), room.cameras, 3).all()
+
+
+def test_a_scene_without_area_is_refused():
+    flat = mesh("line", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], 0, normals=[[0, 1, 0]] * 3)
+    geometry = merge(scene_of(flat, camera=looking("front", (0, 1, 3), (0, 0, 0), 0.7)))
+    with pytest.raises(PlanError, match="no surface"):
+        place_points(geometry, np.ones((1, 2), bool), np.zeros((1, 3)), 100)
+
+
+def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
+    view = moving.views["front"]
+    seen = look(moving.surface, moving.embree, moving.positions, moving.faces, view.camera, (96, 72))
+    hit = seen.hits.face >= 0
+    np.testing.assert_allclose(seen.weight[hit].sum(axis=1), 1, atol=1e-5)
+    assert seen.weight[hit].min() > -1e-5
+    place = np.einsum("nk,nkc->nc", seen.weight, moving.surface.points.position[seen.point])
+    truth = view.camera.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
+    apart = np.linalg.norm(place - truth, axis=1)[hit]
+    assert np.median(apart) < 0.03
+    assert set(np.flatnonzero(seen.is_needed)) == set(seen.point[hit].ravel())
+
+
+def test_what_points_send_is_that_of_the_oracle(moving):
+    materials = [
+        [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
+        [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": {}, "texture": None}],
+    ]
+    names = len(moving.material_names)
+    tables = tables_of([materials[k % 2] for k in range(names)])
+    rng = np.random.default_rng(9)
+    num = moving.surface.points.num_points
+    vectors, eye = rng.normal(size=(num, 3, 36)).astype(np.float32), np.array([0.3, 1.2, 2.0], np.float32)
+    found = send(moving.surface, vectors, tables, eye, np.ones(num, np.uint8))
+    for point in range(0, num, num // 60):
+        expected = send_numpy(moving.surface, vectors, tables, eye, point)
+        np.testing.assert_allclose(found[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
+    none = send(moving.surface, vectors, tables, eye, np.zeros(num, np.uint8))
+    assert not none.any()
+
+
+def test_textures_of_pixels_are_those_of_the_bakes(moving):
+    """White points under a texture show the texture; the same filter as view samples have."""
+    scene, view, size = still_life(), moving.views["front"], (96, 72)
+    surface = moving.surface
+    seen = look(surface, moving.embree, moving.positions, moving.faces, view.camera, size)
+    sent = np.zeros((surface.points.num_points, 3, 3), np.float32)
+    sent[:, 1] = 1
+    angle = view.camera.yfov / size[1]
+    dark = np.zeros((len(moving.material_names), 3), np.float32)
+    found = combine(surface, moving.positions, moving.faces, seen, angle, sent, dark)
+    textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
+    assert textured
+    for index in textured:
+        rows = np.flatnonzero((seen.hits.face >= 0) & (surface.face_material[np.maximum(seen.hits.face, 0)] == index))
+        corners = moving.faces[seen.hits.face[rows]]
+        b = np.column_stack([1 - seen.hits.uv[rows].sum(axis=1), seen.hits.uv[rows]])
+        uv = np.einsum("nk,nkc->nc", b, surface.uvs[corners]).astype(np.float32)
+        p, q = moving.positions[corners], surface.uvs[corners]
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        area = np.linalg.norm(normal, axis=1)
+        cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, seen.directions[rows])) / area, 0.05)
+        (du0, dv0), (du1, dv1) = (q[:, 1] - q[:, 0]).T, (q[:, 2] - q[:, 0]).T
+        footprint = seen.hits.distance[rows] * angle * np.sqrt(np.abs(du0 * dv1 - dv0 * du1) / area / cosine)
+        expected = MipMap.of(scene.materials[index].textures["diffuse"]).sample(uv, footprint.astype(np.float32))
+        np.testing.assert_allclose(found[rows], expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 77.0, -130.0])
+def test_the_sky_is_that_of_fixed_views(rotation):
+    rng = np.random.default_rng(2)
+    radiance, gain = rng.random((16, 32, 3), np.float32), np.array([1.0, 0.5, 2.0], np.float32)
+    directions = rng.normal(size=(500, 3))
+    directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
+    face, out = np.full(500, -1, np.int32), np.zeros((500, 3), np.float32)
+    face[::7] = 3
+    fill_sky(radiance, rotation, gain, face, directions, out)
+    expected = gain * lookup(radiance, turned(directions.astype(np.float64), -rotation).astype(np.float32))
+    assert not out[::7].any()
+    np.testing.assert_allclose(out[face < 0], expected[face < 0], atol=2e-3)
+
+
+def test_rays_go_through_the_middles_of_pixels(moving):
+    camera = Camera("level", np.eye(4), math.radians(90))
+    seen = look(moving.surface, moving.embree, moving.positions, moving.faces, camera, (4, 2))
+    first, last = seen.directions[0], seen.directions[-1]
+    np.testing.assert_allclose(first * np.sign(first), np.abs(last), atol=1e-6)
+    np.testing.assert_allclose(first / -first[2], [-1.5, 0.5, -1], atol=1e-5)

@@ -1,0 +1,74 @@
+"""The in-basis: orthonormal over the hemisphere, nested, and the kernel that sums light in it."""
+
+import numpy as np
+import pytest
+
+from relume.light.triangles import TriangleLights
+from relume.moving.light_vectors import light_vectors, light_vectors_numpy
+from relume.moving.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
+from relume.points import Points
+from relume.trace.surface import any_tangent
+
+
+def hemisphere(radii=24, turns=48):
+    """Directions, and weights of cos θ dω: Gauss–Legendre in r², even in φ."""
+    nodes, weights = np.polynomial.legendre.leggauss(radii)
+    r2, phi = np.repeat((nodes + 1) / 2, turns), np.tile(np.arange(turns) * (2 * np.pi / turns), radii)
+    wi = np.stack([np.sqrt(r2) * np.cos(phi), np.sqrt(r2) * np.sin(phi), np.sqrt(1 - r2)], axis=-1)
+    return wi, np.repeat(weights / 4, turns) * (2 * np.pi / turns)
+
+
+def test_functions_are_orthonormal_under_the_cosine():
+    wi, weight = hemisphere()
+    assert weight.sum() == pytest.approx(np.pi)  # of a white sky
+    functions = in_basis(wi)
+    np.testing.assert_allclose(np.einsum("nk,nl,n->kl", functions, functions, weight), np.eye(NUM_FUNCTIONS), atol=1e-6)
+
+
+def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_ones():
+    """So a prefix of them is the basis of a lower degree: x^a y^b lies in it where a + b is not higher."""
+    wi, weight = hemisphere()
+    functions = in_basis(wi)
+    for degree in range(DEGREE + 1):
+        monomial = wi[:, 0] ** degree
+        share = np.einsum("n,nk,n->k", monomial, functions, weight)
+        np.testing.assert_allclose(share[num_functions(degree) :], 0, atol=1e-6)
+        assert np.abs(share[num_functions(degree - 1) :]).max() > 1e-3
+
+
+def test_nothing_arrives_from_below():
+    assert not in_basis(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
+
+
+def test_every_function_stands_on_one_rung():
+    rungs = ladder()
+    places = [*rungs.cosine, *rungs.sine[rungs.order > 0]]
+    assert sorted(places) == list(range(NUM_FUNCTIONS))
+
+
+@pytest.fixture
+def scattered():
+    """Points that look anywhere, lights anywhere, more than are summed at once, and bits at random."""
+    rng = np.random.default_rng(5)
+    normal, direction = (rng.normal(size=(num, 3)).astype(np.float32) for num in (40, 300))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    points = Points(normal, normal, any_tangent(normal), np.zeros(40, np.uint32))
+    lights = TriangleLights(np.zeros((3, 6, 300), np.float32), direction, rng.random((300, 3), np.float32))
+    return points, rng.integers(0, 256, (40, 38), dtype=np.uint8), lights
+
+
+def test_light_vectors_are_those_of_the_oracle(scattered):
+    points, visible, lights = scattered
+    found, expected = light_vectors(points, visible, lights, ()), light_vectors_numpy(points, visible, lights)
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_the_first_number_is_the_irradiance(scattered):
+    points, visible, lights = scattered
+    cosine = np.maximum(points.normal.astype(np.float64) @ lights.direction.astype(np.float64).T, 0)
+    seen = np.unpackbits(visible, axis=1, count=300, bitorder="little")
+    irradiance = (seen * cosine) @ lights.irradiance
+    np.testing.assert_allclose(
+        np.sqrt(np.pi) * light_vectors(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
+    )
