@@ -69,6 +69,13 @@ class Tiles:
         return _corners(self.codes)
 
     @cached_property
+    def solid_angles(self) -> F64:
+        """Of each tile, sr (van Oosterom and Strackee 1983). (M,)"""
+        a, b, c = self.corners.transpose(1, 0, 2)
+        dots = 1 + np.sum(a * b + b * c + c * a, axis=1)
+        return np.asarray(2 * np.arctan2(np.sum(a * np.cross(b, c), axis=1), dots))
+
+    @cached_property
     def centroids(self) -> F64:
         """The unit direction to the middle of each tile. (M, 3)"""
         return unit(self.corners.mean(axis=1))

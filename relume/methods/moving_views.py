@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
+from relume.light.triangles import TriangleLights
 from relume.memory import Memory
-from relume.methods.store_io import read_cells
+from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.light_vectors import light_vectors
+from relume.moving.sky import Sky, sky_of
 from relume.moving.surface import Surface, pattern_of_points, read_surface
 from relume.moving.view import FreeView
+from relume.moving.zernike import NUM_FUNCTIONS
 from relume.picture.light import Light
 from relume.picture.transfer import Axis, Eyes
 from relume.project.receivers import GatherRays, Rays
@@ -99,16 +102,6 @@ class MovingViews:
         """The triangles' search tree."""
         return self.lit.local.embree
 
-    @property
-    def positions(self) -> F32:
-        """Corners of the triangles. (num_vertices, 3) float32"""
-        return self.lit.local.positions
-
-    @property
-    def faces(self) -> NDArray[np.uint32]:
-        """The triangles. (num_faces, 3) uint32"""
-        return self.lit.local.faces
-
     @cached_property
     def _visible(self) -> NDArray[np.uint8]:
         return np.asarray(self.lit.store.read("points/visibility"), np.uint8)
@@ -129,6 +122,28 @@ class MovingViews:
         if radiance is not None:
             rays.append(GatherRays(self._links, pattern_of_points(self.lit.store, self._links.shape[1]), radiance))
         return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
+
+    @property
+    def vectors_shape(self) -> tuple[int, int, int]:
+        """Of light vectors: points, channels, K."""
+        return self.surface.points.num_points, 3, NUM_FUNCTIONS
+
+    @property
+    def sky_share(self) -> F32:
+        """What each point sees of the sky, in the in-basis, of whatever brightness it is. (points, K) float32"""
+        return self.memory.keep((self.key, "share of the sky"), self._sky_share)
+
+    def _sky_share(self) -> F32:
+        lights = self.lit.lights
+        areas = np.repeat(read_tiles(self.lit.store).solid_angles[:, None], 3, axis=1).astype(np.float32)
+        directions = read_traced_directions(self.lit.store)
+        white = TriangleLights(lights.nodes, directions, areas)
+        return np.ascontiguousarray(light_vectors(self.surface.points, self._visible, white, ())[:, 0])
+
+    def sky_in(self, name: str | None) -> Sky:
+        """An environment, None for the scene's own, and what it is when it is blurred."""
+        owner = self.key if name is None else "environments"
+        return self.memory.keep((owner, "sky", name), lambda: sky_of(lambda degrees: self.map_of(name, degrees)))
 
     def map_of(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""

@@ -8,6 +8,7 @@ points, the cells), then "visibility and gather rays" (rows of cells and of poin
     lights/…                                                 as in relume.methods.sampled_views
     cells/…                                                  as in relume.methods.gather
     lattice/num_rows, first, node                            relume.moving.lattice.Lattice
+    vertices/normal, point, weight                           relume.moving.vertices.Vertices
     points/position, normal, tangent, material               relume.moving.lattice.Placed
     points/visibility, points/links                          lights that a point sees, cells that its rays hit
 """
@@ -31,6 +32,7 @@ from relume.methods.store_io import read_gather_samples, read_tree
 from relume.moving.lattice import MAX_POINTS, most_nodes, place_points
 from relume.moving.sides import open_sides
 from relume.moving.surface import pattern_of_points, read_surface_points, textures_of
+from relume.moving.vertices import POINTS_A_VERTEX
 from relume.scene.model import Scene
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.coherent import trace_coherent
@@ -44,7 +46,8 @@ MIN_POINTS = 64
 _MOST_ALIKE = 54  # points of a material, on both sides, in each of 27 directions
 _MORE_POINTS = 1.05  # than asked for, at most
 _POINT_BYTES = 3 * 12 + 2 + 2 * RAYS_A_POINT
-_MAKING_BYTES_A_NODE = 300  # while nodes are shared: their surface, their keys, and the order of these
+_VERTEX_BYTES = 12 + 2 * 4 * POINTS_A_VERTEX
+_MAKING_BYTES_A_NODE = 600  # while nodes are shared: their surface, their keys, and the order of these
 _CELL_BYTES = POINTS_A_CELL * (24 + 2 * RAYS_A_CELL_POINT) + 64
 _MAKING_BYTES_A_CELL = 4000
 
@@ -84,7 +87,7 @@ class SurfaceMethod:
             store_bytes=points * (_POINT_BYTES + bits)
             + of_cells * bits
             + num_cells * _CELL_BYTES
-            + 4 * nodes
+            + (4 + _VERTEX_BYTES) * nodes
             + triangles * 10
             + bounds.triangles_bytes(scene)
             + bounds.uv_bytes(scene)
@@ -158,6 +161,7 @@ class SurfaceMethod:
         fields = {name: getattr(placed.points, name) for name in ("position", "normal", "tangent")}
         return {
             **{f"lattice/{name}": array for name, array in placed.lattice._asdict().items()},
+            **{f"vertices/{name}": array for name, array in placed.vertices._asdict().items()},
             **{f"points/{name}": array for name, array in fields.items()},
             "points/material": placed.material,
         }

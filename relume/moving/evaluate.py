@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
+from relume.moving.glints import LEAST_COSINE, row_of
+from relume.moving.lobes import NUM_GROUPS, is_narrow
 from relume.moving.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors, turned
 from relume.moving.surface import Surface
 from relume.moving.zernike import NUM_FUNCTIONS, ladder
@@ -19,9 +21,6 @@ from relume.parallel import for_shares
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NUM_GROUPS = 1 + len(TEXTURES)  # terms without a texture, and those that each of them multiplies
-_LEAST_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
-
 
 class Tables(NamedTuple):
     """The out-factors of all materials.
@@ -29,7 +28,8 @@ class Tables(NamedTuple):
     Attributes:
         even: of isotropic terms summed, for φo = 0, by rungs of the ladder. (tables, `NUM_ROWS`, 3, rungs) float32
         uneven: of the others summed. (tables, `NUM_ROWS`, `NUM_COLUMNS`, 3, K) float32
-        of: table of each material and group in both, −1 for none. (materials, groups, 2) int32
+        of: table of each material and group in both, −1 for none; groups are terms without a texture, and those that
+            each of `TEXTURES` multiplies. (materials, groups, 2) int32
     """
 
     even: F32
@@ -38,7 +38,7 @@ class Tables(NamedTuple):
 
 
 def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
-    """Sum the out-factors of the terms of each material that the same texture multiplies.
+    """Sum the out-factors of the broad terms of each material that the same texture multiplies.
 
     Args:
         materials: the terms of each, of a complete look.
@@ -50,7 +50,8 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     for index, terms in enumerate(materials):
         for group in range(NUM_GROUPS):
             texture = None if group == 0 else TEXTURES[group - 1]
-            found = [out_factors(term).table for term in terms if term.get("texture") == texture]
+            broad = (term for term in terms if term.get("texture") == texture and not is_narrow(term))
+            found = [out_factors(term).table for term in broad]
             for kind, kept, tables in (
                 (0, even, [t[:, 0][..., rungs.cosine] for t in found if t.shape[1] == 1]),
                 (1, uneven, [t for t in found if t.shape[1] > 1]),
@@ -110,13 +111,12 @@ def _seen_from(position, normal, tangent, eye):  # type: ignore[no-untyped-def]
     n, t = normal, tangent
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     across, along = t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z
-    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, _LEAST_COSINE), np.float32(1))
+    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, LEAST_COSINE), np.float32(1))
     length = math.sqrt(across * across + along * along)
-    place = math.sqrt(np.float32(1) - cosine) * np.float32(NUM_ROWS - 1)
-    row: Any = min(np.int64(place), NUM_ROWS - 2)
+    row, share = row_of(cosine)
     if length < np.float32(1e-6):
-        return row, np.float32(place - row), np.float32(1), np.float32(0)
-    return row, np.float32(place - row), np.float32(across / length), np.float32(along / length)
+        return row, share, np.float32(1), np.float32(0)
+    return row, share, np.float32(across / length), np.float32(along / length)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -172,7 +172,7 @@ def send_numpy(surface: Surface, vectors: F32, tables: Tables, eye: F32, point: 
     n, t = points.normal[point].astype(np.float64), points.tangent[point].astype(np.float64)
     wo = eye.astype(np.float64) - points.position[point]
     x, y, z = np.array([t, np.cross(n, t), n]) @ wo / np.linalg.norm(wo)
-    place = np.sqrt(1 - np.clip(z, _LEAST_COSINE, 1)) * (NUM_ROWS - 1)
+    place = np.sqrt(1 - np.clip(z, LEAST_COSINE, 1)) * (NUM_ROWS - 1)
     row, phi = min(int(place), NUM_ROWS - 2), np.arctan2(y, x)
     share = place - row
     out = np.zeros((NUM_GROUPS, 3))

@@ -2,8 +2,8 @@
 
 A face whose longest edge is R spacings long has (R + 1)(R + 2) / 2 nodes, rows parallel to its first edge. Nodes of
 different faces that lie together, look the same way and are of one material are one point, so that light is continuous
-across edges, and a mesh finer than the spacing has fewer points than corners. Each side of a face that can be seen has
-nodes of its own (`relume.moving.sides`).
+across edges, and a mesh finer than the spacing has fewer points than corners, which then follow from the points about
+them (`relume.moving.vertices`). Each side of a face that can be seen has nodes of its own (`relume.moving.sides`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import PlanError
+from relume.moving.vertices import Nodes, Vertices, find_vertices, shared_points
 from relume.points import Points
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
@@ -27,7 +28,6 @@ F64 = NDArray[np.float64]
 
 MAX_POINTS = 2_000_000
 MOST_ROWS = 255  # of the grid in one face
-_TOGETHER = 0.35  # of the spacing: nodes as near as this are one point
 _ALIKE, _LEAST_ALIKE = 6, 1  # steps of a unit normal's components, within which points look the same way
 _TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
@@ -42,7 +42,7 @@ class Lattice(NamedTuple):
     Attributes:
         num_rows: R; 0 where the side has no points. (faces, 2) uint8
         first: where its nodes begin in `node`. (faces, 2) uint32
-        node: the point of each. (nodes,) uint32
+        node: which vertex each is. (nodes,) uint32
     """
 
     num_rows: NDArray[np.uint8]
@@ -52,22 +52,24 @@ class Lattice(NamedTuple):
 
 @dataclass(frozen=True)
 class Placed:
-    """Points on surfaces and the lattice that shares them.
+    """Points on surfaces, and the lattice that takes from them what they send.
 
     Attributes:
+        vertices: of the lattice.
         points: n of them, neighbours mostly next to each other, material after material.
         material: of each. (n,) uint16
-        spacing: about the distance of neighbours, metres.
+        spacing: about the distance of neighbours at a middling distance from the eye, metres.
     """
 
     lattice: Lattice
+    vertices: Vertices
     points: Points
     material: NDArray[np.uint16]
     spacing: float
 
 
-class _Nodes(NamedTuple):
-    """Nodes before they are shared: face, side, and barycentric coordinates of the second and third corner."""
+class _Placement(NamedTuple):
+    """Where nodes are in faces: face, side, and barycentric coordinates of the second and third corner."""
 
     face: NDArray[np.int32]
     side: NDArray[np.uint8]
@@ -104,29 +106,34 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
-    longest, count = edges.max(axis=1) / _coarseness(corners.mean(axis=1), area, eyes), is_open.sum(axis=1)
-    spacing = math.sqrt(total / num_points)
-    most = most_nodes(len(geometry.faces), num_points)
+    coarse = _coarseness(corners.mean(axis=1), area, eyes)
+    longest, count = edges.max(axis=1) / coarse, is_open.sum(axis=1)
+    spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
     while int((num_nodes(_rows(longest, spacing)) * count).sum()) > most and spacing < longest.max():
         spacing *= 1.25
     for trial in range(_MOST_TRIALS):
+        lattice, nodes = _grids(geometry, is_open, _rows(longest, spacing), spacing * coarse)
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
-        placed = _placed(geometry, is_open, _rows(longest, spacing), spacing, alike)
-        ratio = placed.points.num_points / num_points
+        chosen = shared_points(nodes, alike)
+        ratio = len(chosen) / num_points
         if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
             break
         finer = spacing * math.sqrt(ratio) * (1 + 0.02 * trial)  # in the end it has to be coarse enough
         if ratio < 1 and int((num_nodes(_rows(longest, finer)) * count).sum()) > most:
             break
         spacing = min(finer, _WIDEST * float(longest.max()))
-    return placed
+    vertices, vertex = find_vertices(nodes, chosen)
+    kept = nodes.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
+    return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
 
 
 def _coarseness(centre: F64, area: F64, eyes: F64) -> F64:
-    """How many times farther apart the points of each face are than those at a middling distance. (faces,)"""
+    """How many times farther apart the points of each face are than those at a middling distance: powers of
+    two. (faces,)"""
     distance = np.min([np.linalg.norm(centre - eye, axis=1) for eye in eyes], axis=0)
     middling = np.sqrt(np.average(distance**2, weights=area))
-    return np.asarray(np.clip(distance / max(middling, 1e-30), 1 / _MOST_COARSE, _MOST_COARSE))
+    coarse = np.clip(distance / max(middling, 1e-30), 1 / _MOST_COARSE, _MOST_COARSE)
+    return np.asarray(2.0 ** np.rint(np.log2(coarse)))
 
 
 def most_nodes(num_faces: int, num_points: int) -> int:
@@ -138,26 +145,22 @@ def _rows(longest: F64, spacing: float) -> NDArray[np.int64]:
     return np.clip(np.ceil(longest / spacing), 1, MOST_ROWS).astype(np.int64)
 
 
-def _placed(
-    geometry: Geometry, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: float, alike: int
-) -> Placed:
-    """Place all nodes and share them."""
+def _grids(
+    geometry: Geometry, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: F64
+) -> tuple[Lattice, Nodes]:
+    """Place the nodes of all grids, which are not numbered as vertices yet. spacing: of each face. (faces,)"""
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
     counts = num_nodes(num_rows).ravel()
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).reshape(num_rows.shape)
-    nodes = _nodes_of(num_rows, counts)
-    normal = _face_normals(geometry)[nodes.face] * np.where(nodes.side == 0, 1, -1)[:, None].astype(np.float32)
-    hits = Hits(nodes.face, nodes.uv, np.ones(len(nodes.face), np.float32))
-    points = surface_at(geometry, hits, -normal).points
-    material = geometry.face_material[nodes.face].astype(np.uint16)
-    chosen, node = _shared(points, material, nodes.side, spacing, alike)
-    seeds = np.arange(len(chosen), dtype=np.uint32)
-    kept = points.rows(chosen)._replace(seed=seeds)
-    lattice = Lattice(num_rows, first.astype(np.uint32), node.astype(np.uint32))
-    return Placed(lattice, kept, material[chosen], spacing)
+    at = _placement(num_rows, counts)
+    normal = _face_normals(geometry)[at.face] * np.where(at.side == 0, 1, -1)[:, None].astype(np.float32)
+    points = surface_at(geometry, Hits(at.face, at.uv, np.ones(len(at.face), np.float32)), -normal).points
+    material = geometry.face_material[at.face].astype(np.uint16)
+    lattice = Lattice(num_rows, first.astype(np.uint32), np.empty(0, np.uint32))
+    return lattice, Nodes(points, material, at.side, spacing[at.face])
 
 
-def _nodes_of(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Nodes:
+def _placement(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Placement:
     """List the nodes of all grids, in the order of `node_of`."""
     side_of = np.repeat(np.arange(len(counts)), counts)
     uv = np.empty((int(counts.sum()), 2), np.float32)
@@ -168,36 +171,10 @@ def _nodes_of(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Nodes:
         begin = (ends - counts)[flat == rows]
         where = begin[:, None] + np.arange(len(i))
         uv[where, 0], uv[where, 1] = (i / rows).astype(np.float32), (j / rows).astype(np.float32)
-    return _Nodes((side_of // 2).astype(np.int32), (side_of % 2).astype(np.uint8), uv)
+    return _Placement((side_of // 2).astype(np.int32), (side_of % 2).astype(np.uint8), uv)
 
 
 def _face_normals(geometry: Geometry) -> F32:
     a, b, c = geometry.positions[geometry.faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30), np.float32)
-
-
-def _shared(
-    points: Points, material: NDArray[np.uint16], side: NDArray[np.uint8], spacing: float, alike: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find which nodes stand for all, in the order of their points, and the point of each node."""
-    size = _TOGETHER * spacing
-    place = np.floor((points.position - points.position.min(axis=0)) / size).astype(np.int64)
-    way = np.rint(points.normal * alike).astype(np.int64) + alike
-    base = 2 * alike + 1
-    kind = ((way[:, 0] * base + way[:, 1]) * base + way[:, 2]) * 2 + side
-    order = np.lexsort((kind, _interleaved(place), material))
-    keys = np.column_stack([place, kind, material.astype(np.int64)])[order]
-    is_new = np.concatenate([[True], np.any(keys[1:] != keys[:-1], axis=1)])
-    node = np.empty(len(order), np.intp)
-    node[order] = np.cumsum(is_new) - 1
-    return order[is_new], node
-
-
-def _interleaved(place: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Order places along a Morton curve: neighbours come mostly next to each other. (n,) uint64"""
-    code = np.zeros(len(place), np.uint64)
-    for bit in range(21):
-        for axis in range(3):
-            code |= (place[:, axis].astype(np.uint64) >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code

@@ -114,16 +114,14 @@ def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: Tria
     return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), in_basis(wi)))
 
 
-def add_scaled(total: F32 | None, part: F32, gain: F32) -> F32:
-    """Add light vectors times a gain of each channel to others, or begin with them.
+def add_scaled(total: F32, part: F32, gain: F32) -> None:
+    """Add light vectors times a gain of each channel to others.
 
     Args:
-        total: what they are added to, which is written; None where there is nothing yet. (n, 3, K) float32
+        total: what they are added to. (n, 3, K) float32
         part: that is added. (n, 3, K) float32. gain: (3,) float32
     """
-    out = np.zeros_like(part) if total is None else total
-    for_shares(lambda start, stop: _add_scaled(part, gain, start, stop, out), len(part))
-    return out
+    for_shares(lambda start, stop: _add_scaled(part, gain, start, stop, total), len(part))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,14 @@ from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.memory import Memory
 from relume.moving.evaluate import Tables, send, tables_of
+from relume.moving.glints import glance
 from relume.moving.light_vectors import add_scaled
-from relume.moving.look_up import Seen, combine, look
-from relume.moving.sky import fill_sky
+from relume.moving.lobes import Lobes, lobes_of
+from relume.moving.look_up import Seen, at_vertices, look
+from relume.moving.pixels import Mirrored, combine
+from relume.moving.sky import Sky, fill_sky, turn_of
 from relume.moving.surface import Surface
 from relume.moving.view import FreeView
-from relume.moving.zernike import NUM_FUNCTIONS
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
@@ -49,9 +51,13 @@ class MovingTransfer(Protocol):
     @property
     def embree(self) -> EmbreeScene: ...
     @property
-    def positions(self) -> F32: ...
+    def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
-    def faces(self) -> NDArray[np.uint32]: ...
+    def sky_share(self) -> F32: ...
+    def sky_in(self, name: str | None) -> Sky:
+        """An environment, None for the scene's own, and what it is when it is blurred."""
+        ...
+
     def vectors(self, element: Light) -> F32:
         """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32"""
         ...
@@ -59,6 +65,20 @@ class MovingTransfer(Protocol):
     def map_of(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
         ...
+
+
+class _Materials(NamedTuple):
+    """What materials send: tables of what the in-basis tells, lobes of the rest."""
+
+    tables: Tables
+    lobes: Lobes
+
+
+class _Arriving(NamedTuple):
+    """Light vectors of all light, and of that which is not the sky's own. (points, 3, K) float32 each"""
+
+    total: F32
+    others: F32
 
 
 @dataclass(frozen=True)
@@ -89,8 +109,8 @@ class MovingPicture:
         self._shown: tuple[Any, ...] | None = None
         self._image = np.zeros((view.height, view.width, 3), np.float32)
         self._seen: tuple[int, Seen] | None = None
-        self._tables: tuple[Any, Tables] | None = None
-        self._vectors: tuple[Light, F32] | None = None
+        self._materials: tuple[Any, _Materials] | None = None
+        self._vectors: tuple[Light, _Arriving] | None = None
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
@@ -167,10 +187,14 @@ class MovingPicture:
         width, height = self._size
         seen = self._look_around()
         eye = camera.to_world[:3, 3].astype(np.float32)
-        sent = send(transfer.surface, self._vectors_now(), self._tables_of(shown), eye, seen.is_needed)
+        light, materials = self._vectors_now(), self._materials_of(shown)
+        sent = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
+        glances = glance(transfer.surface, transfer.sky_share, light.others, materials.lobes, eye, seen.is_needed)
+        mirrored = Mirrored(materials.lobes, *self._sky_now(), at_vertices(transfer.surface, seen.is_seen, glances))
+        sent = at_vertices(transfer.surface, seen.is_seen, sent)
         emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
         pixel_angle = camera.yfov / height
-        out = combine(transfer.surface, transfer.positions, transfer.faces, seen, pixel_angle, sent, emission)
+        out = combine(transfer.surface, seen, pixel_angle, sent, emission, mirrored)
         out *= np.array(gain_of(shown, self._solo), np.float32)
         self._fill_background(shown, seen, out)
         return out.reshape(height, width, 3)
@@ -193,29 +217,35 @@ class MovingPicture:
     def _look_around(self) -> Seen:
         if self._seen is None or self._seen[0] != self._num_eyes:
             transfer = self._transfer
-            found = look(
-                transfer.surface, transfer.embree, transfer.positions, transfer.faces, self._camera, self._size
-            )
+            found = look(transfer.surface, transfer.embree, self._camera, self._size)
             self._seen = self._num_eyes, found
         return self._seen[1]
 
-    def _tables_of(self, shown: Look) -> Tables:
+    def _materials_of(self, shown: Look) -> _Materials:
         terms = [[dict(term) for term in shown.materials[name].terms] for name in self._transfer.material_names]
-        if self._tables is None or self._tables[0] != terms:
-            self._tables = terms, tables_of(terms)
-        return self._tables[1]
+        if self._materials is None or self._materials[0] != terms:
+            self._materials = terms, _Materials(tables_of(terms), lobes_of(terms))
+        return self._materials[1]
 
-    def _vectors_now(self) -> F32:
+    def _sky_now(self) -> tuple[Sky, np.float32, F32]:
+        """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
+        light = self._now()
+        is_seen = light.paths.direct and light.is_environment_lit
+        gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
+        return self._transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain
+
+    def _vectors_now(self) -> _Arriving:
         """Light vectors in the light of the look: transport is linear in its sources."""
         light = self._now()
         if self._vectors is None or self._vectors[0] != light:
-            total: F32 | None = None
+            total, others = (np.zeros(self._transfer.vectors_shape, np.float32) for _ in range(2))
             for element, gain in vector_of(light).items():
-                part = self._transfer.vectors(element)
-                total = add_scaled(total, part, np.array(gain, np.float32))
-            if total is None:
-                total = np.zeros((self._transfer.surface.points.num_points, 3, NUM_FUNCTIONS), np.float32)
-            self._vectors = light, total
+                part, factor = self._transfer.vectors(element), np.array(gain, np.float32)
+                is_sky = element.paths.direct and element.is_environment_lit
+                add_scaled(total, part, factor)
+                if not is_sky:
+                    add_scaled(others, part, factor)
+            self._vectors = light, _Arriving(total, others)
         return self._vectors[1]
 
     def all_tiles(self) -> list[Tile]:
@@ -251,7 +281,7 @@ class MovingPicture:
         seen, pixel, surface = self._seen[1], y * width + x, self._transfer.surface
         face = int(seen.hits.face[pixel])
         place = self._camera.to_world[:3, 3] + float(seen.hits.distance[pixel]) * seen.directions[pixel]
-        normal = seen.weight[pixel] @ surface.points.normal[seen.point[pixel]]
+        normal = seen.weight[pixel] @ surface.vertices.normal[seen.vertex[pixel]]
         return found | {
             "material": self._transfer.material_names[int(surface.face_material[face])],
             "position": place,

@@ -1,8 +1,10 @@
-"""The environment where an eye sees past all surfaces."""
+"""The environment as an eye sees it past all surfaces, and blurred, as lobes do."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
@@ -12,26 +14,92 @@ from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
 
+_NARROWEST = 2.0  # σ of the first level that is blurred, degrees; each is twice the one before
+_NUM_BLURRED = 5
+
+
+class Sky(NamedTuple):
+    """An environment and its blurred levels, one after another.
+
+    Attributes:
+        texels: (texels, 3) float32
+        levels: first texel, height, width of each, sharpest first. (levels, 3) int64
+    """
+
+    texels: F32
+    levels: NDArray[np.int64]
+
+
+def sky_of(map_of: Callable[[float], F32]) -> Sky:
+    """Blur an environment by steps. map_of: degrees -> radiance, (height, width, 3) float32"""
+    maps = [map_of(0.0), *(map_of(_NARROWEST * 2.0**k) for k in range(_NUM_BLURRED))]
+    ends = np.cumsum([0, *(radiance.shape[0] * radiance.shape[1] for radiance in maps)])
+    levels = [(end, *radiance.shape[:2]) for end, radiance in zip(ends, maps, strict=False)]
+    return Sky(np.concatenate([radiance.reshape(-1, 3) for radiance in maps]), np.array(levels, np.int64))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Find u and v of a direction, u perhaps a turn or two outside."""
+    u = np.float32(math.atan2(dz, dx)) * np.float32(0.5 / math.pi) + turn
+    v = np.float32(0.5) - np.float32(math.asin(min(max(dy, np.float32(-1)), np.float32(1)))) * np.float32(1 / math.pi)
+    return u, v
+
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _fill(radiance, turn, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
-    """Fill pixels [start, stop) that see nothing; bilinear, round about in u."""
-    height, width = radiance.shape[0], radiance.shape[1]
+def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
+    """Add a share of one level in a place; bilinear, round about in u. out: (3,)"""
+    first, height, width = sky.levels[level]
+    x = u * width - np.float32(0.5)
+    y: Any = min(max(v * height - np.float32(0.5), np.float32(0)), np.float32(height - 1))
+    left, upper = math.floor(x), math.floor(y)
+    fx, fy = np.float32(x - left), np.float32(y - upper)
+    column, row = np.int64(left) % width, np.int64(upper)
+    beside, below = (column + 1) % width, min(row + 1, height - 1)
+    for channel in range(3):
+        top = sky.texels[first + row * width + column, channel] * (1 - fx)
+        top += sky.texels[first + row * width + beside, channel] * fx
+        bottom = sky.texels[first + below * width + column, channel] * (1 - fx)
+        bottom += sky.texels[first + below * width + beside, channel] * fx
+        out[channel] += share * (top * (1 - fy) + bottom * fy)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def sky_about(sky, turn, dx, dy, dz, sigma, out):  # type: ignore[no-untyped-def]
+    """Find the light about a direction.
+
+    Args:
+        sky: its levels. turn: of the map, as a share of a whole turn, and a half.
+        dx, dy, dz: the direction, unit. sigma: of the blur, radians. out: written. (3,)
+    """
+    step = math.log2(max(sigma * np.float32(180 / math.pi / _NARROWEST), np.float32(1e-3)))
+    place: Any = min(max(step + 1, 0.0), sky.levels.shape[0] - 1.0)
+    lower = np.int64(place)
+    share = place - lower
+    out[:] = 0
+    u, v = _place(turn, dx, dy, dz)
+    _add_level(sky, lower, u, v, np.float32(1 - share), out)
+    if share > 0:
+        _add_level(sky, lower + 1, u, v, np.float32(share), out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _fill(sky, turn, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
+    """Fill pixels [start, stop) that see nothing."""
+    found = np.empty(3, np.float32)
     for p in range(start, stop):
         if face[p] >= 0:
             continue
-        dx, dy, dz = directions[p, 0], directions[p, 1], directions[p, 2]
-        x = (np.float32(math.atan2(dz, dx)) / np.float32(2 * math.pi) + turn) * width - np.float32(0.5)
-        v = np.float32(0.5) - np.float32(math.asin(min(max(dy, np.float32(-1)), np.float32(1)))) / np.float32(math.pi)
-        y = min(max(v * height - np.float32(0.5), np.float32(0)), np.float32(height - 1))
-        left, upper = math.floor(x), math.floor(y)
-        fx, fy = np.float32(x - left), np.float32(y - upper)
-        column, row = np.int64(left) % width, np.int64(upper)
-        beside, below = (column + 1) % width, min(row + 1, height - 1)
+        found[:] = 0
+        u, v = _place(turn, directions[p, 0], directions[p, 1], directions[p, 2])
+        _add_level(sky, 0, u, v, np.float32(1), found)
         for channel in range(3):
-            top = radiance[row, column, channel] * (1 - fx) + radiance[row, beside, channel] * fx
-            bottom = radiance[below, column, channel] * (1 - fx) + radiance[below, beside, channel] * fx
-            out[p, channel] = gain[channel] * (top * (1 - fy) + bottom * fy)
+            out[p, channel] = gain[channel] * found[channel]
+
+
+def turn_of(rotation: float) -> np.float32:
+    """The turn of a map, as kernels take it, from its rotation in degrees."""
+    return np.float32(0.5 + rotation / 360)
 
 
 def fill_sky(radiance: F32, rotation: float, gain: F32, face: NDArray[np.int32], directions: F32, out: F32) -> None:
@@ -43,5 +111,6 @@ def fill_sky(radiance: F32, rotation: float, gain: F32, face: NDArray[np.int32],
         face: that each pixel sees, −1 for none. (n,) int32. directions: of their rays, unit. (n, 3) float32
         out: written there. (n, 3) float32
     """
-    args = (radiance, np.float32(0.5 + rotation / 360), gain, face, directions)
+    sky = Sky(np.ascontiguousarray(radiance).reshape(-1, 3), np.array([[0, *radiance.shape[:2]]], np.int64))
+    args = (sky, turn_of(rotation), gain, face, directions)
     for_shares(lambda start, stop: _fill(*args, start, stop, out), len(face))

@@ -13,6 +13,7 @@ from relume.brdf.albedo import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import Pattern, make_pattern
 from relume.moving.lattice import Lattice, num_nodes
+from relume.moving.vertices import Vertices
 from relume.points import Points
 from relume.scene.model import Scene, Texture
 from relume.trace.texture import MipMap
@@ -81,16 +82,23 @@ class Surface:
     """The surfaces of a bake as an eye sees them.
 
     Attributes:
+        vertices: of the lattice, which follow from points.
         points: that light is kept at. material: of each. (n,) uint16
         uvs: places in textures, of the triangles' corners. (num_vertices, 2) float32
-        face_material: (num_faces,) int32
+        faces: the triangles. (num_faces, 3) uint32. face_material: of each. (num_faces,) int32
+        face_normal: where the corners are counter-clockwise, unit. (num_faces, 3) float32
+        uv_scale: side in textures of a square metre of each. (num_faces,) float32
     """
 
     lattice: Lattice
+    vertices: Vertices
     points: Points
     material: NDArray[np.uint16]
     uvs: F32
+    faces: NDArray[np.uint32]
     face_material: NDArray[np.int32]
+    face_normal: F32
+    uv_scale: F32
     textures: Textures
 
 
@@ -117,22 +125,39 @@ def read_surface(store: StoreReader) -> Surface:
         ChunkDamagedError: arrays of the store do not fit each other. StoreError: its description is not of this form.
     """
     lattice = Lattice(*(store.read(f"lattice/{name}") for name in Lattice._fields))
+    vertices = Vertices(*(store.read(f"vertices/{name}") for name in Vertices._fields))
     surface = Surface(
         lattice,
+        vertices,
         read_surface_points(store),
         store.read("points/material"),
-        store.read("scene/uvs"),
-        store.read("scene/face_material"),
+        *_read_faces(store),
         _read_textures(store),
     )
     num_points, num_materials = surface.points.num_points, len(store.attributes["materials"])
     ends = lattice.first.astype(np.int64) + num_nodes(lattice.num_rows)
     fits = lattice.num_rows.shape == lattice.first.shape == (len(surface.face_material), 2)
-    if not fits or num_points == 0 or int(lattice.node.max(initial=0)) >= num_points or ends.max() > len(lattice.node):
-        raise ChunkDamagedError("lattice", "its nodes do not fit the points")
+    if not fits or ends.max() > len(lattice.node) or int(lattice.node.max(initial=0)) >= len(vertices.normal):
+        raise ChunkDamagedError("lattice", "its nodes do not fit the vertices")
+    if num_points == 0 or int(vertices.point.max(initial=0)) >= num_points:
+        raise ChunkDamagedError("vertices", "they do not fit the points")
     if max(int(surface.material.max()), int(surface.face_material.max())) >= num_materials:
         raise ChunkDamagedError("points", "a point has a material that the scene has not")
     return surface
+
+
+def _read_faces(store: StoreReader) -> tuple[F32, NDArray[np.uint32], NDArray[np.int32], F32, F32]:
+    """The fields `uvs` to `uv_scale` of `Surface`."""
+    positions, faces, uvs = (store.read(f"scene/{name}") for name in ("positions", "faces", "uvs"))
+    if int(faces.max(initial=0)) >= min(len(positions), len(uvs)):
+        raise ChunkDamagedError("scene/faces", "a triangle has a corner that the scene has not")
+    a, b, c = positions[faces].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    twice_area = np.maximum(np.linalg.norm(normal, axis=1), 1e-20)
+    (du_0, dv_0), (du_1, dv_1) = (uvs[faces][:, k].T - uvs[faces][:, 0].T for k in (1, 2))
+    uv_scale = np.sqrt(np.abs(du_0 * dv_1 - dv_0 * du_1) / twice_area)
+    face_normal = (normal / twice_area[:, None]).astype(np.float32)
+    return uvs, faces, store.read("scene/face_material"), face_normal, uv_scale.astype(np.float32)
 
 
 def _read_textures(store: StoreReader) -> Textures:

@@ -7,6 +7,7 @@ from test_zernike import hemisphere
 
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.evaluate import tables_of
+from relume.moving.lobes import is_narrow, lobes_of
 from relume.moving.out_factors import NUM_ROWS, cosines, out_factors, turned
 from relume.moving.zernike import NUM_FUNCTIONS, in_basis
 
@@ -73,8 +74,41 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
         document("lambert"),
         document("lambert", texture="diffuse"),
         document("lambert", texture="diffuse", color=[0, 0, 1.0]),
-        document("ward_anisotropic"),
+        document("ward_anisotropic", params={"alpha_x": 0.9, "alpha_y": 0.5}),
     ]
+    assert not is_narrow(terms[-1])
     tables = tables_of([terms, []])
     assert tables.of.tolist() == [[[0, 0], [1, -1], [-1, -1]], [[-1, -1]] * 3]
     np.testing.assert_allclose(tables.even[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.2, 0.3])
+def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
+    """The integral of the term, by a quadrature of its half vectors: dωi = 4 cos θd dωh."""
+    term = document("ggx", params={"roughness": roughness, "f0": 0.5}, color=[1.0, 0.5, 0.25], texture="specular")
+    lobes = lobes_of([[document("lambert")], [term]])
+    assert lobes.of.tolist() == [-1, 0]
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    alpha = roughness**2
+    u, phi = np.repeat((nodes + 1) / 2, 64), np.tile((np.arange(64) + 0.5) * (2 * np.pi / 64), 400)
+    tan2 = alpha**2 * u / (1 - u)  # of θh, as GGX's facets lie
+    cos_h = 1 / np.sqrt(1 + tan2)
+    sin_h = np.sqrt(1 - cos_h**2)
+    half = np.stack([sin_h * np.cos(phi), sin_h * np.sin(phi), cos_h], axis=-1)
+    density = alpha**2 / (np.pi * cos_h**3 * (alpha**2 + tan2) ** 2)
+    for row in (2, 12, 22):
+        cosine = cosines()[row]
+        wo = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+        cos_d = half @ wo
+        wi = 2 * cos_d[:, None] * half - wo
+        measure = np.repeat(weights / 2, 64) / 64 / density * 4 * np.maximum(cos_d, 0)
+        value = eval_brdf(term, wi, wo) * (np.maximum(wi[:, 2], 0) * measure)[:, None]
+        np.testing.assert_allclose(lobes.albedo[0, row, 2], value.sum(axis=0), rtol=0.03)
+        assert not lobes.albedo[0, row, :2].any()
+
+
+def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
+    found = [lobes_of([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
+    np.testing.assert_allclose(found[0].mean[0, :24], cosines()[:24], atol=0.02)
+    widths = [lobe.sigma[0, 8] for lobe in found]
+    assert widths == sorted(widths)

@@ -13,9 +13,11 @@ from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.evaluate import send, send_numpy, tables_of
 from relume.moving.lattice import node_of, num_nodes, place_points
-from relume.moving.look_up import combine, look
+from relume.moving.lobes import lobes_of
+from relume.moving.look_up import at_vertices, look
+from relume.moving.pixels import Mirrored, combine
 from relume.moving.sides import open_sides
-from relume.moving.sky import fill_sky
+from relume.moving.sky import fill_sky, turn_of
 from relume.scene.model import Camera
 from relume.store import bake_here
 from relume.trace.geometry import merge
@@ -49,19 +51,36 @@ def test_about_as_many_points_as_asked_for_and_none_twice(num_points):
     assert len(np.unique(together, axis=0)) == len(together)
 
 
-def test_nodes_lie_where_their_points_are():
-    """Nowhere farther than points are shared over, and on their side."""
+def test_what_vertices_take_is_from_about_them():
+    """Of their own side, where points are what they take."""
     geometry, found = placed(still_life(), 4000)
-    lattice, points = found.lattice, found.points
+    lattice, vertices, points = found.lattice, found.vertices, found.points
+    np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
+    assert vertices.weight.min() >= 0
     for face, side in np.argwhere(lattice.num_rows > 0)[::37]:
         rows, first = int(lattice.num_rows[face, side]), int(lattice.first[face, side])
         a, b, c = geometry.positions[geometry.faces[face]]
         for i, j in ((0, 0), (rows, 0), (0, rows), (rows // 2, rows // 3 if rows > 2 else 0)):
             place = a + (b - a) * (i / rows) + (c - a) * (j / rows)
-            point = lattice.node[first + node_of(rows, i, j)]
-            assert np.linalg.norm(points.position[point] - place) < found.spacing
+            vertex = lattice.node[first + node_of(rows, i, j)]
+            taken = vertices.weight[vertex] @ points.position[vertices.point[vertex]]
+            assert np.linalg.norm(taken - place) < 2 * found.spacing
             outward = np.cross(b - a, c - a) * (1 if side == 0 else -1)
-            assert points.normal[point] @ outward > 0
+            assert vertices.normal[vertex] @ outward > 0
+
+
+def test_a_smooth_field_is_smooth_between_points():
+    """What a mesh finer than its points shows of light that changes slowly errs by what it changes over a spacing and a
+    half, and nowhere by steps."""
+    scene = scene_of(sphere("ball", (0, 0, 0), 1.0, 0, rings=96), camera=looking("front", (0, 0, 4), (0, 0, 0), 0.7))
+    _, found = placed(scene, 600)
+    slope = np.array([0.3, 0.5, -0.2], np.float32)
+    field = 1 + found.points.position @ slope
+    shown = np.einsum("vk,vk->v", found.vertices.weight, field[found.vertices.point])
+    over_a_spacing = float(np.linalg.norm(slope)) * found.spacing
+    assert len(shown) > 4 * 600
+    assert np.abs(shown - 1 - found.vertices.normal @ slope).max() < 1.5 * over_a_spacing
+    assert np.ptp(shown[found.lattice.node.reshape(-1, 3)], axis=1).max() < over_a_spacing  # between corners of a face
 
 
 def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
@@ -82,15 +101,19 @@ def test_a_scene_without_area_is_refused():
 
 def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
     view = moving.views["front"]
-    seen = look(moving.surface, moving.embree, moving.positions, moving.faces, view.camera, (96, 72))
+    seen = look(moving.surface, moving.embree, view.camera, (96, 72))
     hit = seen.hits.face >= 0
     np.testing.assert_allclose(seen.weight[hit].sum(axis=1), 1, atol=1e-5)
     assert seen.weight[hit].min() > -1e-5
-    place = np.einsum("nk,nkc->nc", seen.weight, moving.surface.points.position[seen.point])
+    of_vertices = at_vertices(moving.surface, seen.is_seen, moving.surface.points.position)
+    place = np.einsum("nk,nkc->nc", seen.weight, of_vertices[seen.vertex])
     truth = view.camera.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
     apart = np.linalg.norm(place - truth, axis=1)[hit]
     assert np.median(apart) < 0.03
-    assert set(np.flatnonzero(seen.is_needed)) == set(seen.point[hit].ravel())
+    vertices = moving.surface.vertices
+    assert set(np.flatnonzero(seen.is_seen)) == set(seen.vertex[hit].ravel())
+    taken = vertices.point[seen.is_seen > 0][vertices.weight[seen.is_seen > 0] > 0]
+    assert set(np.flatnonzero(seen.is_needed)) == set(taken)
 
 
 def test_what_points_send_is_that_of_the_oracle(moving):
@@ -115,20 +138,27 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
     """White points under a texture show the texture; the same filter as view samples have."""
     scene, view, size = still_life(), moving.views["front"], (96, 72)
     surface = moving.surface
-    seen = look(surface, moving.embree, moving.positions, moving.faces, view.camera, size)
+    seen = look(surface, moving.embree, view.camera, size)
     sent = np.zeros((surface.points.num_points, 3, 3), np.float32)
     sent[:, 1] = 1
     angle = view.camera.yfov / size[1]
     dark = np.zeros((len(moving.material_names), 3), np.float32)
-    found = combine(surface, moving.positions, moving.faces, seen, angle, sent, dark)
+    mirrored = Mirrored(
+        lobes_of([()] * len(dark)),
+        moving.sky_in(None),
+        turn_of(0.0),
+        np.zeros(3, np.float32),
+        np.zeros((len(sent), 4), np.float32),
+    )
+    found = combine(surface, seen, angle, sent, dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured
     for index in textured:
         rows = np.flatnonzero((seen.hits.face >= 0) & (surface.face_material[np.maximum(seen.hits.face, 0)] == index))
-        corners = moving.faces[seen.hits.face[rows]]
+        corners = surface.faces[seen.hits.face[rows]]
         b = np.column_stack([1 - seen.hits.uv[rows].sum(axis=1), seen.hits.uv[rows]])
         uv = np.einsum("nk,nkc->nc", b, surface.uvs[corners]).astype(np.float32)
-        p, q = moving.positions[corners], surface.uvs[corners]
+        p, q = moving.lit.local.positions[corners], surface.uvs[corners]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         area = np.linalg.norm(normal, axis=1)
         cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, seen.directions[rows])) / area, 0.05)
@@ -154,7 +184,7 @@ def test_the_sky_is_that_of_fixed_views(rotation):
 
 def test_rays_go_through_the_middles_of_pixels(moving):
     camera = Camera("level", np.eye(4), math.radians(90))
-    seen = look(moving.surface, moving.embree, moving.positions, moving.faces, camera, (4, 2))
+    seen = look(moving.surface, moving.embree, camera, (4, 2))
     first, last = seen.directions[0], seen.directions[-1]
     np.testing.assert_allclose(first * np.sign(first), np.abs(last), atol=1e-6)
     np.testing.assert_allclose(first / -first[2], [-1.5, 0.5, -1], atol=1e-5)

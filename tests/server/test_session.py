@@ -26,7 +26,8 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
         camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8}
         assert hello["views"] == [
-            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "eye": "baked"} for n in ("front", "left")
+            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "eye": "baked", "bounds": None}
+            for n in ("front", "left")
         ]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
         assert not hello["resumed"]

@@ -150,6 +150,7 @@ BOUNDED = {
     "look/library/materials.py",
     "look/library/navigation.py",
     "measured/asset_store.py",
+    "moving/lobes.py",
     "moving/out_factors.py",
     "moving/zernike.py",
     "operators/nodes.py",

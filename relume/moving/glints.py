@@ -1,0 +1,93 @@
+"""What lobes show of the light at points: how much of the sky, and what surfaces and lamps send there.
+
+Both come from the light vectors, since functions that are orthonormal under the cosine give back what they are made of:
+
+    V(ω) ≈ Σ_k v_k h_k(ω),   v_k = ∫ V cos θ h_k dω,   and the same of radiance
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.moving.lobes import Lobes
+from relume.moving.out_factors import NUM_ROWS
+from relume.moving.surface import Surface
+from relume.moving.zernike import add_light, ladder
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+
+LEAST_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def row_of(cosine):  # type: ignore[no-untyped-def]
+    """Find where cos θo lies in tables: a row, and the share of the next."""
+    place = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
+    row: Any = min(np.int64(place), NUM_ROWS - 2)
+    return row, np.float32(place - row)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _glance(rungs, points, material, sky, others, lobes, eye, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
+    """Look from points [start, stop) along their lobes. out: (points, 4), the sky's share, then others' radiance"""
+    position, normal, tangent, _ = points
+    wi, one = np.empty((2, 1), np.float32), np.ones((3, 1), np.float32)
+    scratch, functions = np.empty((6, 1), np.float32), np.empty((3, sky.shape[1]), np.float32)
+    for p in range(start, stop):
+        lobe = lobes.of[material[p]]
+        if not is_needed[p] or lobe < 0:
+            continue
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+        tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
+        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        x, y, z = eye[0] - position[p, 0], eye[1] - position[p, 1], eye[2] - position[p, 2]
+        scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+        cosine: Any = min(max(scale * (nx * x + ny * y + nz * z), LEAST_COSINE), np.float32(1))
+        across, along = tx * x + ty * y + tz * z, bx * x + by * y + bz * z
+        length = math.sqrt(across * across + along * along)
+        row, share = row_of(cosine)
+        mean = lobes.mean[lobe, row] + share * (lobes.mean[lobe, row + 1] - lobes.mean[lobe, row])
+        flat = math.sqrt(max(np.float32(1) - mean * mean, np.float32(0)))
+        wi[0, 0] = -flat * across / length if length > 0 else 0
+        wi[1, 0] = -flat * along / length if length > 0 else 0
+        functions[:] = 0
+        add_light(rungs, 1, wi, one, scratch, functions)
+        for k in range(sky.shape[1]):
+            out[p, 0] += functions[0, k] * sky[p, k]
+            for channel in range(3):
+                out[p, 1 + channel] += functions[0, k] * others[p, channel, k]
+        out[p, 0] = min(max(out[p, 0], np.float32(0)), np.float32(1))
+        for channel in range(1, 4):
+            out[p, channel] = max(out[p, channel], np.float32(0))
+
+
+def glance(surface: Surface, sky: F32, others: F32, lobes: Lobes, eye: F32, is_needed: NDArray[np.uint8]) -> F32:
+    """Look from points along their lobes.
+
+    Args:
+        surface: whose points. sky: v, what each sees of the sky. (points, K) float32
+        others: t of all light but the sky's own. (points, 3, K) float32
+        lobes: of all materials. eye: where it is. (3,) float32
+        is_needed: points that are asked. (points,) uint8
+    Returns:
+        The share of the sky that is seen there, and the radiance of what hides it. (points, 4) float32
+    """
+    out = np.zeros((len(sky), 4), np.float32)
+    args = (
+        ladder(),
+        surface.points,
+        surface.material,
+        sky,
+        others,
+        lobes,
+        np.ascontiguousarray(eye, np.float32),
+        is_needed,
+    )
+    for_shares(lambda start, stop: _glance(*args, start, stop, out), len(sky))
+    return out

@@ -1,0 +1,127 @@
+"""Lobes: what is narrower than the in-basis can tell is sent apart, as light of a blurred mirror (after Sun 2007).
+
+    B(ωo) ≈ a(θo) · L̄(ωm, σ),   a = ∫ ρ cos θi dωi,   R ωm = ∫ ωi ρ cos θi dωi / ∫ ρ cos θi dωi,   σ² ≈ 1 − R
+
+L̄ is the light about the lobe's mean direction ωm, blurred by σ. Both stand in tables over θo, as out-factors do; of
+terms that depend on φo as well, the mean over it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import TEXTURES
+from relume.brdf.evaluate import eval_brdf
+from relume.moving.out_factors import NUM_ROWS, cosines, out_factors
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+NARROW = 0.2  # what the in-basis misses of a term that is sent apart, see `OutFactors.missed`
+NUM_GROUPS = 1 + len(TEXTURES)
+_RINGS, _SPOKES = 64, 24  # of the quadrature about the mirror direction
+_INNERMOST = 3e-4  # radians
+_EYES = 8  # φo over which a term that is not isotropic is averaged
+_MOST_KNOWN = 256
+
+
+class Lobes(NamedTuple):
+    """The lobes of all materials, one each.
+
+    Attributes:
+        albedo: a, by groups of terms as in `relume.moving.evaluate`. (lobes, `NUM_ROWS`, groups, 3) float32
+        mean: cos θm, on the side that the mirror direction is. (lobes, `NUM_ROWS`) float32
+        sigma: radians. (lobes, `NUM_ROWS`) float32
+        of: lobe of each material, −1 for none. (materials,) int32
+    """
+
+    albedo: F32
+    mean: F32
+    sigma: F32
+    of: NDArray[np.int32]
+
+
+def is_narrow(term_document: Mapping[str, Any]) -> bool:
+    """Whether a term is sent as a lobe instead of through the in-basis."""
+    return out_factors(term_document).missed > NARROW
+
+
+def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
+    """Sum the narrow terms of each material to one lobe.
+
+    Args:
+        materials: the terms of each, of a complete look.
+    """
+    of = np.full(len(materials), -1, np.int32)
+    albedo: list[F64] = []
+    mean: list[F64] = []
+    sigma: list[F64] = []
+    for index, terms in enumerate(materials):
+        narrow = [term for term in terms if is_narrow(term)]
+        if not narrow:
+            continue
+        of[index] = len(albedo)
+        by_group, about, width = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros(NUM_ROWS), np.zeros(NUM_ROWS)
+        for term in narrow:
+            found = _lobe_of(json.dumps({**term, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True))
+            sent = found[:, :3] * np.asarray(term["color"], np.float64)
+            by_group[:, 0 if term.get("texture") is None else 1 + TEXTURES.index(term["texture"])] += sent
+            weight = sent.mean(axis=1)
+            about += weight * found[:, 3]
+            width += weight * found[:, 4]
+        total = np.maximum(by_group.sum(axis=1).mean(axis=1), 1e-30)
+        albedo.append(by_group)
+        mean.append(np.where(about > 0, about / total, 1))
+        sigma.append(np.where(width > 0, width / total, 1))
+    shape = (len(albedo), NUM_ROWS)
+    return Lobes(
+        np.reshape(np.array(albedo, np.float32), (*shape, NUM_GROUPS, 3)),
+        np.reshape(np.array(mean, np.float32), shape),
+        np.reshape(np.array(sigma, np.float32), shape),
+        of,
+    )
+
+
+@lru_cache(maxsize=_MOST_KNOWN)
+def _lobe_of(term_text: str) -> F64:
+    """a of each channel, cos θm, and σ, in each row. (`NUM_ROWS`, 5)"""
+    document = json.loads(term_text)
+    ring = np.geomspace(_INNERMOST, np.pi, _RINGS + 1)
+    middle, spoke = np.sqrt(ring[1:] * ring[:-1]), (np.arange(_SPOKES) + 0.5) * (2 * np.pi / _SPOKES)
+    area = np.repeat((np.cos(ring[:-1]) - np.cos(ring[1:])) / _SPOKES * 2 * np.pi, _SPOKES)
+    away = np.stack(
+        [
+            np.outer(np.sin(middle), np.cos(spoke)).ravel(),
+            np.outer(np.sin(middle), np.sin(spoke)).ravel(),
+            np.repeat(np.cos(middle), _SPOKES),
+        ],
+        axis=-1,
+    )
+    out = np.empty((NUM_ROWS, 5))
+    for row, cosine in enumerate(cosines()):
+        sine = np.sqrt(1 - cosine**2)
+        sent, mean = np.zeros(3), np.zeros(2)  # along the surface, away from the eye, and along the normal
+        for phi in np.arange(_EYES) * (2 * np.pi / _EYES):
+            wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
+            frame = np.array(
+                [
+                    [cosine * np.cos(phi), cosine * np.sin(phi), sine],
+                    [-np.sin(phi), np.cos(phi), 0],
+                    -wo + [0, 0, 2 * cosine],
+                ]
+            )
+            wi = away @ frame
+            value = eval_brdf(document, wi, wo) * (np.maximum(wi[:, 2], 0) * area)[:, None]
+            sent += value.sum(axis=0)
+            luminous = value.mean(axis=1)
+            mean += luminous @ np.stack([-(wi[:, 0] * np.cos(phi) + wi[:, 1] * np.sin(phi)), wi[:, 2]], axis=1)
+        length = np.linalg.norm(mean) / max(sent.mean(), 1e-30)
+        tilt = mean[1] / max(np.linalg.norm(mean), 1e-30)
+        out[row] = [*(sent / _EYES), tilt, np.sqrt(max(1 - length, 1e-8))]
+    return out
