@@ -135,7 +135,7 @@ class MovingPicture:
         """See from elsewhere, in a picture of another size; nothing is computed yet.
 
         Args:
-            camera: that `check_camera` lets pass. size: width and height in pixels.
+            camera: a rigid one. size: width and height in pixels.
         """
         self._camera, self._size = camera, size
         self._num_eyes += 1

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import ParameterError, ProtocolError, RelumeError
 from relume.picture.transfer import Eyes
-from relume.scene.checks import check_camera
-from relume.scene.model import Camera
+from relume.scene.placed_camera import placed_camera
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.session_state import SessionState
@@ -115,8 +114,7 @@ class Reception:
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= MAX_EYE_PIXELS):
             raise ParameterError("size", list(message.size), f"at least 1×1 pixels, at most {MAX_EYE_PIXELS} in all")
-        camera = Camera(message.view, np.array(message.to_world, np.float64).reshape(4, 4), message.yfov)
-        check_camera(camera)
+        camera = placed_camera("eye", message.to_world, math.degrees(message.yfov)).camera
         known = self._pending.eyes.get(message.view)
         if known is None or message.eye > known.number:
             self._pending.eyes[message.view] = Eye(message.eye, camera, message.size, received_s)

@@ -1,0 +1,205 @@
+"""A view whose eye moves: baked, looked at from elsewhere while it is edited, rendered, and eyes that cannot be."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from fastapi.testclient import TestClient
+from session_client import Frame, Session, open_session
+from test_end_to_end import decode_rgb9e5, rendered_by, wait_until_done
+
+from server.app import create_app
+from server.settings import Settings
+
+SIZE = (64, 48)
+LEVEL = np.eye(4)
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
+        settings = Settings(data=tmp_path_factory.mktemp("moving"), allowed_hosts=["testserver"])
+        with TestClient(create_app(settings)) as client:
+            yield client
+
+
+@pytest.fixture(scope="module")
+def scene(client: TestClient) -> dict[str, Any]:
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    file = trimesh.Scene(ball).export(file_type="glb")
+    found: dict[str, Any] = client.post("/api/scenes", files={"scene": ("ball.glb", file)}).json()
+    return found
+
+
+@pytest.fixture(scope="module")
+def bake(client: TestClient, scene: dict[str, Any]) -> str:
+    request = {"scene": scene["id"], "method": "surface", "size": SIZE, "lights": 100, "points": 2000}
+    done = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+    assert done["state"] == "ready", done["problem"]
+    assert done["recipe"]["points"] == 2000
+    return str(done["id"])
+
+
+@pytest.fixture
+def session(client: TestClient, bake: str) -> Iterator[Session]:
+    with open_session(client, bake) as session:
+        yield session
+
+
+def hello(session: Session) -> dict[str, Any]:
+    message = session.receive()
+    assert isinstance(message, dict)
+    return message
+
+
+def eye(view: dict[str, Any], number: int, aside: float, size: tuple[int, int] = SIZE) -> dict[str, Any]:
+    """An eye that stands aside of where a view begins."""
+    to_world = np.array(view["camera"]["to_world"]).reshape(4, 4)
+    to_world[:3, 3] += aside * to_world[:3, 0]
+    where = {"to_world": to_world.ravel().tolist(), "yfov": view["camera"]["yfov"]}
+    return {"type": "eye", "view": view["name"], "eye": number, **where, "size": size}
+
+
+def shown(frame: Frame) -> np.ndarray:
+    return decode_rgb9e5(frame.payload).reshape(frame.header["height"], frame.header["width"], 3)
+
+
+def of_eye(session: Session, number: int) -> Frame:
+    while (frame := session.frame()).header["eye"] != number:
+        pass
+    return frame
+
+
+def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: Session) -> None:
+    found = hello(session)
+    (view,) = found["views"]
+    assert (view["eye"], found["method"], "eye" in found["axes"]) == ("free", "surface", True)
+    lowest, highest = np.array(view["bounds"])
+    np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
+
+
+def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -> None:
+    (view,) = hello(session)["views"]
+    first = session.frame()
+    assert (first.header["eye"], first.header["exact"], first.header["fidelity"]) == (None, False, "approximate")
+    pictures = [shown(first)]
+    for number, aside in ((5, 0.4), (6, -0.3)):
+        session.send(**eye(view, number, aside))
+        pictures.append(shown(of_eye(session, number)))
+    assert all(picture.max() > 0.01 for picture in pictures)
+    for k in range(3):
+        assert np.abs(pictures[k] - pictures[k - 1]).max() > 0.01
+    session.send(**eye(view, 7, 0.0))
+    np.testing.assert_array_equal(shown(of_eye(session, 7)), pictures[0])
+
+
+def test_an_older_eye_says_nothing_and_the_size_is_the_eyes(session: Session) -> None:
+    (view,) = hello(session)["views"]
+    session.send(**eye(view, 9, 0.2, (40, 30)))
+    frame = of_eye(session, 9)
+    assert (frame.header["width"], frame.header["height"], frame.header["tiles"]) == (40, 30, [[0, 0, 40, 30]])
+    session.send(**eye(view, 8, 0.5))
+    session.send(**eye(view, 10, 0.2, (40, 30)))
+    np.testing.assert_array_equal(shown(of_eye(session, 10)), shown(frame))
+
+
+def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session, client: TestClient, bake: str) -> None:
+    found = hello(session)
+    (view,), material = found["views"], found["materials"][0]
+    session.frame()
+    terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
+    session.edit(1, f"/materials/{material}/terms", terms)
+    session.edit(2, "/environment/scale", 2.0)
+    session.send(**eye(view, 3, 0.3))
+    frame = of_eye(session, 3)
+    while frame.header["revision"] < 2:
+        frame = session.frame()
+    burst = shown(frame)
+    with open_session(client, bake) as other:
+        hello(other)
+        other.send(**eye(view, 1, 0.3))
+        other.edit(1, f"/materials/{material}/terms", terms)
+        other.edit(2, "/environment/scale", 2.0)
+        frame = other.frame()
+        while (frame.header["revision"], frame.header["eye"]) != (2, 1):
+            frame = other.frame()
+        np.testing.assert_array_equal(shown(frame), burst)
+
+
+def test_a_render_is_what_the_eye_sees_where_it_begins(
+    client: TestClient, bake: str, session: Session, tmp_path: Any
+) -> None:
+    (view,) = hello(session)["views"]
+    picture = shown(session.frame())
+    rendered = rendered_by(client, {"bake": bake, "view": view["name"], "looks": [{}]}, tmp_path)
+    assert np.abs(picture - rendered).max() <= rendered.max() / 256 + 1e-4
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"view": "nowhere"},
+        {"size": [0, 48]},
+        {"size": [60000, 60000]},
+        {"yfov": 0.0},
+        {"yfov": math.pi},
+        {"to_world": [1e30] * 16},
+        {"to_world": [0.0] * 16},
+        {"to_world": [-1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+        {"to_world": [1.0, 0, 0, 0] * 3},
+        {"eye": -1},
+        {"rest": "go"},
+        {"hand": "nonsense"},
+    ],
+    ids=str,
+)
+def test_bad_eyes_are_refused_in_words_and_nothing_is_lost(session: Session, bad: dict[str, Any]) -> None:
+    (view,) = hello(session)["views"]
+    before = shown(session.frame())
+    session.send(**(eye(view, 1, 0.2) | bad))
+    problem = session.text("problem")
+    assert len(problem["problem"]["detail"]) > 10
+    session.send(**eye(view, 2, 0.0))
+    np.testing.assert_array_equal(shown(of_eye(session, 2)), before)
+
+
+def test_an_eye_inside_a_solid_and_one_that_sees_nothing_are_seen_through(session: Session) -> None:
+    (view,) = hello(session)["views"]
+    session.frame()
+    for number, place in ((1, [0, 0, 0]), (2, [0, 0, 1e5])):
+        to_world = LEVEL.copy()
+        to_world[:3, 3] = place
+        session.send(**(eye(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
+        assert np.isfinite(shown(of_eye(session, number))).all()
+
+
+def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
+    client: TestClient, scene: dict[str, Any], bake: str
+) -> None:
+    request = {"scene": scene["id"], "size": SIZE, "lights": 50}
+    fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+    with open_session(client, fixed["id"]) as session:
+        (view,) = hello(session)["views"]
+        assert (view["eye"], view["bounds"]) == ("baked", None)
+        session.send(**eye(view, 1, 0.2))
+        assert "surface" in session.text("problem")["problem"]["detail"]
+    answer = client.get(f"/api/bakes/{bake}/views/{view['name']}/materials.png")
+    assert answer.status_code == 404
+    assert "probe" in answer.json()["detail"]
+
+
+def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
+    found = hello(session)
+    (view,) = found["views"]
+    session.send(**eye(view, 4, 0.0))
+    of_eye(session, 4)
+    session.send(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+    answer = session.text("probe")
+    assert answer["material"] == found["materials"][0]
+    assert np.linalg.norm(answer["position"]) == pytest.approx(1.0, abs=0.02)
+    session.send(type="brush", curve=f"/materials/{answer['material']}/terms/0/curves/theta_h", **{"from": 0, "to": 9})
+    assert session.text("problem")["problem"]["detail"]
