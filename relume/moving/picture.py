@@ -248,6 +248,10 @@ class MovingPicture:
             self._vectors = light, _Arriving(total, others)
         return self._vectors[1]
 
+    def light_vectors(self) -> F32:
+        """What arrives at every point in the light of the look. (points, 3, K) float32"""
+        return self._vectors_now().total
+
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""
         return [(0, 0, *self._size)]

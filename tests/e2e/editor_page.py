@@ -42,6 +42,10 @@ class Editor:
     def pixels(self) -> NDArray[np.int16]:
         """The canvas as it is on the screen, once it is exact. (height, width, 3)"""
         self.wait_until_exact()
+        return self.pixels_now()
+
+    def pixels_now(self) -> NDArray[np.int16]:
+        """The canvas as it is on the screen, exact or not. (height, width, 3)"""
         self.page.mouse.move(2, 2)  # a pointer over the picture outlines what it is over
         self.page.evaluate(SETTLE)
         with Image.open(io.BytesIO(self.canvas.screenshot())) as image:

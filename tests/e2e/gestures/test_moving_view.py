@@ -1,0 +1,141 @@
+"""A view that moves, in a browser: every gesture twice in a row, editing meanwhile, keeping a camera, a reload."""
+
+from __future__ import annotations
+
+import time
+import urllib.request
+from collections.abc import Iterator
+
+import pytest
+from editor_page import WAIT_MS, Editor, changed
+from editor_server import Server
+from playwright.sync_api import Browser, expect
+
+BAKE_S, MOVED_S = 120.0, 30.0
+
+
+@pytest.fixture(scope="module")
+def scene(server: Server) -> Iterator[str]:
+    """A scene of its own with one bake, whose view moves; it is gone afterwards."""
+    identity = server.call("/api/built-ins/cornell_box", {})["id"]
+    recipe = {"scene": identity, "method": "surface", "size": (240, 240), "lights": 100, "points": 4000}
+    bake = server.call("/api/bakes", recipe)
+    deadline = time.monotonic() + BAKE_S
+    while bake["state"] in ("queued", "running") and time.monotonic() < deadline:
+        time.sleep(0.1)
+        bake = server.call(f"/api/bakes/{bake['id']}")
+    assert bake["state"] == "ready", bake["problem"]
+    yield identity
+    request = urllib.request.Request(f"{server.url}/api/scenes/{identity}", method="DELETE")
+    urllib.request.urlopen(request, timeout=30).close()
+
+
+@pytest.fixture
+def moving(server: Server, browser: Browser, scene: str) -> Iterator[Editor]:
+    """The editor on it, its first picture drawn."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(f"{server.url}/?scene={scene}")
+    editor = Editor(page)
+    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
+    page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+    yield editor
+    context.close()
+    assert errors == []
+
+
+def differs(editor: Editor, before: object, least: float = 0.02) -> None:
+    """Wait until the picture is another one."""
+    deadline = time.monotonic() + MOVED_S
+    while changed(before, editor.pixels_now()) < least:  # type: ignore[arg-type]
+        assert time.monotonic() < deadline, "the picture stays as it was"
+        time.sleep(0.1)
+    at_rest(editor)
+
+
+def at_rest(editor: Editor) -> None:
+    """Wait until what hands asked for is shown."""
+    before = editor.pixels_now()
+    while True:
+        time.sleep(0.3)
+        now = editor.pixels_now()
+        if changed(before, now) == 0:
+            return
+        before = now
+
+
+def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
+    page, box = moving.page, moving.canvas.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag(across: float, down: float, button: str = "left") -> None:
+        page.mouse.move(x, y)
+        page.mouse.down(button=button)  # type: ignore[arg-type]
+        page.mouse.move(x + across, y + down, steps=8)
+        page.mouse.up(button=button)  # type: ignore[arg-type]
+
+    def wheel() -> None:
+        page.mouse.move(x, y)
+        page.mouse.wheel(0, -120)
+
+    def key(name: str) -> None:
+        moving.canvas.focus()
+        page.keyboard.press(name)
+
+    gestures = {
+        "turn": lambda: drag(60, 20),
+        "slide": lambda: drag(30, 10, "right"),
+        "wheel": wheel,
+        "key turns": lambda: key("ArrowLeft"),
+        "key slides": lambda: key("Shift+ArrowUp"),
+        "key goes back": lambda: key("-"),
+        "button": lambda: page.get_by_role("button", name="Turn right").click(),
+    }
+    for gesture in gestures.values():
+        for _ in range(2):
+            before = moving.pixels_now()
+            gesture()
+            differs(moving, before)
+
+
+def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Editor) -> None:
+    page, first = moving.page, moving.pixels_now()
+    moving.canvas.focus()
+    page.keyboard.press("ArrowLeft")
+    differs(moving, first)
+    aside = moving.pixels_now()
+    page.reload()
+    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
+    page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+    differs(moving, first)
+    assert changed(aside, moving.pixels_now()) < 0.02
+    moving.canvas.focus()
+    page.keyboard.press("Home")
+    differs(moving, aside)
+    assert changed(first, moving.pixels_now()) < 0.02
+
+
+def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(moving: Editor) -> None:
+    page, first = moving.page, moving.pixels_now()
+    moving.canvas.focus()
+    page.keyboard.press("ArrowRight")
+    differs(moving, first)
+    before, box = moving.pixels_now(), moving.canvas.bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    expect(page.locator(".inspector .card").first).to_be_visible()
+    page.get_by_role("slider", name="Brightness").focus()
+    for _ in range(5):
+        page.keyboard.press("PageUp")
+    differs(moving, before)
+    expect(page.locator("footer.status")).to_contain_text("approximate")
+
+
+def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, scene: str) -> None:
+    moving.page.get_by_role("button", name="Keep camera").click()
+    expect(moving.page.get_by_text("The camera is kept as “View 1”")).to_be_visible()
+    kept = server.call(f"/api/scenes/{scene}/cameras")
+    assert [camera["name"] for camera in kept if camera["name"] == "View 1"] == ["View 1"]
