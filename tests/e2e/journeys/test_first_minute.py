@@ -67,6 +67,7 @@ def drop(page: Page, *paths: Path) -> None:
         session.send("Input.dispatchDragEvent", {"type": kind, "x": 400, "y": 300, "data": data})
 
 
+@pytest.mark.slow
 def test_one_click_takes_a_built_in_scene_and_opens_it(start: Page, server: Server) -> None:
     start.get_by_role("button", name="Still life Teapot").click()
     Editor(start).wait_until_exact()

@@ -51,6 +51,7 @@ def first_ball(page: Page) -> Locator:
     return page.locator(".library-balls button").first
 
 
+@pytest.mark.slow
 def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: str) -> None:
     page = editor.page
     undo = page.get_by_role("button", name="Undo", exact=True)

@@ -31,6 +31,7 @@ def start_page(tmp_path: Path, browser: Browser) -> Iterator[Page]:
     server.kill()
 
 
+@pytest.mark.slow
 def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: Page) -> None:
     page, editor = start_page, Editor(start_page)
     page.get_by_role("button", name="Bake…").click()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from editor_page import Editor
 from playwright.sync_api import expect
 
 
+@pytest.mark.slow
 def test_truth_says_how_long_it_takes_and_can_be_stopped_and_gone_on_with(editor: Editor) -> None:
     page = editor.page
     page.get_by_role("button", name="How true is this?").click()
