@@ -156,6 +156,11 @@ class Memory:
             found = part.get(key)
             return found if isinstance(found, kind) else None
 
+    def holds(self, key: Hashable) -> bool:
+        """Whether there is an entry of that name; it is used no more recently for that."""
+        with self._room.lock:
+            return key in self._room.passing or key in self._room.lasting
+
     def check(self, num_bytes: int) -> None:
         """Raises MemoryBudgetError where an entry of so many bytes is larger than the budget."""
         if num_bytes > self.budget_bytes:

@@ -45,7 +45,7 @@ def warm() -> None:
                 bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES)
             )
             if isinstance(transfer, MovingViews):
-                _move_eyes(transfer, MovingPicture(transfer, recipe.views[0]))
+                _move_eyes(transfer, MovingPicture(transfer, recipe.views[0], is_watched=True))
                 continue
             _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
             _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
@@ -81,6 +81,7 @@ def _move_eyes(transfer: MovingViews, picture: MovingPicture) -> None:
     """See what a moving eye sees: the kernels are the same whatever the terms and the lights."""
     partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
     picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    picture.advance(None)
     picture.advance(None)
     for form in ("rgb9e5", "f32"):
         picture.encode(picture.all_tiles(), form)

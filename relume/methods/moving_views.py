@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
+from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.memory import Memory
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
@@ -27,6 +28,8 @@ from relume.trace.embree import EmbreeScene
 from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
+
+_PREVIEW_DEGREE = 3  # ten numbers of each point are enough while a hand moves a light
 
 
 @dataclass(frozen=True)
@@ -112,16 +115,41 @@ class MovingViews:
 
     def vectors(self, element: Light) -> F32:
         """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32"""
-        key = self.key, "light vectors", element
-        return self.memory.keep(key, lambda: self._vectors(element))
+        return self.memory.keep(self._key_of(element), lambda: self._vectors(element))
+
+    def knows(self, element: Light) -> bool:
+        """Whether they have been made."""
+        return self.memory.holds(self._key_of(element))
+
+    def _key_of(self, element: Light) -> tuple[str, str, Light]:
+        return self.key, "light vectors", element
 
     def _vectors(self, element: Light) -> F32:
         points = self.surface.points
         rays: list[Rays] = list(self.lit.local.all_rays(element, points))
         radiance = self.lit.reflected_in(element)
         if radiance is not None:
-            rays.append(GatherRays(self._links, pattern_of_points(self.lit.store, self._links.shape[1]), radiance))
+            rays.append(GatherRays(self._links, self._pattern, radiance))
         return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
+
+    def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
+        """The same of some points, of a low degree, found quickly. (points, 3, K) float32, nothing elsewhere"""
+        points, rays = self.surface.points.rows(chosen), list[Rays]()
+        if element.paths.direct:
+            for source in element.local:
+                seen = self.lit.local.preview(source.geometry, points).visible
+                rays.append(self.lit.local.preview_rays(source, seen))
+        if element.paths.reflect:
+            radiance = self.lit.reflected.preview_under(element)
+            rays.append(GatherRays(self._links[chosen], self._pattern, radiance))
+        lights = self.lit.preview_lights_of(element)
+        out = np.zeros(self.vectors_shape, np.float32)
+        out[chosen] = light_vectors(points, self._visible[chosen], lights, rays, _PREVIEW_DEGREE)
+        return out
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return pattern_of_points(self.lit.store, self._links.shape[1])
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]:

@@ -29,7 +29,8 @@ F64 = NDArray[np.float64]
 MAX_POINTS = 2_000_000
 MOST_ROWS = 255  # of the grid in one face
 _ALIKE, _LEAST_ALIKE = 6, 1  # steps of a unit normal's components, within which points look the same way
-_TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough
+_TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough, and each is coarser
+_COARSER = 1.25
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
 _NODES_A_POINT = 8  # more where faces are thin
 _MOST_COARSE = 4.0  # or fine, beside a middling distance from the eye
@@ -118,7 +119,7 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
         ratio = len(chosen) / num_points
         if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
             break
-        finer = spacing * math.sqrt(ratio) * (1 + 0.02 * trial)  # in the end it has to be coarse enough
+        finer = spacing * math.sqrt(ratio) * (1 if trial < _TRIALS else _COARSER)
         if ratio < 1 and int((num_nodes(_rows(longest, finer)) * count).sum()) > most:
             break
         spacing = min(finer, _WIDEST * float(longest.max()))

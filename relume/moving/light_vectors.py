@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.light.triangles import TriangleLights
-from relume.moving.zernike import NUM_FUNCTIONS, add_light, in_basis, ladder
+from relume.moving.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
 from relume.project.receivers import Listed, Rays, Receivers
@@ -65,37 +65,40 @@ def _from_listed(rungs, num_points, first, wi, irradiance, scratch, out):  # typ
             add_light(rungs, end - begin, wi[:, begin:end], irradiance[:, begin:end], scratch, out[p])
 
 
-def light_vectors(points: Points, visible: NDArray[np.uint8], lights: TriangleLights, rays: Sequence[Rays]) -> F32:
+def light_vectors(
+    points: Points, visible: NDArray[np.uint8], lights: TriangleLights, rays: Sequence[Rays], degree: int = DEGREE
+) -> F32:
     """Find what arrives at points, as vectors.
 
     Args:
         points: n of them. visible: which of the lights each sees, as in `Receivers`. (n, bytes) uint8
         lights: triangles of the environment. rays: what brings light besides.
+        degree: of the functions; the numbers of higher ones are left at nothing.
     Returns:
         t, radiance times solid angle. (n, 3, K) float32
     Cost: O(n · (lights + rays) · K) time.
     """
     out = np.zeros((points.num_points, 3, NUM_FUNCTIONS), np.float32)
     if lights.num_lights:
-        args = (ladder(), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
+        args = (ladder(degree), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
         for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
     receivers = Receivers(points, points.normal, visible)  # no ray of a point depends on where it is seen from
     for some in rays:
         for_ranges(
-            lambda start, stop, some=some: _list_and_add(some, receivers, start, stop, out),  # type: ignore[misc]
+            lambda start, stop, some=some: _list_and_add(some, receivers, degree, start, stop, out),  # type: ignore[misc]
             points.num_points,
             _LISTED_A_RANGE,
         )
     return out
 
 
-def _list_and_add(rays: Rays, receivers: Receivers, start: int, stop: int, out: F32) -> None:
+def _list_and_add(rays: Rays, receivers: Receivers, degree: int, start: int, stop: int, out: F32) -> None:
     """Add rays of points [start, stop)."""
     most = (stop - start) * rays.rays_a_point
     listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
     rays.list_into(listed, receivers, start, stop)
     scratch = np.empty((6, rays.rays_a_point), np.float32)
-    _from_listed(ladder(), stop - start, listed.first, listed.wi, listed.irradiance, scratch, out[start:stop])
+    _from_listed(ladder(degree), stop - start, listed.first, listed.wi, listed.irradiance, scratch, out[start:stop])
 
 
 def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:

@@ -49,13 +49,21 @@ def cosines() -> F64:
     return np.maximum(1 - np.linspace(0, 1, NUM_ROWS) ** 2, _LEAST_COSINE)
 
 
-@lru_cache(maxsize=1)
-def _disc() -> tuple[F64, F64, F64]:
-    """Spread directions over the disc. Unit (radii · turns, 3), weights of cos θ dω, functions (radii · turns, K)."""
+@lru_cache(maxsize=2)
+def _disc(is_half: bool) -> tuple[F64, F64, F64]:
+    """Spread directions over the disc, or over half of it for what is the same on the other.
+
+    Returns:
+        Unit directions (n, 3), weights of cos θ dω (n,), functions (n, K); those that the halves cancel are nothing.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(_RADII)
-    r2, phi = np.repeat((nodes + 1) / 2, _TURNS), np.tile((np.arange(_TURNS) + 0.5) * (2 * np.pi / _TURNS), _RADII)
+    turns = _TURNS // 2 if is_half else _TURNS
+    r2, phi = np.repeat((nodes + 1) / 2, turns), np.tile((np.arange(turns) + 0.5) * (2 * np.pi / _TURNS), _RADII)
     wi = np.stack([np.sqrt(r2) * np.cos(phi), np.sqrt(r2) * np.sin(phi), np.sqrt(1 - r2)], axis=-1)
-    return wi, np.repeat(weights / 4, _TURNS) * (2 * np.pi / _TURNS), in_basis(wi)
+    functions, rungs = in_basis(wi), ladder()
+    if is_half:
+        functions[:, rungs.sine[rungs.order > 0]] = 0
+    return wi, np.repeat(weights / 4, turns) * (2 * np.pi / turns), functions
 
 
 def out_factors(term_document: Mapping[str, Any]) -> OutFactors:
@@ -75,7 +83,8 @@ def _of_white(term_text: str) -> OutFactors:
     document = json.loads(term_text)
     cosine = cosines()
     sine = np.sqrt(1 - cosine**2)
-    phi = np.zeros(1) if _is_isotropic(document) else np.arange(NUM_COLUMNS) * (2 * np.pi / NUM_COLUMNS)
+    is_even = _is_isotropic(document)
+    phi = np.zeros(1) if is_even else np.arange(NUM_COLUMNS) * (2 * np.pi / NUM_COLUMNS)
     wo = np.stack(
         [
             sine[:, None] * np.cos(phi),
@@ -84,7 +93,7 @@ def _of_white(term_text: str) -> OutFactors:
         ],
         axis=-1,
     )
-    wi, weight, functions = _disc()
+    wi, weight, functions = _disc(is_even)
     table = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS))
     whole = np.empty((NUM_ROWS, len(phi)))
     for row in range(NUM_ROWS):

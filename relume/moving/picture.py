@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,59 +12,22 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
-from relume.memory import Memory
+from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
-from relume.moving.light_vectors import add_scaled
 from relume.moving.lobes import Lobes, lobes_of
 from relume.moving.look_up import Seen, at_vertices, look
 from relume.moving.pixels import Mirrored, combine
 from relume.moving.sky import Sky, fill_sky, turn_of
-from relume.moving.surface import Surface
-from relume.moving.view import FreeView
+from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.scene.model import Camera
-from relume.trace.embree import EmbreeScene
 from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
-
-
-class MovingTransfer(Protocol):
-    """What it asks of an opened bake."""
-
-    @property
-    def memory(self) -> Memory: ...
-    @property
-    def method(self) -> str: ...
-    @property
-    def default_look(self) -> dict[str, Any]: ...
-    @property
-    def material_names(self) -> Sequence[str]: ...
-    @property
-    def views(self) -> Mapping[str, FreeView]: ...
-    @property
-    def surface(self) -> Surface: ...
-    @property
-    def embree(self) -> EmbreeScene: ...
-    @property
-    def vectors_shape(self) -> tuple[int, int, int]: ...
-    @property
-    def sky_share(self) -> F32: ...
-    def sky_in(self, name: str | None) -> Sky:
-        """An environment, None for the scene's own, and what it is when it is blurred."""
-        ...
-
-    def vectors(self, element: Light) -> F32:
-        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32"""
-        ...
-
-    def map_of(self, name: str | None, blur: float = 0) -> F32:
-        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
-        ...
 
 
 class _Materials(NamedTuple):
@@ -72,13 +35,6 @@ class _Materials(NamedTuple):
 
     tables: Tables
     lobes: Lobes
-
-
-class _Arriving(NamedTuple):
-    """Light vectors of all light, and of that which is not the sky's own. (points, 3, K) float32 each"""
-
-    total: F32
-    others: F32
 
 
 @dataclass(frozen=True)
@@ -97,20 +53,26 @@ class MovingAdvance:
 
 
 class MovingPicture:
-    """State of one session's picture; used from one thread at a time."""
+    """State of one session's picture; used from one thread at a time.
 
-    def __init__(self, transfer: MovingTransfer, view_name: str) -> None:
+    Args:
+        is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long.
+    """
+
+    def __init__(self, transfer: MovingTransfer, view_name: str, *, is_watched: bool = False) -> None:
         view = transfer.views[view_name]
         self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
         self._num_eyes = 0  # that it has been given: tells them apart
         self._look: Look | None = None
         self._light: Light | None = None
         self._solo: Solo = None
+        self._is_watched = is_watched
+        self._is_rough = False  # what is shown was found quickly
         self._shown: tuple[Any, ...] | None = None
         self._image = np.zeros((view.height, view.width, 3), np.float32)
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, _Materials] | None = None
-        self._vectors: tuple[Light, _Arriving] | None = None
+        self._vectors: tuple[Light, Arriving] | None = None
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
@@ -165,21 +127,35 @@ class MovingPicture:
         if pointer.name not in [one.name for one in names]:
             raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")
 
-    def next_job(self) -> None:
-        """Nothing is made beside the frames."""
-        return
+    def next_job(self) -> LightJob | None:
+        """What makes a rough picture as good as it gets: the light vectors that it lacks."""
+        is_waiting = self._is_rough and self._has_to_be_rough()
+        return LightJob(self._transfer, self._now(), self.take) if is_waiting else None
 
     def install(self, job: Any, made: Any) -> None:
-        """Nothing was asked for."""
+        """Go on with what a job has made."""
+        job.install(made)
+
+    def take(self, light: Light, vectors: Arriving) -> None:
+        """Go on with the light vectors of a light, unless it is another one by now."""
+        if light == self._now():
+            self._vectors = light, vectors
 
     def advance(self, max_coefficients: int | None) -> MovingAdvance:
         """Bring the picture to its look and its eye."""
         wanted = (self._look, self._solo, self._num_eyes)
-        if self._look is None or wanted == self._shown:
+        if self._look is None or (wanted == self._shown and self._is_rough == self._has_to_be_rough()):
             return MovingAdvance([])
+        self._is_rough = self._has_to_be_rough()
         self._image = self._evaluate(self._look)
         self._shown = wanted
-        return MovingAdvance(self.all_tiles())
+        return MovingAdvance(self.all_tiles(), fidelity="preview" if self._is_rough else "approximate")
+
+    def _has_to_be_rough(self) -> bool:
+        """Whether somebody would wait for light vectors that nobody has."""
+        light = self._now()
+        has_them = self._vectors is not None and self._vectors[0] == light
+        return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
 
     def _evaluate(self, shown: Look) -> F32:
         """The picture, (height, width, 3) float32."""
@@ -187,7 +163,8 @@ class MovingPicture:
         width, height = self._size
         seen = self._look_around()
         eye = camera.to_world[:3, 3].astype(np.float32)
-        light, materials = self._vectors_now(), self._materials_of(shown)
+        materials = self._materials_of(shown)
+        light = self._vectors_now(seen)
         sent = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
         glances = glance(transfer.surface, transfer.sky_share, light.others, materials.lobes, eye, seen.is_needed)
         mirrored = Mirrored(materials.lobes, *self._sky_now(), at_vertices(transfer.surface, seen.is_seen, glances))
@@ -234,18 +211,13 @@ class MovingPicture:
         gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
         return self._transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain
 
-    def _vectors_now(self) -> _Arriving:
-        """Light vectors in the light of the look: transport is linear in its sources."""
-        light = self._now()
+    def _vectors_now(self, seen: Seen | None = None) -> Arriving:
+        """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
+        light, transfer = self._now(), self._transfer
+        if seen is not None and self._is_rough:
+            return roughly(transfer, light, np.flatnonzero(seen.is_needed))
         if self._vectors is None or self._vectors[0] != light:
-            total, others = (np.zeros(self._transfer.vectors_shape, np.float32) for _ in range(2))
-            for element, gain in vector_of(light).items():
-                part, factor = self._transfer.vectors(element), np.array(gain, np.float32)
-                is_sky = element.paths.direct and element.is_environment_lit
-                add_scaled(total, part, factor)
-                if not is_sky:
-                    add_scaled(others, part, factor)
-            self._vectors = light, _Arriving(total, others)
+            self._vectors = light, arriving(transfer, light, transfer.vectors)
         return self._vectors[1]
 
     def light_vectors(self) -> F32:

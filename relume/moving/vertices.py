@@ -23,6 +23,8 @@ _TOGETHER = 0.35  # of the spacing: nodes as near as this are one point
 _SAME = 1e-3  # of it: nodes as near as this are one vertex
 _SAME_WAY = 50  # steps of a unit normal's components, within which vertices look the same way
 _TURN = 1.5  # spacings that a turn of the normal by a radian is worth
+_PLACE_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
+_U64 = np.uint64
 _APART = 1e3  # spacings between materials, and between sides
 
 
@@ -102,34 +104,31 @@ def _features(nodes: Nodes) -> F64:
 def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
     points = nodes.points
-    finest = nodes.spacing.min()
-    level = np.rint(np.log2(nodes.spacing / finest)).astype(np.int64)
-    corner = points.position.min(axis=0)
-    place = np.floor((points.position - corner) / (together * nodes.spacing)[:, None]).astype(np.int64)
+    corner, extent = points.position.min(axis=0), max(float(np.ptp(points.position, axis=0).max()), 1e-30)
+    level = np.rint(np.log2(nodes.spacing / nodes.spacing.min())).astype(np.uint64)
+    size = np.maximum(together * nodes.spacing, extent / ((1 << _PLACE_BITS) - 1))
+    place = np.floor((points.position - corner) / size[:, None]).astype(np.uint64)
     way = np.rint(points.normal * alike).astype(np.int64) + alike
     base = 2 * alike + 1
-    kind = (((way[:, 0] * base + way[:, 1]) * base + way[:, 2]) * 2 + nodes.side) * 64 + level
-    along = _interleaved(np.floor((points.position - corner) / _step(points)).astype(np.int64))
-    order = np.lexsort((kind, place[:, 2], place[:, 1], place[:, 0], along, nodes.material))
-    keys = np.column_stack([place, kind, nodes.material.astype(np.int64)])[order]
-    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    kind = (((way[:, 0] * base + way[:, 1]) * base + way[:, 2]) * 2 + nodes.side).astype(np.uint64)
+    where = (place[:, 0] << _U64(2 * _PLACE_BITS)) | (place[:, 1] << _U64(_PLACE_BITS)) | place[:, 2]
+    what = (kind << _U64(24)) | (level << _U64(16)) | nodes.material.astype(np.uint64)
+    order = np.lexsort((what, where))  # stable: the first of equals is the one with the lowest number
+    is_new = np.concatenate([[True], (where[order[1:]] != where[order[:-1]]) | (what[order[1:]] != what[order[:-1]])])
+    first, group = order[is_new], np.cumsum(is_new) - 1
+    finely = np.floor((points.position[first] - corner) / (extent / ((1 << _PLACE_BITS) - 1))).astype(np.uint64)
+    in_order = np.lexsort((_interleaved(finely), nodes.material[first]))
     rank = np.empty(len(first), np.intp)
-    by_place = np.argsort(first)
-    rank[by_place] = np.arange(len(first))
+    rank[in_order] = np.arange(len(first))
     found = np.empty(len(order), np.intp)
-    found[order] = rank[inverse.ravel()]
-    return order[first[by_place]], found
+    found[order] = rank[group]
+    return first[in_order], found
 
 
-def _step(points: Points) -> float:
-    """The side of the cells of the Morton curve: a millionth of the scene, since its numbers have 20 bits."""
-    return max(float(np.ptp(points.position, axis=0).max()), 1e-30) / ((1 << 20) - 1)
-
-
-def _interleaved(place: NDArray[np.int64]) -> NDArray[np.uint64]:
+def _interleaved(place: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Order places along a Morton curve: neighbours come mostly next to each other. (n,) uint64"""
     code = np.zeros(len(place), np.uint64)
-    for bit in range(20):
+    for bit in range(_PLACE_BITS):
         for axis in range(3):
-            code |= (place[:, axis].astype(np.uint64) >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
+            code |= (place[:, axis] >> _U64(bit) & _U64(1)) << _U64(3 * bit + axis)
     return code

@@ -49,12 +49,12 @@ def num_functions(degree: int) -> int:
     return (degree + 1) * (degree + 2) // 2
 
 
-@lru_cache(maxsize=1)
-def ladder() -> Ladder:
-    """The rungs of all functions up to `DEGREE`."""
+@lru_cache(maxsize=DEGREE + 1)
+def ladder(degree: int = DEGREE) -> Ladder:
+    """The rungs of all functions up to a degree, at most `DEGREE`."""
     rows: list[tuple[float, ...]] = []
-    for m in range(DEGREE + 1):
-        for s, n in enumerate(range(m, DEGREE + 1, 2)):
+    for m in range(degree + 1):
+        for s, n in enumerate(range(m, degree + 1, 2)):
             first = num_functions(n - 1) + sum(1 if k == 0 else 2 for k in range(n % 2, m, 2))
             scale = math.sqrt((n + 1) * (2 if m else 1) / math.pi)
             rows.append((m, scale, first, first + (1 if m else 0), *_recurrence(s, m)))

@@ -37,8 +37,9 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(scene)))
 
     def picture(transfer: Any, view: str) -> Any:
-        moves = transfer.eyes is Eyes.FREE
-        return MovingPicture(transfer, view) if moves else Picture(transfer, view, memory, is_watched=True)
+        if transfer.eyes is Eyes.FREE:
+            return MovingPicture(transfer, view, is_watched=True)
+        return Picture(transfer, view, memory, is_watched=True)
 
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)

@@ -49,9 +49,24 @@ def scene() -> Scene:
     return make_scene("contract", [floor, wall], materials, cameras, Environment("side", radiance))
 
 
-@pytest.fixture(scope="session", params=[*sorted(METHODS), FurnaceMethod.name])
+MOVING = {"surface"}  # methods whose eyes move
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Every registered method, and the tests' own; of those with pictures, the ones whose eyes move or do not."""
+    if "method" not in metafunc.fixturenames:
+        return
+    fixed, names = {*METHODS, FurnaceMethod.name} - MOVING, {*METHODS, FurnaceMethod.name}
+    if "moving" in metafunc.fixturenames:
+        names = MOVING
+    elif "transfer" in metafunc.fixturenames:
+        names = fixed
+    metafunc.parametrize("method", sorted(names), indirect=True, scope="session")
+
+
+@pytest.fixture(scope="session")
 def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
-    """Every registered method, and the tests' own, which joins by the same one line."""
+    """One of them; the tests' own joins by the same one line."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(METHODS, FurnaceMethod.name, FurnaceMethod())
         yield METHODS[request.param]
@@ -79,14 +94,12 @@ def opened(baked: Path) -> Opened:
 @pytest.fixture(scope="session")
 def transfer(opened: Opened) -> Opened:
     """A bake of fixed views, opened."""
-    if opened.eyes is not Eyes.BAKED:
-        pytest.skip("its eyes move: test_moving_pictures.py has their clauses")
+    assert opened.eyes is Eyes.BAKED
     return opened
 
 
 @pytest.fixture(scope="session")
 def moving(opened: Opened) -> Opened:
     """A bake whose eyes move, opened."""
-    if opened.eyes is not Eyes.FREE:
-        pytest.skip("its views are fixed: test_method_pictures.py has their clauses")
+    assert opened.eyes is Eyes.FREE
     return opened

@@ -5,7 +5,7 @@ import pytest
 from looks_of_pictures import EDITS, LOBE, environment, light, lit, painted, transport
 from sessions import look_of, relative_rmse
 
-from relume.errors import NotFoundError, ParameterError
+from relume.errors import CancelledError, NotFoundError, ParameterError
 from relume.moving.picture import MovingPicture
 from relume.reference import reference_image
 from relume.scene.model import Camera
@@ -63,6 +63,30 @@ def test_it_never_says_that_it_is_exact_and_rests(moving):
     assert (first.changed, first.exact, first.fidelity, first.complete) == (True, False, "approximate", True)
     assert not second.changed
     assert picture.next_job() is None
+
+
+@pytest.mark.parametrize("edit", ["a lamp moved", "the environment turned", "fewer paths", "all at once"])
+def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched(moving, edit):
+    _, change = EDITS[edit]
+    other = environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # nobody has asked for its light before
+    picture = MovingPicture(moving, "front", is_watched=True)
+    picture.set_look(look_of(moving, lit(change, other)))
+    assert picture.advance(None).fidelity == "preview"
+    rough = picture.image()
+    assert not picture.advance(None).changed
+    job = picture.next_job()
+    assert job.refines
+    with pytest.raises(CancelledError):
+        job.make(lambda share: None, lambda: True)
+    shares = []
+    picture.install(job, job.make(shares.append, lambda: False))
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert picture.next_job() is None
+    assert picture.advance(None).fidelity == "approximate"
+    exact = seen(moving, change, other).image()
+    np.testing.assert_array_equal(picture.image(), exact)
+    assert relative_rmse(rough, exact) < 0.3
 
 
 def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):

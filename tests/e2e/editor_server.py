@@ -48,6 +48,10 @@ class Server:
         self.process.kill()
         self.process.wait()
 
+    def delete(self, path: str) -> None:
+        """DELETE."""
+        urllib.request.urlopen(urllib.request.Request(self.url + path, method="DELETE"), timeout=30).close()
+
     def call(self, path: str, body: dict[str, Any] | None = None) -> Any:
         """GET, or POST where there is a body."""
         data = None if body is None else json.dumps(body).encode()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import urllib.request
 from collections.abc import Iterator
 
 import pytest
@@ -26,8 +25,7 @@ def scene(server: Server) -> Iterator[str]:
         bake = server.call(f"/api/bakes/{bake['id']}")
     assert bake["state"] == "ready", bake["problem"]
     yield identity
-    request = urllib.request.Request(f"{server.url}/api/scenes/{identity}", method="DELETE")
-    urllib.request.urlopen(request, timeout=30).close()
+    server.delete(f"/api/scenes/{identity}")
 
 
 @pytest.fixture

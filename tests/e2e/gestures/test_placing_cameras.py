@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import urllib.request
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,8 +18,7 @@ def scene(server: Server) -> Iterator[str]:
     """A scene of its own, which is gone afterwards with its bakes: they would be opened instead of the others'."""
     identity = server.call("/api/built-ins/cornell_box", {})["id"]
     yield identity
-    request = urllib.request.Request(f"{server.url}/api/scenes/{identity}", method="DELETE")
-    urllib.request.urlopen(request, timeout=30).close()
+    server.delete(f"/api/scenes/{identity}")
 
 
 @pytest.fixture

@@ -1,0 +1,95 @@
+"""What arrives at the points of a moving picture: summed over sources, found at once or beside the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import CancelledError
+from relume.moving.light_vectors import add_scaled
+from relume.moving.transfer import MovingTransfer
+from relume.picture.jobs import Cancelled, Progress
+from relume.picture.light import Light, vector_of
+
+F32 = NDArray[np.float32]
+
+
+class Arriving(NamedTuple):
+    """Light vectors of all light, and of that which is not the sky's own. (points, 3, K) float32 each"""
+
+    total: F32
+    others: F32
+
+
+def arriving(transfer: MovingTransfer, light: Light, vectors_of: Callable[[Light], F32]) -> Arriving:
+    """Sum over sources: transport is linear in them.
+
+    Args:
+        transfer: of the points. light: that arrives.
+        vectors_of: finds those of one source and one kind of way. (points, 3, K) float32
+    """
+    total, others = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
+    for element, gain in vector_of(light).items():
+        part, factor = vectors_of(element), np.array(gain, np.float32)
+        add_scaled(total, part, factor)
+        if not (element.paths.direct and element.is_environment_lit):
+            add_scaled(others, part, factor)
+    return Arriving(total, others)
+
+
+def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp]) -> Arriving:
+    """Find what arrives at some points quickly, where it is not known.
+
+    Args:
+        transfer: of the points. light: that arrives. chosen: points that are asked about. (n,)
+    """
+
+    def found(element: Light) -> F32:
+        is_known = transfer.knows(element)
+        return transfer.vectors(element) if is_known else transfer.preview_vectors(element, chosen)
+
+    return arriving(transfer, light, found)
+
+
+@dataclass(frozen=True)
+class LightJob:
+    """What arrives, made beside the frames; a `relume.picture.jobs.Job`.
+
+    Attributes:
+        take: gets it when it is there.
+    """
+
+    transfer: MovingTransfer
+    light: Light
+    take: Callable[[Light, Arriving], None]
+
+    what = "light on the points"
+    state: ClassVar[Literal["shading"]] = "shading"
+    refines = True
+
+    @property
+    def key(self) -> tuple[Hashable, ...]:
+        """Jobs of one light are one."""
+        return self.transfer.key, "light vectors", self.light
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> Arriving:
+        """Find it, source by source. Raises CancelledError where `cancelled`, asked before each, said so."""
+        num, done = len(vector_of(self.light)), 0
+
+        def found(element: Light) -> F32:
+            nonlocal done
+            if cancelled():
+                raise CancelledError("light on the points was cancelled")
+            vectors, done = self.transfer.vectors(element), done + 1
+            progress(done / num)
+            return vectors
+
+        return arriving(self.transfer, self.light, found)
+
+    def install(self, made: Arriving) -> None:
+        """Hand it over."""
+        self.take(self.light, made)

@@ -1,0 +1,52 @@
+"""What moving pictures ask of an opened bake; `relume.methods.moving_views` implements it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.moving.sky import Sky
+from relume.moving.surface import Surface
+from relume.moving.view import FreeView
+from relume.picture.light import Light
+from relume.picture.transfer import Opened
+from relume.trace.embree import EmbreeScene
+
+F32 = NDArray[np.float32]
+
+
+class MovingTransfer(Opened, Protocol):
+    """What it asks of an opened bake."""
+
+    @property
+    def views(self) -> Mapping[str, FreeView]: ...
+    @property
+    def surface(self) -> Surface: ...
+    @property
+    def embree(self) -> EmbreeScene: ...
+    @property
+    def vectors_shape(self) -> tuple[int, int, int]: ...
+    @property
+    def sky_share(self) -> F32: ...
+    def sky_in(self, name: str | None) -> Sky:
+        """An environment, None for the scene's own, and what it is when it is blurred."""
+        ...
+
+    def vectors(self, element: Light) -> F32:
+        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32"""
+        ...
+
+    def knows(self, element: Light) -> bool:
+        """Whether they have been made, and are there at once."""
+        ...
+
+    def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
+        """The same of some points alone, found quickly. (points, 3, K) float32"""
+        ...
+
+    def map_of(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        ...
