@@ -28,6 +28,7 @@ def render(
     from relume.exr.attributes import Origin
     from relume.memory import Memory
     from relume.methods.registry import open_bake
+    from relume.picture.transfer import Eyes
     from relume.render.image import render_image
 
     check_output(output)
@@ -42,6 +43,8 @@ def render(
         transfer = open_bake(service.store_path(bake.id), Memory(4 << 30))
         if not bake.is_current:
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
+        if transfer.eyes is Eyes.FREE:
+            typer.echo("note: the eye of this bake moves: its pictures are approximate; exact: relume bake", err=True)
         document = complete_look(partial, transfer.default_look)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)

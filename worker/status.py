@@ -26,6 +26,8 @@ PHASE_WORDS: dict[Phase, str] = {
 }
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
+APPROXIMATE = frozenset({"surface"})  # methods whose pictures are never exact
+
 
 @dataclass(frozen=True)
 class BakeStatus:
@@ -64,9 +66,10 @@ class BakeStatus:
         return self.code == bake_code()
 
     @property
-    def rank(self) -> tuple[int, bool]:
-        """Sorts a scene's bakes: the finest is the best, of equally fine ones one that this code has made."""
-        return self.detail, self.is_current
+    def rank(self) -> tuple[bool, int, bool]:
+        """Sorts a scene's bakes, the best last: one whose pictures become exact, then the finest, then one that this
+        code has made."""
+        return self.recipe.method not in APPROXIMATE, self.detail, self.is_current
 
     @property
     def detail(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,8 @@ def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: 
             (NEW, True),
         ]
         assert service.get(new).rank > service.get(old).rank
+        moving = replace(service.get(new), recipe=replace(RECIPE, method="surface", size=(4096, 4096)))
+        assert moving.rank < service.get(old).rank  # however fine, it never becomes exact
         assert service.get(old).state == "ready"
         assert open_store(service.store_path(old)).attributes["code"] == OLD
 
