@@ -57,7 +57,7 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
 
 @linux
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in MOVING)) for name in sorted(METHODS)]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "direct")) for name in sorted(METHODS)]
 )
 def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
     took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_points=1000))

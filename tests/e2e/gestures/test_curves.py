@@ -135,6 +135,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 def test_points_that_are_touched_change_nothing_and_a_nudge_no_more_than_its_share(
     curve: CurvePage, server: Server
 ) -> None:

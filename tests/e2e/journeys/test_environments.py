@@ -25,6 +25,7 @@ def dusk_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_another_environment_is_chosen_by_click_and_by_key_and_undone(editor: Editor) -> None:
     page = editor.page
     group = page.get_by_role("radiogroup", name="Environment")
