@@ -31,9 +31,11 @@ from relume.look import Look, complete, validate
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.moving.arriving import arriving
 from relume.moving.look_up import look as look_around
 from relume.moving.picture import MovingPicture
 from relume.parallel import num_threads
+from relume.picture.light import light_of
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
 from relume.scene.model import Scene
@@ -171,8 +173,10 @@ class _Scene:
         def direct(document: dict[str, Any]) -> None:
             document["transport"]["show"] = "direct"
 
-        picture = self.picture(self.look(direct))
-        found = np.sqrt(np.pi) * picture.light_vectors()[chosen, :, 0].astype(np.float64)
+        shown = light_of(self.look(direct), self.moving.material_names, has_bounces=True)
+        found = np.sqrt(np.pi) * arriving(self.moving, shown, self.moving.vectors).total[chosen, :, 0].astype(
+            np.float64
+        )
         return float(np.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)))
 
     def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:

@@ -82,7 +82,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 def generate_protocol() -> str:
     """Messages and bodies; the same models give the same text."""
     parts = [HEAD]
-    for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN"):
+    for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"):
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
     for mode, models in (("validation", INPUTS), ("serialization", OUTPUTS)):

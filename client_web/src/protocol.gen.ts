@@ -9,6 +9,8 @@ export const MAX_FRAMES_IN_FLIGHT = 2;
 
 export const MAX_VIEWS_SHOWN = 4;
 
+export const MAX_EYE_PIXELS = 2304000;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";

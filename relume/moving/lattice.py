@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from relume.errors import PlanError
 from relume.moving.vertices import Nodes, Vertices, find_vertices, shared_points
 from relume.points import Points
+from relume.trace.cells import face_normals
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
@@ -110,17 +111,22 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
     coarse = _coarseness(corners.mean(axis=1), area, eyes)
     longest, count = edges.max(axis=1) / coarse, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
-    while int((num_nodes(_rows(longest, spacing)) * count).sum()) > most and spacing < longest.max():
-        spacing *= 1.25
+
+    def is_too_fine(spacing: float) -> bool:
+        return int((num_nodes(_rows(longest, spacing)) * count).sum()) > most
+
+    while is_too_fine(spacing) and spacing < longest.max():
+        spacing *= _COARSER
+    normals = face_normals(geometry)
     for trial in range(_MOST_TRIALS):
-        lattice, nodes = _grids(geometry, is_open, _rows(longest, spacing), spacing * coarse)
+        lattice, nodes = _grids(geometry, normals, is_open, _rows(longest, spacing), spacing * coarse)
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
         chosen = shared_points(nodes, alike)
         ratio = len(chosen) / num_points
         if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
             break
         finer = spacing * math.sqrt(ratio) * (1 if trial < _TRIALS else _COARSER)
-        if ratio < 1 and int((num_nodes(_rows(longest, finer)) * count).sum()) > most:
+        if ratio < 1 and is_too_fine(finer):
             break
         spacing = min(finer, _WIDEST * float(longest.max()))
     vertices, vertex = find_vertices(nodes, chosen)
@@ -147,14 +153,17 @@ def _rows(longest: F64, spacing: float) -> NDArray[np.int64]:
 
 
 def _grids(
-    geometry: Geometry, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: F64
+    geometry: Geometry, normals: F32, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: F64
 ) -> tuple[Lattice, Nodes]:
-    """Place the nodes of all grids, which are not numbered as vertices yet. spacing: of each face. (faces,)"""
+    """Place the nodes of all grids, which are not numbered as vertices yet.
+
+    normals: of the faces. (faces, 3). spacing: of points on each. (faces,)
+    """
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
     counts = num_nodes(num_rows).ravel()
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).reshape(num_rows.shape)
     at = _placement(num_rows, counts)
-    normal = _face_normals(geometry)[at.face] * np.where(at.side == 0, 1, -1)[:, None].astype(np.float32)
+    normal = normals[at.face] * np.where(at.side == 0, 1, -1)[:, None].astype(np.float32)
     points = surface_at(geometry, Hits(at.face, at.uv, np.ones(len(at.face), np.float32)), -normal).points
     material = geometry.face_material[at.face].astype(np.uint16)
     lattice = Lattice(num_rows, first.astype(np.uint32), np.empty(0, np.uint32))
@@ -173,9 +182,3 @@ def _placement(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Place
         where = begin[:, None] + np.arange(len(i))
         uv[where, 0], uv[where, 1] = (i / rows).astype(np.float32), (j / rows).astype(np.float32)
     return _Placement((side_of // 2).astype(np.int32), (side_of % 2).astype(np.uint8), uv)
-
-
-def _face_normals(geometry: Geometry) -> F32:
-    a, b, c = geometry.positions[geometry.faces].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30), np.float32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from relume.moving.sky import Sky, fill_sky, turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
+from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.scene.model import Camera
 from relume.views.resolve import encode_pixels
@@ -35,21 +35,6 @@ class _Materials(NamedTuple):
 
     tables: Tables
     lobes: Lobes
-
-
-@dataclass(frozen=True)
-class MovingAdvance:
-    """What one step changed; a `server.library.ports.Advance`."""
-
-    tiles: list[Tile]
-    exact: bool = False
-    fidelity: Word = "approximate"
-    complete: bool = True
-
-    @property
-    def changed(self) -> bool:
-        """Whether any pixel may be new."""
-        return bool(self.tiles)
 
 
 class MovingPicture:
@@ -102,11 +87,6 @@ class MovingPicture:
         self._camera, self._size = camera, size
         self._num_eyes += 1
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the next picture, pixels."""
-        return self._size
-
     def touch(self, pointer: str) -> None:
         """Take note of what a hand holds; nothing needs to be prepared.
 
@@ -141,15 +121,19 @@ class MovingPicture:
         if light == self._now():
             self._vectors = light, vectors
 
-    def advance(self, max_coefficients: int | None) -> MovingAdvance:
+    def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
         wanted = (self._look, self._solo, self._num_eyes)
         if self._look is None or (wanted == self._shown and self._is_rough == self._has_to_be_rough()):
-            return MovingAdvance([])
+            return Advance([], exact=False, fidelity=self._fidelity, complete=True)
         self._is_rough = self._has_to_be_rough()
         self._image = self._evaluate(self._look)
         self._shown = wanted
-        return MovingAdvance(self.all_tiles(), fidelity="preview" if self._is_rough else "approximate")
+        return Advance(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
+
+    @property
+    def _fidelity(self) -> Word:
+        return "preview" if self._is_rough else "approximate"
 
     def _has_to_be_rough(self) -> bool:
         """Whether somebody would wait for light vectors that nobody has."""
@@ -211,18 +195,14 @@ class MovingPicture:
         gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
         return self._transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain
 
-    def _vectors_now(self, seen: Seen | None = None) -> Arriving:
+    def _vectors_now(self, seen: Seen) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
         light, transfer = self._now(), self._transfer
-        if seen is not None and self._is_rough:
+        if self._is_rough:
             return roughly(transfer, light, np.flatnonzero(seen.is_needed))
         if self._vectors is None or self._vectors[0] != light:
             self._vectors = light, arriving(transfer, light, transfer.vectors)
         return self._vectors[1]
-
-    def light_vectors(self) -> F32:
-        """What arrives at every point in the light of the look. (points, 3, K) float32"""
-        return self._vectors_now().total
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""

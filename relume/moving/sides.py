@@ -15,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.scene.model import Camera
+from relume.trace.cells import face_normals
 from relume.trace.geometry import Geometry
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, camera_directions, trace_from
@@ -37,46 +38,43 @@ def open_sides(geometry: Geometry, cameras: Sequence[Camera], seed: int) -> NDAr
         (faces, 2); side 0 is the one where the corners are counter-clockwise.
     """
     num_faces = len(geometry.faces)
-    outside, rng = 2 * num_faces, np.random.default_rng(seed)
-    links = [_seen_by(geometry, camera, outside) for camera in cameras]
+    outside, rng, normals = 2 * num_faces, np.random.default_rng(seed), face_normals(geometry)
+    links = [_seen_by(geometry, normals, camera, outside) for camera in cameras]
     for _ in range(max(1, min(_RAYS_A_SIDE, _MOST_RAYS // (2 * num_faces)))):
         for start in range(0, 2 * num_faces, _RAYS_AT_ONCE):
             sides = np.arange(start, min(start + _RAYS_AT_ONCE, 2 * num_faces))
-            links.append(_seen_from(geometry, sides, outside, rng))
+            links.append(_seen_from(geometry, normals, sides, outside, rng))
     one, other = np.concatenate(links, axis=1)
     graph = coo_array((np.ones(len(one), np.bool_), (one, other)), shape=(outside + 1, outside + 1))
     _, part = connected_components(graph, directed=False)
     return np.asarray(part[:outside] == part[outside]).reshape(num_faces, 2)
 
 
-def _sides_hit(geometry: Geometry, hits: Hits, directions: F32, outside: int) -> NDArray[np.int64]:
+def _sides_hit(normals: F32, hits: Hits, directions: F32, outside: int) -> NDArray[np.int64]:
     """Find the sides that rays hit, `outside` where they leave the scene."""
-    a, b, c = geometry.positions[geometry.faces[np.maximum(hits.face, 0)]].transpose(1, 0, 2)
-    is_behind = np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) > 0
+    is_behind = np.einsum("nc,nc->n", normals[np.maximum(hits.face, 0)], directions) > 0
     return np.where(hits.face >= 0, 2 * hits.face.astype(np.int64) + is_behind, outside)
 
 
 def _seen_from(
-    geometry: Geometry, sides: NDArray[np.int64], outside: int, rng: np.random.Generator
+    geometry: Geometry, normals: F32, sides: NDArray[np.int64], outside: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Shoot one ray from a random place of each side. (2, rays): the side, and what it sees"""
     face = (sides // 2).astype(np.int32)
-    a, b, c = geometry.positions[geometry.faces[face]].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a).astype(np.float32) * np.where(sides % 2 == 0, 1, -1)[:, None].astype(np.float32)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal = normals[face] * np.where(sides % 2 == 0, 1, -1)[:, None].astype(np.float32)
     root, v = np.sqrt(rng.random(len(sides))), rng.random(len(sides))
     uv = np.stack([root * (1 - v), root * v], axis=1).astype(np.float32)
     surface = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal)
     directions = lobe_directions(normal, 1.0, rng)
     hits = trace_from(geometry.embree, surface.points.position, directions)
-    return np.stack([sides, _sides_hit(geometry, hits, directions, outside)])
+    return np.stack([sides, _sides_hit(normals, hits, directions, outside)])
 
 
-def _seen_by(geometry: Geometry, camera: Camera, outside: int) -> NDArray[np.int64]:
+def _seen_by(geometry: Geometry, normals: F32, camera: Camera, outside: int) -> NDArray[np.int64]:
     """Link what a camera sees with the outside. (2, rays)"""
     width, height = _EYE_PIXELS
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, _EYE_PIXELS, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     hits = trace_from(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
-    seen = _sides_hit(geometry, hits, directions, outside)
+    seen = _sides_hit(normals, hits, directions, outside)
     return np.stack([np.full(len(seen), outside), seen])

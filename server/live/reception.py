@@ -20,7 +20,6 @@ from server.live.state.target import Eye
 from server.wire import protocol
 
 MAX_BAD_MESSAGES = 50
-MAX_EYE_PIXELS = 1920 * 1200
 
 
 class Reception:
@@ -112,8 +111,9 @@ class Reception:
             raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method surface")
         self._check_view(message.view)
         width, height = message.size
-        if not (width >= 1 and height >= 1 and width * height <= MAX_EYE_PIXELS):
-            raise ParameterError("size", list(message.size), f"at least 1×1 pixels, at most {MAX_EYE_PIXELS} in all")
+        if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_EYE_PIXELS):
+            allowed = f"at least 1×1 pixels, at most {protocol.MAX_EYE_PIXELS} in all"
+            raise ParameterError("size", list(message.size), allowed)
         camera = placed_camera("eye", message.to_world, math.degrees(message.yfov)).camera
         known = self._pending.eyes.get(message.view)
         if known is None or message.eye > known.number:

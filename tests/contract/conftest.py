@@ -15,6 +15,7 @@ from relume.picture.transfer import Eyes, Opened
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
 from relume.store import bake_here
+from worker.status import APPROXIMATE
 
 SIZE, NUM_LIGHTS, NUM_POINTS = (48, 36), 100, 6000
 
@@ -49,16 +50,13 @@ def scene() -> Scene:
     return make_scene("contract", [floor, wall], materials, cameras, Environment("side", radiance))
 
 
-MOVING = {"surface"}  # methods whose eyes move
-
-
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Every registered method, and the tests' own; of those with pictures, the ones whose eyes move or do not."""
     if "method" not in metafunc.fixturenames:
         return
-    fixed, names = {*METHODS, FurnaceMethod.name} - MOVING, {*METHODS, FurnaceMethod.name}
+    fixed, names = {*METHODS, FurnaceMethod.name} - APPROXIMATE, {*METHODS, FurnaceMethod.name}
     if "moving" in metafunc.fixturenames:
-        names = MOVING
+        names = APPROXIMATE
     elif "transfer" in metafunc.fixturenames:
         names = fixed
     metafunc.parametrize("method", sorted(names), indirect=True, scope="session")

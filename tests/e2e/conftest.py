@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from editor_page import WAIT_MS, Editor
+from editor_page import WAIT_MS, Editor, opened_page
 from editor_server import SIZE, Server
 from playwright.sync_api import Browser, expect, sync_playwright
 from tiny_scenes import still_life
@@ -71,14 +71,9 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def editor(server: Server, browser: Browser) -> Iterator[Editor]:
     """The editor of the scene in a fresh browser profile, its first picture exact."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    editor = Editor(page)
     (scene,) = server.call("/api/scenes")
-    page.goto(f"{server.url}/?scene={scene['id']}")
-    editor.wait_until_exact()
-    yield editor
-    context.close()
-    assert errors == []
+    with opened_page(browser) as page:
+        editor = Editor(page)
+        page.goto(f"{server.url}/?scene={scene['id']}")
+        editor.wait_until_exact()
+        yield editor

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Locator, Page
+from playwright.sync_api import Browser, Locator, Page
 
 WAIT_MS = 120_000
 # A patch is sent within one animation frame, the status bar follows within another.
@@ -72,6 +74,18 @@ class Editor:
         self.page.mouse.down()
         self.page.mouse.move(x(stop), y, steps=12)
         self.page.mouse.up()
+
+
+@contextmanager
+def opened_page(browser: Browser) -> Iterator[Page]:
+    """A page in a fresh browser profile, at 1280×800; no script on it may fail."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    context.close()
+    assert errors == []
 
 
 def changed(before: NDArray[np.int16], after: NDArray[np.int16]) -> float:

@@ -2,7 +2,7 @@
 import { effect } from "@preact/signals";
 import { send } from "../live/connections";
 import { askProbe } from "../live/probing";
-import type { HelloMessage, Triple } from "../protocol";
+import { MAX_EYE_PIXELS, type HelloMessage, type Triple } from "../protocol";
 import { bake } from "../state/bakes";
 import { connection } from "../state/connection";
 import { shownViews, views } from "../state/views";
@@ -12,7 +12,6 @@ import { frameOf, isNear, orbitOf, type Bounds, type Frame, type Orbit } from ".
 type View = HelloMessage["views"][number];
 
 const DEGREES = 180 / Math.PI;
-const MOST_PIXELS = 1920 * 1200;
 
 /** Of one view of one bake. */
 export class Eye {
@@ -90,7 +89,7 @@ export class Eye {
 
   private tell({ to_world, yfov }: Frame): void {
     const { name, width, height } = this.view;
-    const scale = Math.min(1, Math.sqrt(MOST_PIXELS / (width * height)));
+    const scale = Math.min(1, Math.sqrt(MAX_EYE_PIXELS / (width * height)));
     const size: [number, number] = [Math.floor(width * scale), Math.floor(height * scale)];
     this.number = Math.max(this.number + 1, Date.now());
     const camera = { to_world, yfov: yfov / DEGREES };

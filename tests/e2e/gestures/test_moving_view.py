@@ -6,9 +6,9 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from editor_page import WAIT_MS, Editor, changed
+from editor_page import WAIT_MS, Editor, changed, opened_page
 from editor_server import Server
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 BAKE_S, MOVED_S = 120.0, 30.0
 
@@ -31,17 +31,16 @@ def scene(server: Server) -> Iterator[str]:
 @pytest.fixture
 def moving(server: Server, browser: Browser, scene: str) -> Iterator[Editor]:
     """The editor on it, its first picture drawn."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(f"{server.url}/?scene={scene}")
-    editor = Editor(page)
+    with opened_page(browser) as page:
+        page.goto(f"{server.url}/?scene={scene}")
+        wait_until_drawn(page)
+        yield Editor(page)
+
+
+def wait_until_drawn(page: Page) -> None:
+    """Until its first picture is there."""
     page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
     page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
-    yield editor
-    context.close()
-    assert errors == []
 
 
 def differs(editor: Editor, before: object, least: float = 0.02) -> None:
@@ -106,8 +105,7 @@ def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Edit
     differs(moving, first)
     aside = moving.pixels_now()
     page.reload()
-    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
-    page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+    wait_until_drawn(page)
     differs(moving, first)
     assert changed(aside, moving.pixels_now()) < 0.02
     moving.canvas.focus()

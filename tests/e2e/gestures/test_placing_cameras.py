@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from editor_page import WAIT_MS, Editor
+from editor_page import WAIT_MS, Editor, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
@@ -24,17 +24,12 @@ def scene(server: Server) -> Iterator[str]:
 @pytest.fixture
 def page(server: Server, scene: str, browser: Browser) -> Iterator[Page]:
     """The start page with the scene's bake dialog open, and the finder on it, its first picture drawn."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(server.url)
-    page.locator(".scene-card", has_text="Cornell box").get_by_role("button", name="Bake…").click()
-    page.get_by_role("button", name="Place a camera…").click()
-    moved(page, "")
-    yield page
-    context.close()
-    assert errors == []
+    with opened_page(browser) as page:
+        page.goto(server.url)
+        page.locator(".scene-card", has_text="Cornell box").get_by_role("button", name="Bake…").click()
+        page.get_by_role("button", name="Place a camera…").click()
+        moved(page, "")
+        yield page
 
 
 def moved(page: Page, before: str) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from editor_page import Editor
+from editor_page import Editor, opened_page
 from editor_server import Server
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
@@ -45,18 +44,12 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def start(server: Server, browser: Browser) -> Iterator[Page]:
     """The start page in a fresh profile; scenes that a test imports are gone afterwards."""
     known = {scene["id"] for scene in server.call("/api/scenes")}
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(server.url)
-    yield page
-    context.close()
+    with opened_page(browser) as page:
+        page.goto(server.url)
+        yield page
     for scene in server.call("/api/scenes"):
         if scene["id"] not in known:
-            request = urllib.request.Request(f"{server.url}/api/scenes/{scene['id']}", method="DELETE")
-            urllib.request.urlopen(request, timeout=30).close()
-    assert errors == []
+            server.delete(f"/api/scenes/{scene['id']}")
 
 
 def drop(page: Page, *paths: Path) -> None:
