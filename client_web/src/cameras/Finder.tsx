@@ -110,27 +110,30 @@ interface PlacingProps extends Begun {
 
 function Placing({ scene, bounds, first, whole, name, onKept }: PlacingProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const [problem, setProblem] = useState("");
+  const [unseen, setUnseen] = useState(""); // a picture that comes after says nothing about what was refused
+  const [refused, setRefused] = useState("");
   const [called, setCalled] = useState(name ?? freeName(scene.views.map((view) => view.name)));
-  const { orbit, change } = useMoved(scene.id, canvas, first, setProblem);
+  const { orbit, change } = useMoved(scene.id, canvas, first, setUnseen);
   const field = useId();
 
   const seeAll = () => change(() => whole);
   const lookAt = async (u: number, v: number) => {
+    setRefused("");
     try {
       const place = await placeAt(scene.id, frameOf(orbit), RESTING, u * RESTING[0], v * RESTING[1]);
       if (place !== null) change((now) => ({ ...now, target: place }));
     } catch (error) {
-      setProblem((error as Error).message);
+      setRefused((error as Error).message);
     }
   };
   const keep = async (event: Event) => {
     event.preventDefault();
+    setRefused("");
     try {
       await keepCamera(scene.id, called.trim(), frameOf(orbit));
       onKept(called.trim());
     } catch (error) {
-      setProblem((error as Error).message);
+      setRefused((error as Error).message);
     }
   };
   const hand = useHand(change, bounds, (u, v) => void lookAt(u, v));
@@ -181,7 +184,7 @@ function Placing({ scene, bounds, first, whole, name, onKept }: PlacingProps) {
         </button>
       </div>
       <p class="finder-problem" role="alert">
-        {problem}
+        {refused || unseen}
       </p>
     </form>
   );
