@@ -39,3 +39,8 @@ def bake_path(data_dir: Path, bake_id: str) -> Path:
 def staging_path(data_dir: Path, bake_id: str) -> Path:
     """The store of a bake that is not finished."""
     return data_dir / "bakes" / "staging" / f"{_checked(bake_id)}.zarr"
+
+
+def scene_of_bake(bake: Path, scene_id: str) -> Path:
+    """Folder of the scene that a published store was baked of, in the same data directory."""
+    return scene_path(bake.parents[1], scene_id)

@@ -54,7 +54,7 @@ export interface EditMessage {
   solo?: string[] | null;
 }
 
-/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "stay", a moving picture is not replaced when the eye rests. */
+/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and edits go on in it; "stay", none does. */
 export interface EyeMessage {
   type: "eye";
   view: string;
@@ -63,7 +63,7 @@ export interface EyeMessage {
   yfov: number;
   size: [number, number];
   hand?: string | null;
-  rest?: "stay";
+  rest?: "exact" | "stay";
 }
 
 /** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */

@@ -87,6 +87,11 @@ class MovingPicture:
         self._camera, self._size = camera, size
         self._num_eyes += 1
 
+    @property
+    def eye(self) -> tuple[Camera, tuple[int, int]]:
+        """Where it is seen from, and the size of the picture."""
+        return self._camera, self._size
+
     def touch(self, pointer: str) -> None:
         """Take note of what a hand holds; nothing needs to be prepared.
 

@@ -8,10 +8,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import CancelledError, PlanError
+from relume.errors import PlanError
 from relume.look import Look
 from relume.methods.moving_views import MovingViews
 from relume.moving.picture import MovingPicture
+from relume.picture.finish import finish
 from relume.picture.picture import Picture
 from relume.picture.transfer import Opened, Transfer
 
@@ -50,21 +51,9 @@ def render_image(
         raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
     picture = Picture(fixed, view_name, fixed.memory.passing)
     picture.set_look(look)
-    num_terms, made = sum(len(material.terms) for material in look.materials.values()), 0
-    while True:
-        if cancelled():
-            raise CancelledError("the picture was cancelled")
-        exact = picture.advance(None).exact
-        if picture.next_job() is None and exact:
-            progress(1.0)
-            image, alpha = picture.image(), picture.alpha(for_display=for_display)
-            return image if alpha is None else np.dstack([image, alpha])
-
-        def share_of_all(share: float, made: int = made) -> None:
-            progress(min(made + share, num_terms) / max(1, num_terms))  # seldom is more made than an image a term
-
-        picture.freeze(share_of_all, cancelled)
-        made += 1
+    finish(picture, look, progress, cancelled)
+    image, alpha = picture.image(), picture.alpha(for_display=for_display)
+    return image if alpha is None else np.dstack([image, alpha])
 
 
 def render_small(transfer: Opened, view_name: str, look: Look, width: int) -> NDArray[np.float32]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from server.library.ports import Library
+from worker.paths import scene_of_bake
 
 if TYPE_CHECKING:
     from relume.scene.model import Camera
@@ -21,7 +22,9 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.code_version import image_code
     from relume.memory import Memory
     from relume.methods.registry import open_bake
+    from relume.methods.stills import Stills
     from relume.moving.picture import MovingPicture
+    from relume.moving.resting import RestingPicture
     from relume.picture.picture import Picture
     from relume.picture.transfer import Eyes
     from relume.reference import reference_image
@@ -36,10 +39,18 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     def finder(scene: Path) -> Finder:
         return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(scene)))
 
+    def stills_of(transfer: Any) -> Stills:
+        scene = scene_of_bake(Path(transfer.key), transfer.scene_id)
+        return memory.passing.keep((transfer.key, "scene"), lambda: Stills(transfer.lit, load_scene(scene)))
+
     def picture(transfer: Any, view: str) -> Any:
-        if transfer.eyes is Eyes.FREE:
-            return MovingPicture(transfer, view, is_watched=True)
-        return Picture(transfer, view, memory, is_watched=True)
+        if transfer.eyes is not Eyes.FREE:
+            return Picture(transfer, view, memory, is_watched=True)
+
+        def still(*of_eye: Any) -> Any:
+            return stills_of(transfer).make(*of_eye)  # in the job's thread: reading a scene takes its time
+
+        return RestingPicture(MovingPicture(transfer, view, is_watched=True), still, memory)
 
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)

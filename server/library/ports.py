@@ -60,7 +60,7 @@ class Picture(Protocol):
 class MovingPicture(Picture, Protocol):
     """One whose eye moves."""
 
-    def set_eye(self, camera: Camera, size: tuple[int, int]) -> None: ...
+    def set_eye(self, camera: Camera, size: tuple[int, int], *, rests: bool) -> None: ...
 
 
 class Finder(Protocol):

@@ -117,7 +117,9 @@ class Reception:
         camera = placed_camera("eye", message.to_world, math.degrees(message.yfov)).camera
         known = self._pending.eyes.get(message.view)
         if known is None or message.eye > known.number:
-            self._pending.eyes[message.view] = Eye(message.eye, camera, message.size, received_s)
+            self._pending.eyes[message.view] = Eye(
+                message.eye, camera, message.size, received_s, message.rest == "exact"
+            )
 
     def _check_view(self, name: str) -> None:
         if name not in self._transfer.views:

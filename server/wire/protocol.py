@@ -150,7 +150,8 @@ class TouchMessage(Message):
 class EyeMessage(Message):
     """client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames
     name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as
-    in an edit; nothing is prepared for it. `rest`: "stay", a moving picture is not replaced when the eye rests."""
+    in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and
+    edits go on in it; "stay", none does."""
 
     type: Literal["eye"]
     view: Name
@@ -159,7 +160,7 @@ class EyeMessage(Message):
     yfov: Annotated[float, Field(gt=0, lt=math.pi, allow_inf_nan=False)]
     size: tuple[Pixel, Pixel]
     hand: Pointer | None = None
-    rest: Literal["stay"] = "stay"
+    rest: Literal["exact", "stay"] = "exact"
 
 
 ClientMessage = Annotated[

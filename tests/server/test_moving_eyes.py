@@ -100,6 +100,35 @@ def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -
     np.testing.assert_array_equal(shown(of_eye(session, 7)), pictures[0])
 
 
+def exact_of(session: Session, number: int, revision: int) -> Frame:
+    while (frame := session.exact(revision)).header["eye"] != number:
+        pass
+    return frame
+
+
+def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twice(
+    session: Session, client: TestClient, scene: dict[str, Any], tmp_path: Any
+) -> None:
+    found = hello(session)
+    (view,), material = found["views"], found["materials"][0]
+    for number, aside in ((5, 0.4), (6, -0.3)):
+        placed = eye(view, number, aside)
+        session.send(**placed)
+        moving = of_eye(session, number)
+        assert not moving.header["exact"]
+        exact_of(session, number, number - 5)
+        terms = [{"model": "lambert", "color": [0.1, 0.5, 0.1 * number]}]
+        session.edit(number - 4, f"/materials/{material}/terms", terms)
+        edited = exact_of(session, number, number - 4)
+        camera = {"name": "placed", "to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])}
+        request = {"scene": scene["id"], "views": [camera], "size": SIZE, "lights": 100}
+        fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+        look = {"materials": {material: {"terms": terms}}}
+        rendered = rendered_by(client, {"bake": fixed["id"], "view": "placed", "looks": [look]}, tmp_path)
+        # nothing lights a ball but the sky: no gather cells that may differ
+        assert np.abs(shown(edited) - rendered).max() <= rendered.max() / 256 + 1e-4
+
+
 def test_an_older_eye_says_nothing_and_the_size_is_the_eyes(session: Session) -> None:
     (view,) = hello(session)["views"]
     session.send(**eye(view, 9, 0.2, (40, 30)))

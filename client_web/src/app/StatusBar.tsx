@@ -36,8 +36,7 @@ function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
-  if (moves.value) return "approximate, as moving views are";
-  if (!settled.value) return "refining…";
+  if (!settled.value) return moves.value ? "approximate until the eye rests" : "refining…";
   return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
 }
 

@@ -93,7 +93,7 @@ export class Eye {
     const size: [number, number] = [Math.floor(width * scale), Math.floor(height * scale)];
     this.number = Math.max(this.number + 1, Date.now());
     const camera = { to_world, yfov: yfov / DEGREES };
-    send({ type: "eye", view: name, eye: this.number, ...camera, size, hand: null, rest: "stay" });
+    send({ type: "eye", view: name, eye: this.number, ...camera, size, hand: null, rest: "exact" });
     // what is laid over the picture, as the handles of lights are, follows
     views.value = views.peek().map((other) => (other.name === name ? { ...other, camera } : other));
   }

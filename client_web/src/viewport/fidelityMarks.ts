@@ -24,7 +24,7 @@ const OTHER_LIGHT: Mark = {
 
 const MOVING: Mark = {
   words: "Moving view, approximate",
-  title: "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer. A bake of a camera is exact.",
+  title: "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer. Where the eye rests the exact picture follows.",
 };
 
 const SHOWN_AFTER_MS = 300;
@@ -51,7 +51,7 @@ effect(() => {
 
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
-  if (moves.value) return [MOVING];
-  const ofPicture = rough.value === null ? [] : [MARKS[rough.value]];
+  const isMoving = moves.value && rough.value === "approximate";
+  const ofPicture = rough.value === null ? [] : [isMoving ? MOVING : MARKS[rough.value]];
   return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
 }

@@ -104,7 +104,8 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     start_s = time.perf_counter()
     accept(request.accepting, request.target)
     if request.eye is not None:
-        cast("MovingPicture", picture).set_eye(request.eye.camera, request.eye.size)
+        eye = request.eye
+        cast("MovingPicture", picture).set_eye(eye.camera, eye.size, rests=eye.rests)
     advance = picture.advance(request.max_coefficients)
     job = picture.next_job()
     updated_s = time.perf_counter()

@@ -34,9 +34,11 @@ class Eye:
 
     Attributes:
         number: that frames name. size: of their pictures, pixels. received_s: when it came in.
+        rests: an exact picture is to follow when nothing else is left to do.
     """
 
     number: int
     camera: Camera
     size: tuple[int, int]
     received_s: float
+    rests: bool

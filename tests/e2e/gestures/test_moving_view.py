@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 
@@ -30,11 +31,13 @@ def scene(server: Server) -> Iterator[str]:
 
 @pytest.fixture
 def moving(server: Server, browser: Browser, scene: str) -> Iterator[Editor]:
-    """The editor on it, its first picture drawn."""
+    """The editor on it, its first picture exact."""
     with opened_page(browser) as page:
         page.goto(f"{server.url}/?scene={scene}")
         wait_until_drawn(page)
-        yield Editor(page)
+        editor = Editor(page)
+        editor.wait_until_exact()
+        yield editor
 
 
 def wait_until_drawn(page: Page) -> None:
@@ -44,23 +47,12 @@ def wait_until_drawn(page: Page) -> None:
 
 
 def differs(editor: Editor, before: object, least: float = 0.02) -> None:
-    """Wait until the picture is another one."""
+    """Wait until the picture is another one, and the exact one of where the eye rests."""
     deadline = time.monotonic() + MOVED_S
     while changed(before, editor.pixels_now()) < least:  # type: ignore[arg-type]
         assert time.monotonic() < deadline, "the picture stays as it was"
         time.sleep(0.1)
-    at_rest(editor)
-
-
-def at_rest(editor: Editor) -> None:
-    """Wait until what hands asked for is shown."""
-    before = editor.pixels_now()
-    while True:
-        time.sleep(0.3)
-        now = editor.pixels_now()
-        if changed(before, now) == 0:
-            return
-        before = now
+    editor.wait_until_exact()
 
 
 def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
@@ -127,7 +119,13 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     for _ in range(5):
         page.keyboard.press("PageUp")
     differs(moving, before)
-    expect(page.locator("footer.status")).to_contain_text("approximate")
+    edited = moving.pixels_now()
+    page.keyboard.press("Control+z")
+    differs(moving, edited)
+    moving.canvas.focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("footer.status")).to_contain_text(re.compile("approximate|the exact picture from here"))
+    differs(moving, edited)
 
 
 def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, scene: str) -> None:

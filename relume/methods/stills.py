@@ -1,0 +1,160 @@
+"""Stills: what a fixed-view bake of the place where a moving eye rests would hold, made in memory and at once.
+
+Light triangles, gather cells and what those see are in the moving bake already. What the eye alone decides is traced by
+the stages of the method `gather`: view samples, the lights that they see, the cells that their gather rays hit. A still
+is exact as `gather` is, and all that is made from the bake's light is shared with it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import Recipe, StoreReader, Task
+from relume.errors import CancelledError
+from relume.methods.gather import GatherMethod
+from relume.methods.local_lights import LocalLights
+from relume.methods.reflected import Reflected
+from relume.methods.transfer import BouncedViews
+from relume.operators.image_files import ImageFiles
+from relume.picture.jobs import Cancelled, Progress
+from relume.scene.model import Camera, Scene
+from relume.scene.placed_camera import with_cameras
+from relume.views.view import open_view
+
+_ROWS_A_TASK = 4096  # a second's work at most: so soon is a still given up
+_SAMPLES, _TRACED = 0, (1, 3)  # stages of `gather`; the one between them is the bake's
+
+
+class StoreWithView:
+    """A store in which nothing is written: over it the arrays of one more view, the first; a `StoreReader`."""
+
+    def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
+        self._store, self._attributes = store, {**store.attributes, **attributes}
+        self.arrays: dict[str, NDArray[Any]] = {}
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """Those of the store, but for what the view brings."""
+        return self._attributes
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory that the view's arrays hold."""
+        return sum(array.nbytes for array in self.arrays.values())
+
+    def shape(self, path: str) -> tuple[int, ...]:
+        """Shape of an array."""
+        return self.arrays[path].shape if path in self.arrays else self._store.shape(path)
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Rows [start, stop) of the array at a path."""
+        found = self.arrays.get(path)
+        return self._store.read(path, start, stop) if found is None else found[start:stop]
+
+
+@dataclass(frozen=True)
+class Still(BouncedViews):
+    """One view of a moving bake, opened as if it had been baked; what is no view's is the bake's.
+
+    Attributes:
+        lit: the light of the bake.
+    """
+
+    lit: BouncedViews
+
+    @classmethod
+    def of(cls, lit: BouncedViews, store: StoreWithView) -> Still:
+        """Open the view that a store has more than the bake."""
+        view = open_view(store, 0, lit.memory, lit.key)
+        of_bake = {one.name: getattr(lit, one.name) for one in fields(BouncedViews)}
+        return cls(**{**of_bake, "store": store, "views": {view.name: view}}, lit=lit)
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory that the view's arrays hold."""
+        return cast("StoreWithView", self.store).num_bytes
+
+    @property
+    def derived(self) -> ImageFiles:
+        """Where images of the default look are kept: among those of others, for eyes are without number."""
+        return self.edited
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """What local lights need."""
+        return self.lit.local
+
+    @cached_property
+    def reflected(self) -> Reflected:
+        """Light that gather cells send out."""
+        return self.lit.reflected
+
+
+class Stills:
+    """Makes stills of one moving bake.
+
+    Args:
+        lit: the light of the bake. scene: that was baked.
+    """
+
+    def __init__(self, lit: BouncedViews, scene: Scene) -> None:
+        self._lit, self._scene, self._gather = lit, scene, GatherMethod()
+
+    def make(self, camera: Camera, size: tuple[int, int], progress: Progress, cancelled: Cancelled) -> Still:
+        """Trace what an eye sees, unless it is remembered.
+
+        Args:
+            camera: the eye. size: width and height, pixels.
+            progress: called with the share done. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+            MemoryBudgetError: what is traced is larger than the memory may be.
+        """
+        memory, name = self._lit.memory.passing, _name_of(camera, size)
+        key = self._lit.key, "still", name
+        found = memory.find(key, Still)
+        if found is not None:
+            return found
+        recipe = Recipe(self._gather.name, (name,), size, self._lit.num_lights)
+        scene = with_cameras(self._scene, [replace(camera, name=name)])
+        store = StoreWithView(self._lit.store, self._gather.attributes(scene, recipe))
+        store.arrays.update(self._gather.compute(scene, recipe, Task(_SAMPLES, 1, name, 0, 0), store).arrays)
+        for stage in _TRACED:
+            specs = self._gather.arrays(stage, scene, recipe, store)
+            store.arrays.update(
+                {spec.path: np.empty(spec.shape, spec.dtype) for spec in specs if spec.path.startswith("views/")}
+            )
+
+        def traced() -> Still:
+            tasks = [task for stage in _TRACED for task in _shortened(self._gather.tasks(stage, scene, recipe, store))]
+            for done, task in enumerate(tasks):
+                if cancelled():
+                    raise CancelledError("the still was cancelled")
+                progress(done / len(tasks))
+                for path, rows in self._gather.compute(scene, recipe, task, store).arrays.items():
+                    if path in store.arrays:
+                        store.arrays[path][task.start : task.stop] = rows
+            return Still.of(self._lit, store)
+
+        return memory.get(key, Still, store.num_bytes, traced)
+
+
+def _shortened(tasks: Iterable[Task]) -> Iterator[Task]:
+    """Those of the view, cut so that one takes no longer than somebody waits who gives a still up."""
+    for task in tasks:
+        if task.view:
+            for start in range(task.start, task.stop, _ROWS_A_TASK):
+                yield replace(task, start=start, stop=min(start + _ROWS_A_TASK, task.stop))
+
+
+def _name_of(camera: Camera, size: tuple[int, int]) -> str:
+    """A name that no other eye's still has: by it the memory tells their images apart."""
+    where = hashlib.sha256(camera.to_world.tobytes() + repr((camera.yfov, size)).encode()).hexdigest()[:16]
+    return f"{camera.name} {where}"

@@ -1,0 +1,225 @@
+"""A moving picture that becomes exact when its eye rests: a still of that place replaces it, until the eye moves on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import CancelledError, ParameterError, RelumeError
+from relume.look import Look
+from relume.memory import Memory
+from relume.moving.picture import MovingPicture
+from relume.picture.finish import finish
+from relume.picture.jobs import Cancelled, Progress
+from relume.picture.light import Solo
+from relume.picture.picture import Advance, Picture
+from relume.picture.transfer import Transfer
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+Eye = tuple[Camera, tuple[int, int]]
+MakeStill = Callable[[Camera, tuple[int, int], Progress, Cancelled], Transfer]
+"""Finds what an eye sees, in a picture of this size: an opened bake of this one fixed view."""
+
+_TRACING = 0.6  # of the time that a still takes until it is shown; the rest is shading
+
+
+@dataclass(frozen=True)
+class StillJob:
+    """The exact picture of where an eye rests, made beside the frames; a `relume.picture.jobs.Job`.
+
+    Attributes:
+        number: of the eye, among those that the picture was given.
+        look, solo: that the picture is made in; others that came meanwhile are followed from there.
+        take: gets it when it is there; None where it cannot be had.
+    """
+
+    make_still: MakeStill
+    memory: Memory
+    eye: Eye
+    number: int
+    look: Look
+    solo: Solo
+    take: Callable[[int, Picture | None], None]
+
+    what = "the exact picture from here"
+    state: ClassVar[Literal["shading"]] = "shading"
+    refines = True
+
+    @property
+    def key(self) -> tuple[Hashable, ...]:
+        """Jobs of one eye are one."""
+        return "still", self.number
+
+    def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
+        """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
+        try:
+            transfer = self.make_still(*self.eye, lambda share: progress(_TRACING * share), cancelled)
+            picture = Picture(transfer, next(iter(transfer.views)), self.memory)
+            picture.set_look(self.look, solo=self.solo)
+            finish(picture, self.look, lambda share: progress(_TRACING + (1 - _TRACING) * share), cancelled)
+        except CancelledError:
+            raise
+        except RelumeError:  # the scene is gone, or it needs more memory than there is: the moving picture stays
+            return None
+        return picture
+
+    def install(self, made: Picture | None) -> None:
+        """Hand it over."""
+        self.take(self.number, made)
+
+
+class RestingPicture:
+    """Two pictures of one view that take turns; one session's, used from one thread at a time.
+
+    Args:
+        moving: shown while the eye moves, and until there is something better.
+        make_still: finds what an eye sees; heavy. memory: of what is made for stills.
+    """
+
+    def __init__(self, moving: MovingPicture, make_still: MakeStill, memory: Memory) -> None:
+        self._moving, self._make_still, self._memory = moving, make_still, memory
+        self._number, self._rests = 0, True
+        self._still: Picture | None = None
+        self._is_still = False  # the still is what is shown
+        self._is_asked_again = False  # for a picture from the eye that it has
+        self._look: Look | None = None
+        self._hand: str | None = None
+        self._touched: str | None = None
+        self._solo: Solo = None
+
+    @property
+    def _shown(self) -> MovingPicture | Picture:
+        return self._still if self._still is not None and self._is_still else self._moving
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all; see `Picture.check`."""
+        self._shown.check(look)
+
+    def set_look(self, look: Look, *, hand: str | None = None, solo: Solo = None) -> None:
+        """A new target for both; nothing is computed yet.
+
+        Args:
+            look: that is to be shown. hand: pointer to what the user's hand is on, or None.
+            solo: names of sources of light that alone are shown; None: all.
+        Raises:
+            ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
+        """
+        self._moving.set_look(look, hand=hand, solo=solo)
+        if self._still is not None:
+            self._still.set_look(look, hand=hand, solo=solo)
+        self._look, self._hand, self._solo = look, hand, solo
+
+    def set_eye(self, camera: Camera, size: tuple[int, int], *, rests: bool = True) -> None:
+        """See from elsewhere; nothing is computed yet.
+
+        Args:
+            camera: a rigid one. size: width and height in pixels.
+            rests: an exact picture is to follow.
+        """
+        self._rests = rests
+        if _is_same(self._moving.eye, (camera, size)):
+            self._is_asked_again = True
+            return
+        self._moving.set_eye(camera, size)
+        self._number += 1
+        self._still, self._is_still = None, False
+
+    def touch(self, pointer: str) -> None:
+        """Prepare what a hand takes hold of; see `Picture.touch`."""
+        self._shown.touch(pointer)
+        self._touched = pointer
+
+    def next_job(self) -> Any:
+        """What must be made next; a still last."""
+        if self._still is not None:
+            return self._still.next_job()
+        job = self._moving.next_job()
+        if job is not None or not self._rests or self._look is None:
+            return job
+        return StillJob(
+            self._make_still, self._memory, self._moving.eye, self._number, self._look, self._solo, self._take
+        )
+
+    def _take(self, number: int, still: Picture | None) -> None:
+        if number != self._number:
+            return
+        if still is None or self._look is None:
+            self._rests = False
+            return
+        still.set_look(self._look, hand=self._hand, solo=self._solo)
+        if self._touched is not None:
+            with suppress(ParameterError):  # an edit may have removed it
+                still.touch(self._touched)
+        self._still = still
+
+    def install(self, job: Any, made: Any) -> None:
+        """Go on with what a job has made."""
+        if isinstance(job, StillJob):
+            job.install(made)
+        else:
+            (self._still or self._moving).install(job, made)
+
+    def advance(self, max_coefficients: int | None) -> Advance:
+        """Bring what is shown to its look and its eye; a still is shown once it is exact, and from then on."""
+        step = self._step(max_coefficients)
+        if not self._is_asked_again:
+            return step
+        self._is_asked_again = False
+        return replace(step, tiles=self.all_tiles())
+
+    def _step(self, max_coefficients: int | None) -> Advance:
+        if self._still is None:
+            return self._moving.advance(max_coefficients)
+        step = self._still.advance(max_coefficients)
+        if self._is_still:
+            return step
+        if not step.exact:
+            return self._moving.advance(max_coefficients)
+        self._is_still = True
+        return replace(step, tiles=self._still.all_tiles())
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture."""
+        return self._shown.all_tiles()
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame; see `Picture.encode`."""
+        return self._shown.encode(tiles, form)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much it hides of what is behind it; see `Picture.encode_alpha`."""
+        return self._shown.encode_alpha(tiles)
+
+    def image(self) -> F32:
+        """Linear radiance. (height, width, 3) float32"""
+        return self._shown.image()
+
+    def probe(self, x: int, y: int) -> dict[str, Any]:
+        """What makes up a pixel; see `Picture.probe`. Raises ParameterError where it lies outside the picture."""
+        return self._shown.probe(x, y)
+
+    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Which pixels a stretch of a curve lights; see `Picture.brush`.
+
+        Args:
+            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+        Raises:
+            EditNotSupportedError: no still is shown.
+        """
+        return self._shown.brush(pointer, from_deg, to_deg)
+
+
+def _is_same(one: Eye, other: Eye) -> bool:
+    (camera, size), (other_camera, other_size) = one, other
+    return bool(
+        size == other_size
+        and camera.yfov == other_camera.yfov
+        and np.array_equal(camera.to_world, other_camera.to_world)
+    )

@@ -1,0 +1,155 @@
+"""What a moving picture becomes when its eye rests: that of a fixed view baked there, and what edits make of that."""
+
+import numpy as np
+import pytest
+from looks_of_pictures import EDITS, LOBE, drawn, light, lit, painted, transport
+from sessions import look_of, make_next, relative_rmse
+from test_moving_pictures import aside as aside  # the eye that nobody baked
+
+from relume.bake import Recipe
+from relume.errors import CancelledError
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.methods.stills import Stills
+from relume.moving.picture import MovingPicture
+from relume.moving.resting import RestingPicture, StillJob
+from relume.render.image import render_image
+from relume.scene.placed_camera import with_cameras
+from relume.store import bake_here
+
+SIZE = (64, 40)
+
+
+@pytest.fixture(scope="session")
+def fixed(method, moving, scene, tmp_path_factory):
+    """A bake of a fixed view from `aside`, made apart from all that moves."""
+    first = moving.views["front"].camera
+    to_world = first.to_world.copy()
+    to_world[:3, 3] += [0.4, 0.3, -0.2]
+    placed = with_cameras(scene, [type(first)("front", to_world, first.yfov)])
+    path = tmp_path_factory.mktemp("rest") / "fixed.zarr"
+    bake_here(METHODS["gather"], placed, Recipe("gather", ("front",), SIZE, moving.lit.num_lights), path)
+    return open_transfer(path, Memory(1 << 30))
+
+
+@pytest.fixture
+def picture(moving, scene, aside):
+    """From `aside`, under the look of all of these tests."""
+    found = RestingPicture(MovingPicture(moving, "front"), Stills(moving.lit, scene).make, moving.memory)
+    found.set_look(look_of(moving, lit()))
+    found.set_eye(aside, SIZE)
+    return found
+
+
+def rested(picture):
+    """Make all that waits; returns what the last step changed."""
+    step = picture.advance(None)
+    while picture.next_job() is not None:
+        make_next(picture)
+        step = picture.advance(None)
+    return step
+
+
+@pytest.mark.parametrize("edit", [None, "a curve drawn", "a lamp moved", "the environment turned", "all at once"])
+def test_straight_light_is_that_of_a_fixed_bake_to_the_bit(moving, fixed, picture, edit):
+    changes = [EDITS[edit][1]] if edit else []
+    look = look_of(moving, lit(*changes, transport(show="direct")))
+    picture.set_look(look)
+    step = rested(picture)
+    assert (step.exact, step.fidelity) == (True, "exact")
+    np.testing.assert_array_equal(picture.image(), render_image(fixed, "front", look))
+
+
+def test_reflected_light_is_that_of_other_cells(moving, fixed, picture):
+    look = look_of(moving, lit(transport(show="first_bounce")))
+    picture.set_look(look)
+    rested(picture)
+    expected = render_image(fixed, "front", look)
+    assert relative_rmse(picture.image(), expected) < 0.05
+    assert picture.image().mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
+def test_the_moving_picture_stands_until_the_still_is_exact_and_comes_back_with_the_eye(picture, aside, moving):
+    assert picture.advance(None).fidelity == "approximate"
+    first = picture.image().copy()
+    for _ in range(2):
+        step = rested(picture)
+        assert step.exact
+        assert step.changed
+        assert (picture.image() != first).any()
+        assert not picture.advance(None).changed
+        picture.set_eye(moving.views["front"].camera, (48, 36))
+        step = picture.advance(None)
+        assert (step.fidelity, picture.image().shape) == ("approximate", (36, 48, 3))
+        picture.set_eye(aside, SIZE)
+        assert picture.advance(None).fidelity == "approximate"
+        np.testing.assert_array_equal(picture.image(), first)
+
+
+def test_edits_go_on_in_the_still_and_those_made_meanwhile_are_kept(picture, moving, fixed):
+    job = picture.next_job()
+    assert job.refines
+    made = job.make(lambda share: None, lambda: False)
+    direct = transport(show="direct")
+    picture.set_look(look_of(moving, lit(painted, direct)))
+    picture.touch(LOBE)
+    picture.install(job, made)
+    assert rested(picture).exact
+    np.testing.assert_array_equal(
+        picture.image(), render_image(fixed, "front", look_of(moving, lit(painted, direct)))
+    )
+    look = look_of(moving, lit(painted, drawn, direct))
+    picture.set_look(look, hand=LOBE)
+    assert picture.advance(None).changed  # at once: the curve in hand was frozen
+    rested(picture)
+    assert relative_rmse(picture.image(), render_image(fixed, "front", look)) < 1e-5
+    assert picture.brush(LOBE, 0, 90).any()
+    assert picture.probe(30, 36)["material"] == "Floor"
+
+
+def test_a_still_of_another_eye_is_of_no_use(picture, moving):
+    job = picture.next_job()
+    made = job.make(lambda share: None, lambda: False)
+    picture.set_eye(moving.views["front"].camera, SIZE)
+    assert picture.next_job().key != job.key
+    picture.install(job, made)
+    assert picture.advance(None).fidelity == "approximate"
+
+
+def test_it_tells_how_far_it_is_and_can_be_given_up(picture):
+    job, shares = picture.next_job(), []
+    with pytest.raises(CancelledError):
+        job.make(lambda share: None, lambda: True)
+    job.make(shares.append, lambda: False)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+
+
+def test_the_same_eye_again_is_sent_again_and_traced_no_more(picture, aside):
+    rested(picture)
+    before = picture.image().copy()
+    picture.set_eye(aside, SIZE)
+    step = picture.advance(None)
+    assert step.changed
+    assert step.exact
+    np.testing.assert_array_equal(picture.image(), before)
+    assert picture.next_job() is None
+
+
+def test_who_does_not_want_it_has_the_moving_picture(picture, aside):
+    picture.set_eye(aside, SIZE, rests=False)
+    assert picture.advance(None).fidelity == "approximate"
+    assert picture.next_job() is None
+    picture.set_eye(aside, SIZE, rests=True)
+    assert isinstance(picture.next_job(), StillJob)
+
+
+def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
+    moving = open_bake(baked, Memory(100_000))
+    picture = RestingPicture(MovingPicture(moving, "front"), Stills(moving.lit, scene).make, moving.memory)
+    picture.set_look(look_of(moving, lit(light("Panel", on=False))))
+    picture.set_eye(aside, SIZE)
+    picture.advance(None)
+    make_next(picture)
+    assert picture.next_job() is None
+    assert picture.advance(None).fidelity == "approximate"
