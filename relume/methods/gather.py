@@ -37,7 +37,7 @@ from relume.views.store_io import pattern_of_material, read_camera, read_points,
 
 CELLS_A_SHARD = 4096
 RAYS_A_SAMPLE, RAYS_A_POINT = 610, 55
-_GLOSSY_RAYS = 233  # of those of a sample, where its material has a highlight
+_GLOSSY_RAYS = 233
 _PIXELS_A_CELL, _FEWEST_CELLS = 10, 1024
 _CELLS, _RAYS = 2, 3  # stages
 _BYTES_A_CELL = POINTS_A_CELL * (24 + 2 * RAYS_A_POINT) + 64
@@ -47,13 +47,17 @@ _SHARD_ROW_BYTES = 500  # of a sample beside its links, which are there thrice: 
 
 
 class GatherMethod:
-    """Implements `relume.methods.base.TransferMethod`."""
+    """Implements `relume.methods.base.TransferMethod`.
+
+    Args:
+        rays: of a view sample. glossy: of those, where its material has a highlight.
+    """
 
     name = "gather"
     stages = (*SampledViews.stages, "gather cells", "gather rays")
 
-    def __init__(self) -> None:
-        self._views = SampledViews()
+    def __init__(self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS) -> None:
+        self._views, self._rays, self._glossy = SampledViews(), rays, glossy
 
     def prepare(self, scene: Scene) -> None:
         """Build the triangles' search tree."""
@@ -70,21 +74,21 @@ class GatherMethod:
         return Plan(
             num_view_samples=direct.num_view_samples,
             num_rays=direct.num_rays
-            + direct.num_view_samples * RAYS_A_SAMPLE
+            + direct.num_view_samples * self._rays
             + points * (RAYS_A_POINT + recipe.num_lights),
             store_bytes=direct.store_bytes
-            + direct.num_view_samples * (2 * RAYS_A_SAMPLE + 4)
+            + direct.num_view_samples * (2 * self._rays + 4)
             + cells * _BYTES_A_CELL
             + points * bits,
             peak_bytes=direct.peak_bytes
             + cells * _MAKING_BYTES_A_CELL
             + bounds.num_triangles(scene) * _NORMAL_BYTES
-            + SHARD_ROWS * (3 * 2 * RAYS_A_SAMPLE + _SHARD_ROW_BYTES),
+            + SHARD_ROWS * (3 * 2 * self._rays + _SHARD_ROW_BYTES),
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material."""
-        plain, glossy = [RAYS_A_SAMPLE, 0], [RAYS_A_SAMPLE - _GLOSSY_RAYS, _GLOSSY_RAYS]
+        plain, glossy = [self._rays, 0], [self._rays - self._glossy, self._glossy]
         direct = self._views.attributes(scene, recipe)
         terms = [direct["look"]["materials"][material.name]["terms"] for material in scene.materials]
         return {
@@ -118,7 +122,7 @@ class GatherMethod:
         of_views = [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
             for k, rows in enumerate(self._views.sampled_of(store).num_surface_samples)
-            for name, width, dtype in (("links", (RAYS_A_SAMPLE,), "uint16"), ("number", (), "uint32"))
+            for name, width, dtype in (("links", (self._rays,), "uint16"), ("number", (), "uint32"))
         ]
         return [*of_cells, *of_views]
 

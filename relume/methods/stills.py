@@ -8,10 +8,11 @@ is exact as `gather` is, and all that is made from the bake's light is shared wi
 from __future__ import annotations
 
 import hashlib
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,8 @@ from relume.scene.model import Camera, Scene
 from relume.scene.placed_camera import with_cameras
 from relume.views.view import open_view
 
-_ROWS_A_TASK = 4096  # a second's work at most: so soon is a still given up
+_RAYS, _GLOSSY_RAYS = 203, 78  # a third of a bake's: reflected light is there three times as soon
+_ROWS_A_TASK = 4096  # half a second's work at most: so soon is a still given up
 _SAMPLES, _TRACED = 0, (1, 3)  # stages of `gather`; the one between them is the bake's
 
 
@@ -43,11 +45,6 @@ class StoreWithView:
     def attributes(self) -> Mapping[str, Any]:
         """Those of the store, but for what the view brings."""
         return self._attributes
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory that the view's arrays hold."""
-        return sum(array.nbytes for array in self.arrays.values())
 
     def shape(self, path: str) -> tuple[int, ...]:
         """Shape of an array."""
@@ -77,11 +74,6 @@ class Still(BouncedViews):
         return cls(**{**of_bake, "store": store, "views": {view.name: view}}, lit=lit)
 
     @property
-    def num_bytes(self) -> int:
-        """Memory that the view's arrays hold."""
-        return cast("StoreWithView", self.store).num_bytes
-
-    @property
     def derived(self) -> ImageFiles:
         """Where images of the default look are kept: among those of others, for eyes are without number."""
         return self.edited
@@ -97,6 +89,54 @@ class Still(BouncedViews):
         return self.lit.reflected
 
 
+class Tracing:
+    """A still that is being traced; given up, it goes on from there when it is wanted again.
+
+    Args:
+        method: whose stages these are. scene: with the eye among its cameras. recipe: of its view.
+        store: that the view's arrays are written to.
+    """
+
+    def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: StoreWithView) -> None:
+        self._method, self._scene, self._recipe, self.store = method, scene, recipe, store
+        sampling = Task(_SAMPLES, 1, recipe.views[0], 0, 0)
+        store.arrays.update(method.compute(scene, recipe, sampling, store).arrays)
+        for stage in _TRACED:
+            of_view = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
+            store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in of_view})
+        self._tasks = [task for stage in _TRACED for task in _shortened(method.tasks(stage, scene, recipe, store))]
+        self._done, self._lock = 0, threading.Lock()
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory that the view's arrays hold."""
+        return sum(array.nbytes for array in self.store.arrays.values())
+
+    def finish(self, progress: Progress, cancelled: Cancelled) -> None:
+        """Trace what is left.
+
+        Args:
+            progress: called with the share done. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        while True:
+            if cancelled():
+                raise CancelledError("the still was cancelled")
+            progress(self._done / len(self._tasks) if self._tasks else 1.0)
+            with self._lock:  # for one task, so that others who want it go on with it as well
+                if self._done == len(self._tasks):
+                    return
+                self._trace(self._tasks[self._done])
+                self._done += 1
+
+    def _trace(self, task: Task) -> None:
+        arrays = self.store.arrays
+        for path, rows in self._method.compute(self._scene, self._recipe, task, self.store).arrays.items():
+            if path in arrays:
+                arrays[path][task.start : task.stop] = rows
+
+
 class Stills:
     """Makes stills of one moving bake.
 
@@ -105,10 +145,10 @@ class Stills:
     """
 
     def __init__(self, lit: BouncedViews, scene: Scene) -> None:
-        self._lit, self._scene, self._gather = lit, scene, GatherMethod()
+        self._lit, self._scene, self._method = lit, scene, GatherMethod(_RAYS, _GLOSSY_RAYS)
 
     def make(self, camera: Camera, size: tuple[int, int], progress: Progress, cancelled: Cancelled) -> Still:
-        """Trace what an eye sees, unless it is remembered.
+        """Trace what an eye sees, as far as it is not remembered.
 
         Args:
             camera: the eye. size: width and height, pixels.
@@ -119,31 +159,18 @@ class Stills:
         """
         memory, name = self._lit.memory.passing, _name_of(camera, size)
         key = self._lit.key, "still", name
-        found = memory.find(key, Still)
-        if found is not None:
-            return found
-        recipe = Recipe(self._gather.name, (name,), size, self._lit.num_lights)
-        scene = with_cameras(self._scene, [replace(camera, name=name)])
-        store = StoreWithView(self._lit.store, self._gather.attributes(scene, recipe))
-        store.arrays.update(self._gather.compute(scene, recipe, Task(_SAMPLES, 1, name, 0, 0), store).arrays)
-        for stage in _TRACED:
-            specs = self._gather.arrays(stage, scene, recipe, store)
-            store.arrays.update(
-                {spec.path: np.empty(spec.shape, spec.dtype) for spec in specs if spec.path.startswith("views/")}
-            )
+        tracing = memory.find(key, Tracing)
+        if tracing is None:
+            begun = self._begin(replace(camera, name=name), size)
+            tracing = memory.get(key, Tracing, begun.num_bytes, lambda: begun)
+        tracing.finish(progress, cancelled)
+        return Still.of(self._lit, tracing.store)
 
-        def traced() -> Still:
-            tasks = [task for stage in _TRACED for task in _shortened(self._gather.tasks(stage, scene, recipe, store))]
-            for done, task in enumerate(tasks):
-                if cancelled():
-                    raise CancelledError("the still was cancelled")
-                progress(done / len(tasks))
-                for path, rows in self._gather.compute(scene, recipe, task, store).arrays.items():
-                    if path in store.arrays:
-                        store.arrays[path][task.start : task.stop] = rows
-            return Still.of(self._lit, store)
-
-        return memory.get(key, Still, store.num_bytes, traced)
+    def _begin(self, camera: Camera, size: tuple[int, int]) -> Tracing:
+        recipe = Recipe(self._method.name, (camera.name,), size, self._lit.num_lights)
+        scene = with_cameras(self._scene, [camera])
+        store = StoreWithView(self._lit.store, self._method.attributes(scene, recipe))
+        return Tracing(self._method, scene, recipe, store)
 
 
 def _shortened(tasks: Iterable[Task]) -> Iterator[Task]:

@@ -35,7 +35,7 @@ class StillJob:
     """The exact picture of where an eye rests, made beside the frames; a `relume.picture.jobs.Job`.
 
     Attributes:
-        number: of the eye, among those that the picture was given.
+        number: of the eye, among those that the picture was given. num_looks: that it was given, too.
         look, solo: that the picture is made in; others that came meanwhile are followed from there.
         take: gets it when it is there; None where it cannot be had.
     """
@@ -44,6 +44,7 @@ class StillJob:
     memory: Memory
     eye: Eye
     number: int
+    num_looks: int
     look: Look
     solo: Solo
     take: Callable[[int, Picture | None], None]
@@ -54,8 +55,8 @@ class StillJob:
 
     @property
     def key(self) -> tuple[Hashable, ...]:
-        """Jobs of one eye are one."""
-        return "still", self.number
+        """Jobs of one eye and look are one: while hands edit, nothing takes a core from them."""
+        return "still", self.number, self.num_looks
 
     def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
         """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
@@ -85,7 +86,7 @@ class RestingPicture:
 
     def __init__(self, moving: MovingPicture, make_still: MakeStill, memory: Memory) -> None:
         self._moving, self._make_still, self._memory = moving, make_still, memory
-        self._number, self._rests = 0, True
+        self._number, self._num_looks, self._rests = 0, 0, True
         self._still: Picture | None = None
         self._is_still = False  # the still is what is shown
         self._is_asked_again = False  # for a picture from the eye that it has
@@ -115,6 +116,7 @@ class RestingPicture:
         if self._still is not None:
             self._still.set_look(look, hand=hand, solo=solo)
         self._look, self._hand, self._solo = look, hand, solo
+        self._num_looks += 1
 
     def set_eye(self, camera: Camera, size: tuple[int, int], *, rests: bool = True) -> None:
         """See from elsewhere; nothing is computed yet.
@@ -143,9 +145,8 @@ class RestingPicture:
         job = self._moving.next_job()
         if job is not None or not self._rests or self._look is None:
             return job
-        return StillJob(
-            self._make_still, self._memory, self._moving.eye, self._number, self._look, self._solo, self._take
-        )
+        wanted = self._number, self._num_looks, self._look, self._solo
+        return StillJob(self._make_still, self._memory, self._moving.eye, *wanted, self._take)
 
     def _take(self, number: int, still: Picture | None) -> None:
         if number != self._number:
