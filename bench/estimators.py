@@ -28,7 +28,6 @@ from relume.picture.light import light_of
 from relume.points import Points
 from relume.scene.cornell import cornell_box
 from relume.trace.cell_tree import NO_CELL, CellTree
-from relume.trace.cells import face_normals
 from relume.trace.geometry import Geometry, merge
 from relume.trace.links import trace_links
 from relume.trace.primary import trace_from
@@ -93,7 +92,7 @@ def _areas(geometry: Geometry, tree: CellTree, num_cells: int, num_points: int) 
     face = rng.choice(len(area), num_points, p=area / area.sum())
     u, v = rng.random((2, num_points))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    normal = face_normals(geometry)[face]
+    normal = geometry.face_normals[face]
     place = a[face] + u[:, None] * (b - a)[face] + v[:, None] * (c - a)[face] + geometry.epsilon * normal
     keys, node = np.concatenate([place, normal], axis=1), tree.roots[2 * geometry.face_mesh[face]].astype(np.int64)
     while np.any(inner := (node >= 0) & (node < len(tree.axis))):

@@ -25,6 +25,7 @@ from relume.brdf.albedo import is_diffuse
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
+from relume.methods.last_read import LastRead
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
 from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_tree
 from relume.methods.transfer import BouncedViews, described
@@ -58,6 +59,7 @@ class GatherMethod:
 
     def __init__(self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS) -> None:
         self._views, self._rays, self._glossy = SampledViews(), rays, glossy
+        self._tree_of = LastRead(read_tree)
 
     def prepare(self, scene: Scene) -> None:
         """Build the triangles' search tree."""
@@ -144,7 +146,7 @@ class GatherMethod:
         points, geometry = read_gather_samples(store, task.start, task.stop), self._views.geometry_of(scene)
         seen = trace_coherent(geometry.embree, points.position, points.normal, self._views.sampled_of(store).targets)
         pattern = make_pattern(RAYS_A_POINT, 0, int(store.attributes["gather_seed"]))
-        links = trace_links(geometry, read_tree(store), points, points.normal, pattern)
+        links = trace_links(geometry, self._tree_of(store), points, points.normal, pattern)
         num_cells = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
             "cells/visibility": seen.visible.reshape(num_cells, -1),
@@ -158,7 +160,7 @@ class GatherMethod:
         points = read_points(store, k, task.start, task.stop, seed)
         wo = towards_eye(read_camera(store, k), points.position)
         material = store.read(f"views/{k}/material", task.start, task.stop)
-        geometry, tree = self._views.geometry_of(scene), read_tree(store)
+        geometry, tree = self._views.geometry_of(scene), self._tree_of(store)
         for index in np.unique(material):
             first, stop = np.searchsorted(material, [index, index + 1])
             pattern = pattern_of_material(store, k, int(index))

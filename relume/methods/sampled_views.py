@@ -28,6 +28,7 @@ from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import weigh
 from relume.look import default_look
 from relume.methods import bounds
+from relume.methods.last_read import LastRead
 from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
 from relume.scene.model import Camera, Scene
 from relume.trace.coherent import Targets, targets_of, trace_coherent
@@ -45,10 +46,9 @@ class Sampled(NamedTuple):
     """What every task of the second stage needs of the first.
 
     Attributes:
-        store: it was read from. targets: of shadow rays. num_surface_samples: of each view.
+        targets: of shadow rays. num_surface_samples: of each view.
     """
 
-    store: StoreReader
     targets: Targets
     num_surface_samples: tuple[int, ...]
 
@@ -61,7 +61,7 @@ class SampledViews:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._geometry: tuple[str, Geometry] | None = None
-        self._sampled: Sampled | None = None
+        self.sampled_of = LastRead(_read_sampled)
 
     def __reduce__(self) -> tuple[type[SampledViews], tuple[()]]:
         return type(self), ()  # travels to workers without what it keeps
@@ -169,14 +169,11 @@ class SampledViews:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
 
-    def sampled_of(self, store: StoreReader) -> Sampled:
-        """What the first stage has written, read once for all tasks of a store."""
-        with self._lock:
-            if self._sampled is None or self._sampled.store is not store:
-                views = range(len(store.attributes["views"]))
-                rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
-                self._sampled = Sampled(store, read_targets(store), rows)
-            return self._sampled
+
+def _read_sampled(store: StoreReader) -> Sampled:
+    views = range(len(store.attributes["views"]))
+    rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
+    return Sampled(read_targets(store), rows)
 
 
 def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:

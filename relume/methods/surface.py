@@ -26,6 +26,7 @@ from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
+from relume.methods.last_read import LastRead
 from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
 from relume.methods.store_io import read_gather_samples, read_tree
@@ -60,6 +61,7 @@ class SurfaceMethod:
 
     def __init__(self) -> None:
         self._views = SampledViews()
+        self._tree_of, self._targets_of = LastRead(read_tree), LastRead(read_targets)
 
     def prepare(self, scene: Scene) -> None:
         """Build the triangles' search tree."""
@@ -182,8 +184,8 @@ class SurfaceMethod:
             )
         else:
             points, pattern = read_surface_points(store, task.start, task.stop), pattern_of_points(store, RAYS_A_POINT)
-        seen = trace_coherent(geometry.embree, points.position, points.normal, read_targets(store))
-        links = trace_links(geometry, read_tree(store), points, points.normal, pattern)
+        seen = trace_coherent(geometry.embree, points.position, points.normal, self._targets_of(store))
+        links = trace_links(geometry, self._tree_of(store), points, points.normal, pattern)
         num_rows = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
             f"{task.view}/visibility": seen.visible.reshape(num_rows, -1),

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from relume.errors import PlanError
 from relume.moving.vertices import Nodes, Vertices, find_vertices, shared_points
 from relume.points import Points
-from relume.trace.cells import face_normals
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
@@ -117,7 +116,7 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
 
     while is_too_fine(spacing) and spacing < longest.max():
         spacing *= _COARSER
-    normals = face_normals(geometry)
+    normals = geometry.face_normals
     for trial in range(_MOST_TRIALS):
         lattice, nodes = _grids(geometry, normals, is_open, _rows(longest, spacing), spacing * coarse)
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many

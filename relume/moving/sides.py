@@ -15,7 +15,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.scene.model import Camera
-from relume.trace.cells import face_normals
 from relume.trace.geometry import Geometry
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, camera_directions, trace_from
@@ -38,7 +37,7 @@ def open_sides(geometry: Geometry, cameras: Sequence[Camera], seed: int) -> NDAr
         (faces, 2); side 0 is the one where the corners are counter-clockwise.
     """
     num_faces = len(geometry.faces)
-    outside, rng, normals = 2 * num_faces, np.random.default_rng(seed), face_normals(geometry)
+    outside, rng, normals = 2 * num_faces, np.random.default_rng(seed), geometry.face_normals
     links = [_seen_by(geometry, normals, camera, outside) for camera in cameras]
     for _ in range(max(1, min(_RAYS_A_SIDE, _MOST_RAYS // (2 * num_faces)))):
         for start in range(0, 2 * num_faces, _RAYS_AT_ONCE):

@@ -69,13 +69,6 @@ def gather_samples_of(position: F32, normal: F32, first_cell: int = 0) -> Points
     return Points(position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32))
 
 
-def face_normals(geometry: Geometry) -> F32:
-    """Compute unit normals of the triangles, their corners counter-clockwise. (faces, 3) float32"""
-    a, b, c = geometry.positions[geometry.faces].astype(np.float64).transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
-
-
 def choose_cells(
     scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_cells: int
 ) -> Cells:
@@ -89,7 +82,7 @@ def choose_cells(
     most = min(num_cells, MAX_CELLS - 2 * len(scene.meshes))
     photons = shoot_photons(scene, geometry, views, size, _PHOTONS_A_CELL * most)
     hits, directions = photons.hits, photons.directions
-    normal = face_normals(geometry)[hits.face]
+    normal = geometry.face_normals[hits.face]
     is_behind = np.einsum("nc,nc->n", normal, directions) > 0
     normal[is_behind] *= -1
     place = surface_at(geometry, hits, directions).points.position

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,13 @@ class Geometry:
     face_mesh: NDArray[np.int32]
     embree: EmbreeScene
     epsilon: float
+
+    @cached_property
+    def face_normals(self) -> F32:
+        """Unit normals of the triangles, their corners counter-clockwise. (num_faces, 3) float32"""
+        a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
+        normal = np.cross(b - a, c - a)
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
 
     def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
         """Tell which points on surfaces (n, 3) are seen from a place (3,) on their outer side."""

@@ -13,7 +13,6 @@ from relume.light.gather_rays import Pattern, cosine_ray, glossy_ray, small_shif
 from relume.parallel import for_ranges
 from relume.points import Points
 from relume.trace.cell_tree import NO_CELL_NODE, CellTree, locate16
-from relume.trace.cells import face_normals
 from relume.trace.embree import intersect16, packet_arguments
 from relume.trace.geometry import Geometry
 from relume.trace.packet import LANES, aim, ask, direction_of, hit_of, new_packet, place_of, set_origin, trace_hits
@@ -141,7 +140,7 @@ def trace_links(geometry: Geometry, tree: CellTree, points: Points, wo: F32, pat
     """
     links = np.empty((points.num_points, pattern.num_rays), np.uint16)
     arguments = packet_arguments(coherent=True)
-    surfaces = face_normals(geometry), (2 * geometry.face_mesh).astype(np.int32)
+    surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
     counts: list[int] = []
 
     def kernel(start: int, stop: int) -> None:

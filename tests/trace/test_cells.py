@@ -9,7 +9,7 @@ from tiny_scenes import looking, points_at, scene_of, sphere
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.scene.cornell import cornell_box
 from relume.trace.cell_tree import NO_CELL, grow_tree, locate16
-from relume.trace.cells import POINTS_A_CELL, choose_cells, face_normals
+from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.geometry import merge
 from relume.trace.links import trace_links
 from relume.trace.photons import lobe_directions
@@ -167,7 +167,7 @@ def test_links_are_those_of_first_hits(box):
     _, geometry, cells = box
     points, pattern = points_of(cells, 40, first=100), make_pattern(24, 9, 3)
     links = trace_links(geometry, cells.tree, points, points.normal, pattern)
-    normals = face_normals(geometry)
+    normals = geometry.face_normals
     origins, directions, expected_of = [], [], []
     for p in range(40):
         n, t = points.normal[p].astype(float), points.tangent[p].astype(float)
