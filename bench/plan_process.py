@@ -18,7 +18,7 @@ from relume.methods.registry import METHODS
 from relume.scene.archive import load_scene
 from relume.store import bake_here, open_store
 from relume.store.publish import array_paths
-from worker.status import APPROXIMATE, recipe_from_json
+from worker.status import MOVING, recipe_from_json
 
 
 def main(folder: str, recipe: str) -> None:
@@ -35,7 +35,7 @@ def main(folder: str, recipe: str) -> None:
         peak_bytes = _peak_bytes()
         reader = open_store(store)
         of_views = [f"views/{k}/pixel" for k in range(len(wanted.views))]
-        of_method = ["points/material"] if wanted.method in APPROXIMATE else of_views
+        of_method = ["points/material"] if wanted.method in MOVING else of_views
         samples = sum(reader.shape(path)[0] for path in of_method)
         store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
     print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))

@@ -41,6 +41,8 @@ TARGETS = {
     "surface.bytes_per_point": "≤ 1000",
     "surface.view_fps": "≥ 15",
     "surface.points_rmse": "≤ 1 %",
+    "surface.rest_s": "≤ 10 s",
+    "in_out.phong_terms_per_exponent": "2.5",
     "gather.store_mb": "≤ 116 MB",
     "gather.freeze_s": "≤ 0.5 s",
     "gather.brdf_fps": "≥ 60",

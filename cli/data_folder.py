@@ -65,15 +65,26 @@ def find_scene(ledger: Ledger, name: str) -> SceneRecord:
     raise NotFoundError(f"there is no scene {name[:80]!r}; known are: {known}; relume import adds one")
 
 
-def find_bake(service: BakeService, scene: SceneRecord, view: str | None) -> tuple[BakeStatus, str]:
-    """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError."""
+def find_bake(
+    service: BakeService, scene: SceneRecord, view: str | None, *, moves: bool = False
+) -> tuple[BakeStatus, str]:
+    """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError.
+
+    Args:
+        service, scene: where to look, and what for. view: its name; None: any. moves: its eye must.
+    """
+    from worker.status import MOVING
+
     ready = [bake for bake in service.bakes(scene.id) if bake.state == "ready"]
+    if moves:
+        ready = [bake for bake in ready if bake.recipe.method in MOVING]
     known = dict.fromkeys((*scene.views, *(baked for bake in ready for baked in bake.recipe.views)))
     if view is not None and view not in known:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(known)[:400]}")
     fitting = [bake for bake in ready if view is None or view in bake.recipe.views]
     if not fitting:
-        raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}")
+        option = " --method surface" if moves else ""
+        raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}{option}")
     finest = max(fitting, key=lambda bake: bake.rank)
     return finest, view or finest.recipe.views[0]
 

@@ -28,7 +28,14 @@ def save(path: Path, image: NDArray[Any], look: Any) -> None:
 
 
 def save_exr(
-    path: Path, transfer: Any, view: str, look: Any, origin: Any, with_layers: bool, precision: Literal["half", "float"]
+    path: Path,
+    transfer: Any,
+    view: str,
+    look: Any,
+    origin: Any,
+    with_layers: bool,
+    precision: Literal["half", "float"],
+    stills: Any = None,
 ) -> None:
     """Render a look, with a layer for each light and each kind of light path if asked, and say how far it is."""
     from rich.console import Console
@@ -47,7 +54,7 @@ def save_exr(
         bar = progress.add_task("render", total=1.0)
         export_exr(
             path,
-            lambda shown, tell: render_image(transfer, view, shown, progress=tell),
+            lambda shown, tell: render_image(transfer, view, shown, progress=tell, stills=stills),
             look,
             layers,
             attributes,

@@ -9,7 +9,7 @@ import typer
 
 from cli.options import Data, LookFile, SceneName, View, read_look
 
-Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")]
+Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="Where to write the picture, or frames.")]
 
 
 def render(
@@ -19,39 +19,61 @@ def render(
     view: View = None,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
     full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
+    turntable: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="N frames from all sides as PNG, of a moving bake, into a folder."),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the frames that are in the folder.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Moving bakes: as it looks while the eye moves.")] = False,
     data: Data = None,
 ) -> None:
-    """Render one exact frame of a baked scene."""
+    """Render one exact frame of a baked scene, or a turntable."""
     from cli.data_folder import complete_look, find_bake, find_scene, open_bakes, open_settings
     from cli.picture import check_output, save, save_exr
+    from cli.turntable import check_frames, render_turntable
     from relume.errors import ParameterError
     from relume.exr.attributes import Origin
     from relume.memory import Memory
+    from relume.methods.moving_views import MovingViews
     from relume.methods.registry import open_bake
-    from relume.picture.transfer import Eyes
+    from relume.methods.stills import Stills
     from relume.render.image import render_image
+    from relume.scene.archive import load_scene
+    from worker.paths import scene_path
 
-    check_output(output)
-    is_exr = output.suffix.lower() == ".exr"
+    if turntable is None:
+        check_output(output)
+    else:
+        check_frames(output, turntable, resume)
+    is_exr = turntable is None and output.suffix.lower() == ".exr"
     if (layers or full_float) and not is_exr:
         raise ParameterError("--output", output.name, "a file name that ends in .exr, for --layers and --float")
     partial = read_look(look)
     service = open_bakes(open_settings(data))
     try:
         record = find_scene(service.ledger, scene)
-        bake, view_name = find_bake(service, record, view)
+        bake, view_name = find_bake(service, record, view, moves=turntable is not None)
         transfer = open_bake(service.store_path(bake.id), Memory(4 << 30))
         if not bake.is_current:
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
-        if transfer.eyes is Eyes.FREE:
-            typer.echo("note: the eye of this bake moves: its pictures are approximate; exact: relume bake", err=True)
+        stills = None
+        if isinstance(transfer, MovingViews) and not quick:
+            stills = Stills(transfer.lit, load_scene(scene_path(service.data_dir, record.id)))
+        if isinstance(transfer, MovingViews) and quick:
+            typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
         document = complete_look(partial, transfer.default_look)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
-        if is_exr:
+        if turntable is not None:
+            assert isinstance(transfer, MovingViews)
+            render_turntable(transfer, view_name, document, output, turntable, stills)
+        elif is_exr:
             origin = Origin(record.id, record.name, bake.id)
-            save_exr(output, transfer, view_name, document, origin, layers, "float" if full_float else "half")
+            save_exr(
+                output, transfer, view_name, document, origin, layers, "float" if full_float else "half", stills=stills
+            )
         else:
-            save(output, render_image(transfer, view_name, document, for_display=True), document)
+            image = render_image(transfer, view_name, document, for_display=True, stills=stills)
+            save(output, image, document)
     finally:
         service.close()

@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, cameras, protocol
+from server.wire import bodies, cameras, protocol, renders
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -49,7 +49,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     protocol.PatchOperation,
     *CLIENT_MESSAGES,
     bodies.BakeRequest,
-    bodies.RenderRequest,
+    renders.RenderRequest,
     bodies.TruthRequest,
     bodies.ShareRequest,
 )
@@ -70,7 +70,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,
-    bodies.RenderBody,
+    renders.RenderBody,
     bodies.TruthBody,
     bodies.TruthPlanBody,
     bodies.LookEntry,

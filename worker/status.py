@@ -26,7 +26,7 @@ PHASE_WORDS: dict[Phase, str] = {
 }
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
-APPROXIMATE = frozenset({"surface"})  # methods whose pictures are never exact
+MOVING = frozenset({"surface"})  # methods whose eyes move: their pictures are exact where these rest, not at once
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class BakeStatus:
 
     @property
     def rank(self) -> tuple[bool, int, bool]:
-        """Sorts a scene's bakes, the best last: one whose pictures become exact, then the finest, then one that this
+        """Sorts a scene's bakes, the best last: one whose pictures are exact at once, the finest, then one that this
         code has made."""
-        return self.recipe.method not in APPROXIMATE, self.detail, self.is_current
+        return self.recipe.method not in MOVING, self.detail, self.is_current
 
     @property
     def detail(self) -> int:

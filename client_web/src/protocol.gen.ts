@@ -45,6 +45,12 @@ export interface CameraBody {
   name: string;
 }
 
+/** Where a camera is and how wide it looks. `to_world`: camera to world, 16 numbers by row, looking along -Z; scale is taken out. `yfov`: vertical, degrees. */
+export interface CameraFrame {
+  to_world: number[];
+  yfov: number;
+}
+
 /** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
 export interface EditMessage {
   type: "edit";
@@ -64,6 +70,11 @@ export interface EyeMessage {
   size: [number, number];
   hand?: string | null;
   rest?: "exact" | "stay";
+}
+
+/** From camera to camera, at even shares of the frames; one frame each where no number of frames is given. */
+export interface EyePath {
+  eyes: CameraFrame[];
 }
 
 /** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
@@ -87,16 +98,20 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares, what is between them going from one to the next. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
   view: string;
   looks: Record<string, unknown>[];
-  format: "exr" | "png" | "webp";
+  format: "exr" | "png" | "webp" | "mp4";
   size?: [number, number] | null;
   name?: string | null;
   layers?: boolean;
   precision?: "half" | "float";
+  path?: Turntable | EyePath | null;
+  frames?: number | null;
+  fps?: number;
+  exact?: boolean;
 }
 
 /** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. */
@@ -137,6 +152,12 @@ export interface TruthRequest {
   look?: Record<string, unknown>;
   passes?: number;
   dry_run?: boolean;
+}
+
+/** Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by default where the view begins. */
+export interface Turntable {
+  turntable: number;
+  start?: CameraFrame | null;
 }
 
 /** client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down to fit into it, until views are shown otherwise; all other frames come in the baked size. */
@@ -197,12 +218,6 @@ export interface CameraEntry {
   yfov: number;
   name: string;
   is_placed: boolean;
-}
-
-/** Where a camera is and how wide it looks. `to_world`: camera to world, 16 numbers by row, looking along -Z; scale is taken out. `yfov`: vertical, degrees. */
-export interface CameraFrame {
-  to_world: number[];
-  yfov: number;
 }
 
 /** Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians. */
@@ -428,7 +443,7 @@ export interface RenderBody {
   id: string;
   bake: string;
   view: string;
-  format: "exr" | "png" | "webp";
+  format: "exr" | "png" | "webp" | "mp4";
   size: [number, number] | null;
   state: "queued" | "running" | "ready" | "failed";
   done: number;

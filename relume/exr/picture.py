@@ -13,7 +13,7 @@ from relume.exr.layers import Layer
 from relume.imageio.exr import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
 from relume.look import Look
 
-Progress = Callable[[float], object]
+Progress = Callable[[float], None]
 Render = Callable[[Look, Progress], NDArray[np.float32]]
 """Renders a look, (height, width, 3) or with alpha (height, width, 4), and tells the share done."""
 

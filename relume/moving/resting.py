@@ -27,7 +27,7 @@ Eye = tuple[Camera, tuple[int, int]]
 MakeStill = Callable[[Camera, tuple[int, int], Progress, Cancelled], Transfer]
 """Finds what an eye sees, in a picture of this size: an opened bake of this one fixed view."""
 
-_TRACING = 0.6  # of the time that a still takes until it is shown; the rest is shading
+TRACING = 0.5  # of what a still tells to be done; the rest is shading
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,10 @@ class StillJob:
     def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
         """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
         try:
-            transfer = self.make_still(*self.eye, lambda share: progress(_TRACING * share), cancelled)
+            transfer = self.make_still(*self.eye, lambda share: progress(TRACING * share), cancelled)
             picture = Picture(transfer, next(iter(transfer.views)), self.memory)
             picture.set_look(self.look, solo=self.solo)
-            finish(picture, self.look, lambda share: progress(_TRACING + (1 - _TRACING) * share), cancelled)
+            finish(picture, self.look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
         except CancelledError:
             raise
         except RelumeError:  # the scene is gone, or it needs more memory than there is: the moving picture stays

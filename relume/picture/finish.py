@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from relume.errors import CancelledError
 from relume.look import Look
+from relume.picture.jobs import Cancelled, Progress
 from relume.picture.picture import Picture
 
 
-def finish(picture: Picture, look: Look, progress: Callable[[float], object], cancelled: Callable[[], bool]) -> None:
+def finish(picture: Picture, look: Look, progress: Progress, cancelled: Cancelled) -> None:
     """Make all that a picture lacks until it shows a look exactly.
 
     Args:

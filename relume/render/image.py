@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import cast
 
 import numpy as np
@@ -11,10 +10,13 @@ from numpy.typing import NDArray
 from relume.errors import PlanError
 from relume.look import Look
 from relume.methods.moving_views import MovingViews
+from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
 from relume.picture.finish import finish
+from relume.picture.jobs import Cancelled, Progress
 from relume.picture.picture import Picture
 from relume.picture.transfer import Opened, Transfer
+from relume.scene.model import Camera
 
 
 def render_image(
@@ -22,20 +24,22 @@ def render_image(
     view_name: str,
     look: Look,
     size: tuple[int, int] | None = None,
-    progress: Callable[[float], object] = lambda share: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
     *,
     for_display: bool = False,
+    eye: tuple[Camera, tuple[int, int]] | None = None,
+    stills: Stills | None = None,
 ) -> NDArray[np.float32]:
     """Render a look exactly; what is made for it is kept in passing in the memory that the bake was opened with.
-
-    Where the bake's eyes move it is as true as the picture from there is.
 
     Args:
         transfer: an opened bake. view_name: one of its views.
         size: width and height; None means the baked one, and none else is possible where the view is fixed.
         progress: called with about the share done. cancelled: asked now and then.
         for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
+        eye: of a bake whose eyes move: another camera than the view's, and the size of its picture.
+        stills: of such a bake: makes the picture exact; None: it is as true as the picture that moves.
     Returns:
         Linear radiance; where the look's background is transparent, coverage as a fourth channel, which the others
         are multiplied by already. (height, width, 3 or 4) float32
@@ -43,13 +47,33 @@ def render_image(
         PlanError: another size than the baked one.
         CancelledError: `cancelled` said so.
     """
+    view = transfer.views[view_name]
     if isinstance(transfer, MovingViews):
-        return _moving_image(transfer, view_name, look, size)
-    fixed = cast("Transfer", transfer)
-    view = fixed.views[view_name]
+        eye = eye or (view.camera, size or (view.width, view.height))
+        if stills is None:
+            return _moving_image(transfer, view_name, look, eye)
+        still = stills.make(*eye, lambda share: progress(share / 2), cancelled)
+        return _exact(
+            still, next(iter(still.views)), look, lambda share: progress((1 + share) / 2), cancelled, for_display
+        )
     if size is not None and tuple(size) != (view.width, view.height):
         raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
-    picture = Picture(fixed, view_name, fixed.memory.passing)
+    return _exact(cast("Transfer", transfer), view_name, look, progress, cancelled, for_display)
+
+
+def _second_half(progress: Progress, share: float) -> None:
+    progress((1 + share) / 2)
+
+
+def _exact(
+    transfer: Transfer,
+    view_name: str,
+    look: Look,
+    progress: Progress,
+    cancelled: Cancelled,
+    for_display: bool,
+) -> NDArray[np.float32]:
+    picture = Picture(transfer, view_name, transfer.memory.passing)
     picture.set_look(look)
     finish(picture, look, progress, cancelled)
     image, alpha = picture.image(), picture.alpha(for_display=for_display)
@@ -68,17 +92,17 @@ def render_small(transfer: Opened, view_name: str, look: Look, width: int) -> ND
     view = transfer.views[view_name]
     step = max(1, view.width // width)
     if isinstance(transfer, MovingViews):
-        return _moving_image(transfer, view_name, look, (view.width // step, max(1, view.height // step)))
+        small = view.width // step, max(1, view.height // step)
+        return _moving_image(transfer, view_name, look, (transfer.views[view_name].camera, small))
     return render_image(transfer if step < 2 else cast("Transfer", transfer).thinned(view_name, step), view_name, look)
 
 
 def _moving_image(
-    transfer: MovingViews, view_name: str, look: Look, size: tuple[int, int] | None
+    transfer: MovingViews, view_name: str, look: Look, eye: tuple[Camera, tuple[int, int]]
 ) -> NDArray[np.float32]:
-    """What is seen from where the eye of a view begins. (height, width, 3) float32"""
+    """What is seen while the eye moves. (height, width, 3) float32"""
     picture = MovingPicture(transfer, view_name)
     picture.set_look(look)
-    if size is not None:
-        picture.set_eye(transfer.views[view_name].camera, size)
+    picture.set_eye(*eye)
     picture.advance(None)
     return picture.image()

@@ -52,13 +52,17 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
 
         return RestingPicture(MovingPicture(transfer, view, is_watched=True), still, memory)
 
+    def render(transfer: Any, view: str, look: Any, *, exact: bool = True, **rest: Any) -> Any:
+        stills = stills_of(transfer) if exact and transfer.eyes is Eyes.FREE else None
+        return render_image(transfer, view, look, stills=stills, **rest)
+
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)
     return Library(
         open_transfer=lambda path: open_bake(path, memory),
         open_in_passing=lambda path: open_bake(path, memory.passing),
         make_picture=picture,
-        render=render_image,
+        render=render,
         render_small=render_small,
         reference=reference,
         finder=finder,

@@ -85,8 +85,8 @@ class Library:
         open_in_passing: the same for work that nobody watches: what it makes is the first to be forgotten.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
-            where the look's background is transparent; `progress`, `cancelled` and `for_display` as of `render_image`;
-            heavy.
+            where the look's background is transparent; `progress`, `cancelled`, `for_display` and `eye` as of
+            `render_image`; `exact`, where the eye moves: not as it looks meanwhile; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
         reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,

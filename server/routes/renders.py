@@ -10,17 +10,20 @@ from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
-from relume.picture.transfer import Opened
+from relume.picture.transfer import Eyes, Opened
 from server.errors import NotReadyError
+from server.files.video import check_encoder
+from server.queues.animation import check_animation
 from server.queues.renders import Render
 from server.routes.bakes import ready_bake
 from server.services import Shared
-from server.wire.bodies import MAX_LOOKS, RenderBody, RenderRequest
 from server.wire.body import MAX_NAME, Id
+from server.wire.protocol import MAX_EYE_PIXELS
+from server.wire.renders import MAX_FRAMES, RenderBody, RenderRequest
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
-MEDIA_TYPES = {"exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
+MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
 
 
 @router.post("", status_code=202)
@@ -56,11 +59,18 @@ def _check(request: RenderRequest, transfer: Opened) -> None:
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false for this format; only EXR files have layers")
-    if request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
+    if request.format == "mp4":
+        check_encoder()
+    if transfer.eyes is Eyes.FREE:
+        width, height = request.size or (view.width, view.height)
+        if width * height > MAX_EYE_PIXELS:
+            raise ParameterError("size", [width, height], f"at most {MAX_EYE_PIXELS} pixels in all")
+    elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
     for index, partial in enumerate(request.looks):
         check_look(partial, transfer, f"/looks/{index}")
+    check_animation(request, transfer)
 
 
 @router.get("/{render}")
@@ -77,7 +87,7 @@ def delete_render(render: Id, services: Shared) -> Response:
 
 
 @router.get("/{render}/frames/{index}", response_class=FileResponse)
-def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_LOOKS)], services: Shared) -> FileResponse:
+def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_FRAMES)], services: Shared) -> FileResponse:
     """One finished picture, counted from 0."""
     found = services.renders.get(render)
     if index >= found.total:
@@ -86,7 +96,19 @@ def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_LOOKS)], servi
     if not path.exists():
         raise NotReadyError(f"frame {index} is not finished; {_state(found)}")
     name = services.renders.download_name(found, index)
-    return FileResponse(path, media_type=MEDIA_TYPES[found.request.format], filename=name)
+    return FileResponse(path, media_type=MEDIA_TYPES[found.request.picture_format], filename=name)
+
+
+@router.get("/{render}/video.mp4", response_class=FileResponse)
+def get_video(render: Id, services: Shared) -> FileResponse:
+    """All pictures as a video, where one was asked for, when it is finished."""
+    found = services.renders.get(render)
+    if found.request.format != "mp4":
+        raise NotFoundError(f"this batch has {found.request.format} pictures; ask for the format mp4")
+    if found.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(found)}")
+    path = services.renders.video_path(found)
+    return FileResponse(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(found))
 
 
 @router.get("/{render}/archive.zip", response_class=FileResponse)

@@ -13,12 +13,10 @@ from relume.remarks import Effect
 from server.wire.body import Body, Id, Name
 from server.wire.cameras import CameraBody
 from server.wire.protocol import MAX_VIEWS_SHOWN
+from server.wire.renders import Side
 from worker.status import Phase
 
-Side = Annotated[int, Field(ge=1, le=16384)]
 Preset = Literal["preview", "good", "final"]
-ImageFormat = Literal["exr", "png", "webp"]
-MAX_LOOKS = 1000
 
 
 def moment(posix_s: float) -> str:
@@ -260,38 +258,6 @@ class DryRunBody(Body):
     id: str
     recipe: RecipeBody
     plan: PlanBody
-
-
-class RenderRequest(Body):
-    """A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default.
-
-    `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and
-    each kind of light path beside the picture, and `precision` of the values.
-    """
-
-    bake: Id
-    view: Name
-    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
-    format: ImageFormat
-    size: tuple[Side, Side] | None = None
-    name: Name | None = None
-    layers: bool = False
-    precision: Literal["half", "float"] = "half"
-
-
-class RenderBody(Body):
-    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too."""
-
-    id: str
-    bake: str
-    view: str
-    format: ImageFormat
-    size: tuple[int, int] | None
-    state: Literal["queued", "running", "ready", "failed"]
-    done: int
-    total: int
-    progress: float
-    problem: str | None
 
 
 class LookEntry(Body):

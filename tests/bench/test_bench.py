@@ -20,14 +20,14 @@ FIXED_NAMES = {
 }  # fmt: skip
 IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
-    "bench.rays", "bench.bake", "bench.ray_saving", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms",
-    "bench.pca", "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.gather", "bench.gather_rooms",
-    "bench.surface", "bench.gather_lights", "bench.gather_follow", "bench.estimators", "bench.sharp_slider",
-    "bench.mesh_files",
+    "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
+    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.gather", "bench.surface",
+    "bench.gather_follow", "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting", "bench.in_out",
 ]  # fmt: skip
-WITH_PROCESSES = [
+LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
     "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights", "bench.memory",
+    "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = ("accuracy.", "paper.", "truth.", "gather.rmse_", "lights.rmse_", "estimators.", "peer.")
@@ -56,7 +56,7 @@ def check(group: registry.Group) -> None:
 def test_names_are_those_that_scripts_know() -> None:
     assert set(registry.names()) >= FIXED_NAMES
     assert len(registry.names()) == len(set(registry.names()))
-    assert {group.module for group in registry.GROUPS} == {*IN_PROCESS, *WITH_PROCESSES}
+    assert {group.module for group in registry.GROUPS} == {*IN_PROCESS, *LONG}
 
 
 @pytest.mark.parametrize("module", IN_PROCESS)
@@ -65,8 +65,8 @@ def test_benchmark_runs_small(module: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", WITH_PROCESSES)
-def test_benchmark_with_processes_runs_small(module: str) -> None:
+@pytest.mark.parametrize("module", LONG)
+def test_long_benchmark_runs_small(module: str) -> None:
     check(group_of(module))
 
 

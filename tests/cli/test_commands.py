@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cli.interrupts import noted_interrupts
 from cli.main import main
@@ -192,6 +193,31 @@ def test_render_writes_layers_and_says_what_cannot_have_them(
     assert str(OpenImageIO.ImageBuf(str(output)).spec().format) == "float"
     assert main(["render", "quad", "--layers", "--output", str(tmp_path / "x.png")]) == 1
     assert ".exr" in capsys.readouterr().err
+
+
+def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, look = tmp_path / "round", tmp_path / "look.json"
+    look.write_text(json.dumps({"materials": {"White": {"terms": [{"model": "lambert", "color": [0.5, 0.25, 1.0]}]}}}))
+    turntable = ["render", "quad", "--turntable", "3", "--look", str(look), "--output", str(folder)]
+    assert main(turntable) == 1
+    assert "--method surface" in capsys.readouterr().err
+    assert main(["bake", "quad", "--view", "front", "--method", "surface", "--points", "200", *TINY]) == 0
+    assert main(turntable) == 0
+    frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]
+    assert frames[0].shape == (24, 32, 3)
+    assert (frames[0] != frames[1]).any()
+    assert main(turntable) == 1
+    assert "--resume" in capsys.readouterr().err
+    (folder / "0001.png").unlink()
+    (folder / "0002.png").write_bytes(b"kept")
+    assert main([*turntable, "--resume"]) == 0
+    np.testing.assert_array_equal(np.asarray(Image.open(folder / "0001.png")), frames[1])
+    assert (folder / "0002.png").read_bytes() == b"kept"
+    assert main(["render", "quad", "--quick", "--output", str(tmp_path / "x.png")]) == 0
+    assert "approximate" in capsys.readouterr().err
+    assert main(["render", "quad", "--turntable", "0", "--output", str(tmp_path / "none")]) == 1
 
 
 def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from relume.picture.transfer import Eyes, Opened
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
 from relume.store import bake_here
-from worker.status import APPROXIMATE
+from worker.status import MOVING
 
 SIZE, NUM_LIGHTS, NUM_POINTS = (48, 36), 100, 6000
 
@@ -54,9 +54,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Every registered method, and the tests' own; of those with pictures, the ones whose eyes move or do not."""
     if "method" not in metafunc.fixturenames:
         return
-    fixed, names = {*METHODS, FurnaceMethod.name} - APPROXIMATE, {*METHODS, FurnaceMethod.name}
+    fixed, names = {*METHODS, FurnaceMethod.name} - MOVING, {*METHODS, FurnaceMethod.name}
     if "moving" in metafunc.fixturenames:
-        names = APPROXIMATE
+        names = MOVING
     elif "transfer" in metafunc.fixturenames:
         names = fixed
     metafunc.parametrize("method", sorted(names), indirect=True, scope="session")

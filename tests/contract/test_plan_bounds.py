@@ -17,7 +17,7 @@ from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS
 from relume.scene.archive import make_scene
 from relume.scene.model import Environment, Material, Scene, Texture
-from worker.status import APPROXIMATE
+from worker.status import MOVING
 
 linux = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells the most memory held")
 BLUE = {"model": "lambert", "color": [0.2, 0.3, 0.5], "texture": "diffuse"}
@@ -61,7 +61,7 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
 )
 def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
     took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_points=1000))
-    if name not in APPROXIMATE:  # nearly every pixel is an edge, and all flights are short beside one
+    if name not in MOVING:  # nearly every pixel is an edge, and all flights are short beside one
         assert took["view_samples"] > 3 * 16 * 16
 
 

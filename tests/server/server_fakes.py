@@ -280,6 +280,8 @@ class Control:
         progress: Callable[[float], object] = lambda share: None,
         cancelled: Callable[[], bool] = lambda: False,
         for_display: bool = False,
+        eye: None = None,
+        exact: bool = True,
     ) -> np.ndarray:
         """It waits half way while `render_gate` is clear."""
         progress(0.5)

@@ -166,7 +166,7 @@ def test_a_render_is_what_the_eye_sees_where_it_begins(
     client: TestClient, bake: str, session: Session, tmp_path: Any
 ) -> None:
     (view,) = hello(session)["views"]
-    picture = shown(session.frame())
+    picture = shown(session.exact(0))
     rendered = rendered_by(client, {"bake": bake, "view": view["name"], "looks": [{}]}, tmp_path)
     assert np.abs(picture - rendered).max() <= rendered.max() / 256 + 1e-4
 
@@ -191,12 +191,12 @@ def test_a_render_is_what_the_eye_sees_where_it_begins(
 )
 def test_bad_eyes_are_refused_in_words_and_nothing_is_lost(session: Session, bad: dict[str, Any]) -> None:
     (view,) = hello(session)["views"]
-    before = shown(session.frame())
+    before = shown(session.exact(0))
     session.send(**(eye(view, 1, 0.2) | bad))
     problem = session.text("problem")
     assert len(problem["problem"]["detail"]) > 10
     session.send(**eye(view, 2, 0.0))
-    np.testing.assert_array_equal(shown(of_eye(session, 2)), before)
+    np.testing.assert_array_equal(shown(exact_of(session, 2, 0)), before)
 
 
 def test_an_eye_inside_a_solid_and_one_that_sees_nothing_are_seen_through(session: Session) -> None:

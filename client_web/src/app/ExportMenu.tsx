@@ -1,17 +1,41 @@
-/** Pictures to take away: PNG and EXR with one click each, and EXR without its layers. */
+/** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exporting, exportExr, exportPng } from "../looks/export";
+import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES } from "../looks/export";
 import { lightLimitWords } from "../seen/limits";
-import { sideBySide, viewName } from "../state/views";
+import { moves, sideBySide, viewName } from "../state/views";
 
 /** What an export is of: with several views shown it must be said. */
 function whichView(): string {
   return sideBySide.value ? `the view “${viewName.value}”` : "the picture";
 }
 
-const CHOICES = [
-  { layers: true, label: "EXR with layers", help: "One for each light and each kind of light path, beside the picture" },
-  { layers: false, label: "EXR, the picture alone", help: "Quicker, and a smaller file" },
+interface Choice {
+  label: string;
+  help: string;
+  run(): Promise<void>;
+}
+
+const PICTURES: Choice[] = [
+  {
+    label: "EXR with layers",
+    help: "One for each light and each kind of light path, beside the picture",
+    run: () => exportExr(true),
+  },
+  { label: "EXR, the picture alone", help: "Quicker, and a smaller file", run: () => exportExr(false) },
+];
+
+const TURNTABLES: Choice[] = [
+  {
+    label: "Turntable, quick",
+    help: `${TURNTABLE_FRAMES} frames once around, as the view looks while it moves; PNG in a ZIP`,
+    run: () => exportTurntable("png", false),
+  },
+  {
+    label: "Turntable, exact",
+    help: `Each of ${TURNTABLE_FRAMES} frames as where the eye rests; takes as long for each`,
+    run: () => exportTurntable("png", true),
+  },
+  { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", false) },
 ];
 
 export function ExportMenu() {
@@ -41,13 +65,13 @@ export function ExportMenu() {
       </div>
       {open && (
         <ul class="menu-body export-menu">
-          {CHOICES.map(({ layers, label, help }) => (
+          {(moves.value ? [...PICTURES, ...TURNTABLES] : PICTURES).map(({ label, help, run }) => (
             <li key={label}>
               <button
                 disabled={busy}
                 onClick={() => {
                   setOpen(false);
-                  void exportExr(layers);
+                  void run();
                 }}
               >
                 {label}

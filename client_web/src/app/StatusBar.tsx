@@ -84,8 +84,8 @@ export function StatusBar() {
       <span class="spacer" />
       {exporting.value !== null && (
         <span class="bake">
-          EXR {Math.round(100 * exporting.value.progress)} %
-          <progress max={1} value={exporting.value.progress} aria-label="EXR" />
+          {exporting.value.what} {Math.round(100 * exporting.value.progress)} %
+          <progress max={1} value={exporting.value.progress} aria-label={exporting.value.what} />
           <button onClick={exporting.value.stop}>Stop</button>
         </span>
       )}

@@ -1,10 +1,12 @@
-/** Export: PNG as displayed, made here; EXR in linear radiance, rendered by the server. Both are of the light that is
- * shown: one source alone, or some of its paths. */
+/** Export: PNG as displayed, made here; EXR in linear radiance and turntables, rendered by the server. All are of the light
+ * that is shown: one source alone, or some of its paths. */
 import { signal } from "@preact/signals";
+import { eyeOf } from "../cameras/eye";
+import { frameOf } from "../cameras/orbit";
 import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
-import type { RenderBody } from "../protocol";
+import type { RenderBody, RenderRequest } from "../protocol";
 import { lightLimits, lightLimitWords } from "../seen/limits";
 import { seenOf } from "../seen/rendered";
 import { bake } from "../state/bakes";
@@ -16,8 +18,8 @@ import { pngBlob } from "./image";
 
 const POLL_MS = 300;
 
-/** The EXR that the server renders now: how far it is, and a way to stop it. */
-export const exporting = signal<{ progress: number; stop(): void } | null>(null);
+/** What the server renders now: how far it is, and a way to stop it. */
+export const exporting = signal<{ what: string; progress: number; stop(): void } | null>(null);
 
 /** As many characters as the server leaves of a name. */
 const LONGEST_STEM = 120;
@@ -48,7 +50,7 @@ export async function exportPng(): Promise<void> {
 }
 
 /** Follow a render to its end; null where it was stopped on the way. */
-async function finished(render: RenderBody): Promise<RenderBody | null> {
+async function finished(what: string, render: RenderBody): Promise<RenderBody | null> {
   let [state, isStopped] = [render, false];
   const stop = () => {
     isStopped = true;
@@ -56,25 +58,45 @@ async function finished(render: RenderBody): Promise<RenderBody | null> {
     void attempt(() => deleteRender(render.id));
   };
   while (!isStopped && (state.state === "queued" || state.state === "running")) {
-    exporting.value = { progress: state.progress, stop };
+    exporting.value = { what, progress: state.progress, stop };
     await new Promise((done) => setTimeout(done, POLL_MS));
     if (!isStopped) state = await getRender(render.id);
   }
   if (isStopped) return null;
-  if (state.state === "failed") throw new Error(`The EXR could not be rendered: ${problemText(state.problem)}`);
+  if (state.state === "failed") throw new Error(`${what} could not be rendered: ${problemText(state.problem)}`);
   return state;
 }
 
-/** With layers: one for each light and each kind of light path, where there are several. */
-export async function exportExr(layers: boolean): Promise<void> {
+/** Where the view in hand is seen from, if its eye moves. */
+function eyeNow(): { to_world: number[]; yfov: number } | null {
+  const eye = eyeOf(viewName.peek());
+  if (eye === null) return null;
+  return eye.isFirst ? eye.first : frameOf(eye.orbit);
+}
+
+/** Have the server render the look that is seen; `fetchFrom` is the file of the finished batch. */
+async function render(what: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null || exporting.value !== null) return;
   await attempt(async () => {
-    const shown = seenOf(current);
-    note(`Rendering the EXR on the server${lightLimitWords()}…`);
-    const looks = [{ ...shown }];
-    const asked = await startRender({ bake: id, view: viewName.value, looks, format: "exr", layers, name: fileStem() });
-    const render = await finished(asked);
-    if (render !== null) download(`/api/renders/${encodeURIComponent(render.id)}/frames/0`, "");
+    const looks = [{ ...seenOf(current) }];
+    note(`Rendering on the server${lightLimitWords()}: ${what}…`);
+    const asked = await startRender({ bake: id, view: viewName.value, looks, name: fileStem(), ...more });
+    const done = await finished(what, asked);
+    if (done !== null) download(`/api/renders/${encodeURIComponent(done.id)}/${fetchFrom}`, "");
   }).finally(() => (exporting.value = null));
+}
+
+/** With layers: one for each light and each kind of light path, where there are several. */
+export function exportExr(layers: boolean): Promise<void> {
+  const eye = eyeNow();
+  return render("EXR", "frames/0", { format: "exr", layers, path: eye === null ? null : { eyes: [eye] } });
+}
+
+export const TURNTABLE_FRAMES = 72;
+
+/** Once around, from where the eye is: numbered frames in a ZIP, or a video. `exact`: as where the eye rests. */
+export function exportTurntable(format: "png" | "mp4", exact: boolean): Promise<void> {
+  const path = { turntable: TURNTABLE_FRAMES, start: eyeNow() };
+  return render("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, exact });
 }

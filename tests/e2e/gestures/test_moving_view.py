@@ -18,7 +18,7 @@ BAKE_S, MOVED_S = 120.0, 30.0
 def scene(server: Server) -> Iterator[str]:
     """A scene of its own with one bake, whose view moves; it is gone afterwards."""
     identity = server.call("/api/built-ins/cornell_box", {})["id"]
-    recipe = {"scene": identity, "method": "surface", "size": (240, 240), "lights": 100, "points": 4000}
+    recipe = {"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000}
     bake = server.call("/api/bakes", recipe)
     deadline = time.monotonic() + BAKE_S
     while bake["state"] in ("queued", "running") and time.monotonic() < deadline:

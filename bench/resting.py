@@ -1,0 +1,101 @@
+"""surface.rest_s: what somebody waits for the exact picture who has moved the eye and lets it rest.
+
+The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
+From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
+begins. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
+under a look without reflected light, whose gather rays are traced all the same. `moving_error` is how far the moving
+picture was from the exact one that replaces it, edges included, which only the exact one antialiases.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from bench.figure import Figure
+from relume.bake import Recipe
+from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.moving_views import MovingViews
+from relume.methods.registry import METHODS, open_bake
+from relume.methods.stills import Stills
+from relume.moving.picture import MovingPicture
+from relume.moving.resting import TRACING, RestingPicture
+from relume.parallel import num_threads
+from relume.scene.built_in import built_in
+from relume.scene.model import Scene
+from relume.store import bake_here
+
+_MEMORY = 4 << 30
+
+
+class _Rested(NamedTuple):
+    """Seconds until the exact picture, of them until all was traced, and the relative RMSE of the one before."""
+
+    rest_s: float
+    tracing_s: float
+    error: float
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake both scenes, move the eye, wait."""
+    still = _rested("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
+    box = _rested("cornell_box", (48, 48) if tiny else (400, 400), tiny)
+    (rest_s, tracing_s, error), (direct_s, _, _) = still
+    context = {"size": "640×480", "tracing_s": tracing_s, "direct_s": direct_s, "moving_error": error}
+    of_box = {"cornell_box_400": box[0].rest_s, "its_tracing_s": box[0].tracing_s, "its_direct_s": box[1].rest_s}
+    return [Figure("surface.rest_s", rest_s, "s", {**context, **of_box, "threads": num_threads()})]
+
+
+def _rested(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Rested, _Rested]:
+    """Of all light, and of that which comes straight."""
+    scene = built_in(name)
+    recipe = Recipe(
+        "surface", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=2000 if tiny else 50_000
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = bake_here(METHODS["surface"], scene, recipe, Path(folder) / "moving.zarr")
+        found = []
+        for show in ("all", "direct"):
+            moving = open_bake(path, Memory(_MEMORY))
+            assert isinstance(moving, MovingViews)
+            found.append(_median(scene, moving, size, show))
+    return found[0], found[1]
+
+
+def _median(scene: Scene, moving: MovingViews, size: tuple[int, int], show: str) -> _Rested:
+    """Two rests of one session, after one in a small picture, in which kernels are compiled and cells are lit."""
+    look = validate(complete({"transport": {"show": show}}, moving.default_look), moving.default_look)
+    picture = RestingPicture(
+        MovingPicture(moving, scene.cameras[0].name), Stills(moving.lit, scene).make, moving.memory
+    )
+    picture.set_look(look)
+    few = size[0] // 4, size[1] // 4
+    _, *counted = (_rest(scene, picture, step, few if step == 0 else size) for step in range(3))
+    return _Rested(*np.median(np.array(counted), axis=0).tolist())
+
+
+def _rest(scene: Scene, picture: RestingPicture, step: int, size: tuple[int, int]) -> _Rested:
+    camera = scene.cameras[0]
+    to_world = camera.to_world.copy()
+    to_world[:3, 3] += 0.01 * (step + 1) * to_world[:3, 0]
+    picture.set_eye(replace(camera, to_world=to_world), size)
+    picture.advance(None)
+    before, began, traced = picture.image().copy(), time.perf_counter(), [0.0]
+
+    def tell(share: float) -> None:
+        if share <= TRACING:
+            traced[0] = time.perf_counter() - began
+
+    while (job := picture.next_job()) is not None:
+        picture.install(job, job.make(tell, lambda: False))
+        picture.advance(None)
+    picture.encode(picture.all_tiles(), "rgb9e5")
+    rest_s, exact = time.perf_counter() - began, picture.image()
+    error = float(np.sqrt(np.mean((before - exact) ** 2) / np.mean(exact**2)))
+    return _Rested(rest_s, traced[0], error)

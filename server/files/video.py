@@ -1,0 +1,53 @@
+"""Videos of numbered frames, by the program ffmpeg, which must be installed where the server runs."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from relume.errors import CancelledError, ParameterError, RelumeError
+from relume.replacing import replacing
+
+_ASK_S = 0.2
+_SAID = 300  # characters of what the program says
+
+
+def check_encoder() -> str:
+    """Path of the program. Raises ParameterError where there is none."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        raise ParameterError("format", "mp4", "exr, png or webp; for mp4 ffmpeg must be installed on the server")
+    return found
+
+
+def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bool]) -> None:
+    """Encode 0000.png, 0001.png, … of a folder as H.264; the file appears whole or not at all.
+
+    Args:
+        frames: the folder. fps: frames a second. target: file that ends in .mp4.
+        cancelled: asked now and then.
+    Raises:
+        ParameterError: there is no encoder. CancelledError: `cancelled` said so. RelumeError: it failed.
+    """
+    even = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # its colours are halved both ways
+    with replacing(target) as unfinished:
+        command = [
+            check_encoder(), "-nostdin", "-y", "-loglevel", "error",
+            "-framerate", str(fps), "-i", str(frames / "%04d.png"),
+            "-vf", even, "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p",
+            "-movflags", "+faststart", "-f", "mp4", str(unfinished),
+        ]  # fmt: skip
+        # nothing of it is a user's but a number
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
+            while True:
+                try:
+                    _, said = process.communicate(timeout=_ASK_S)
+                    break
+                except subprocess.TimeoutExpired:
+                    if cancelled():
+                        process.kill()
+                        raise CancelledError("the video was cancelled") from None
+        if process.returncode != 0:
+            raise RelumeError(f"ffmpeg could not make the video: {said.strip()[-_SAID:]}")

@@ -1,0 +1,85 @@
+"""Bodies of batch renders."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from server.wire.body import Body, Id, Name
+from server.wire.cameras import CameraFrame
+
+Side = Annotated[int, Field(ge=1, le=16384)]
+ImageFormat = Literal["exr", "png", "webp"]
+MAX_LOOKS = 1000
+MAX_FRAMES = 3600
+Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
+
+
+class Turntable(Body):
+    """Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by
+    default where the view begins."""
+
+    turntable: Frames
+    start: CameraFrame | None = None
+
+
+class EyePath(Body):
+    """From camera to camera, at even shares of the frames; one frame each where no number of frames is given."""
+
+    eyes: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
+
+
+class RenderRequest(Body):
+    """A batch of exact pictures; looks may be partial.
+
+    `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
+    default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the
+    picture, and `precision` of the values.
+
+    Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at
+    even shares, what is between them going from one to the next. `format` "mp4" makes a video of them, `fps` frames a
+    second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner.
+    """
+
+    bake: Id
+    view: Name
+    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
+    format: ImageFormat | Literal["mp4"]
+    size: tuple[Side, Side] | None = None
+    name: Name | None = None
+    layers: bool = False
+    precision: Literal["half", "float"] = "half"
+    path: Turntable | EyePath | None = None
+    frames: Frames | None = None
+    fps: Annotated[int, Field(ge=1, le=120)] = 25
+    exact: bool = True
+
+    @property
+    def num_frames(self) -> int:
+        """How many pictures come of it."""
+        if isinstance(self.path, Turntable):
+            return self.path.turntable
+        if self.frames is not None:
+            return self.frames
+        return max(len(self.looks), len(self.path.eyes) if self.path is not None else 1)
+
+    @property
+    def picture_format(self) -> ImageFormat:
+        """Of a single frame."""
+        return "png" if self.format == "mp4" else self.format
+
+
+class RenderBody(Body):
+    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too."""
+
+    id: str
+    bake: str
+    view: str
+    format: ImageFormat | Literal["mp4"]
+    size: tuple[int, int] | None
+    state: Literal["queued", "running", "ready", "failed"]
+    done: int
+    total: int
+    progress: float
+    problem: str | None

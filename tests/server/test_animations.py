@@ -1,0 +1,145 @@
+"""Animations: eyes that go round or along, looks that change on the way, frames and videos of them."""
+
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO
+import pytest
+from fastapi.testclient import TestClient
+from test_end_to_end import wait_until_done
+from test_moving_eyes import SIZE, bake, client, eye, scene
+
+__all__ = ["bake", "client", "scene"]  # fixtures
+
+
+@pytest.fixture
+def material(client: TestClient, scene: dict[str, Any]) -> str:
+    return str(scene["materials"][0]["name"])
+
+
+def of(material: str, color: list[float]) -> dict[str, Any]:
+    return {"materials": {material: {"terms": [{"model": "lambert", "color": color}]}}}
+
+
+def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list[np.ndarray]:
+    """All pictures of a batch. (height, width, 3) float32 each"""
+    answer = client.post("/api/renders", json={"view": "view", "looks": [{}], "format": "exr", **request})
+    assert answer.status_code == 202, answer.text
+    url = answer.headers["location"]
+    done = wait_until_done(client, url)
+    assert done["state"] == "ready", done["problem"]
+    found = []
+    for index in range(done["total"]):
+        file = folder / f"{index}.exr"
+        file.write_bytes(client.get(f"{url}/frames/{index}").content)
+        found.append(OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)[..., :3])
+    return found
+
+
+@pytest.fixture
+def view(client: TestClient, bake: str) -> dict[str, Any]:
+    with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v1"]) as session:
+        found: dict[str, Any] = session.receive_json()["views"][0]
+    return found
+
+
+def test_a_turntable_goes_once_around_exactly_or_quickly(
+    client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
+) -> None:
+    request = {"bake": bake, "view": view["name"], "path": {"turntable": 4}, "size": [40, 30]}
+    exact = frames_of(client, request, tmp_path)
+    quick = frames_of(client, request | {"exact": False}, tmp_path)
+    assert [frame.shape for frame in exact] == [(30, 40, 3)] * 4
+    for k in range(4):
+        assert np.abs(exact[k] - exact[k - 1]).max() > 0.05
+        assert 0 < np.sqrt(np.mean((exact[k] - quick[k]) ** 2)) < 0.3 * np.sqrt(np.mean(exact[k] ** 2))
+    (still,) = frames_of(client, request | {"path": None}, tmp_path)
+    np.testing.assert_array_equal(exact[0], still)
+
+
+def test_a_way_from_camera_to_camera_with_looks_between_looks(
+    client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
+) -> None:
+    eyes = []
+    for aside in (0.0, 0.4):
+        placed = eye(view, 1, aside)
+        eyes.append({"to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])})
+    looks = [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])]
+    request = {"bake": bake, "view": view["name"], "path": {"eyes": eyes}, "looks": looks, "frames": 3, "exact": False}
+    found = frames_of(client, request, tmp_path)
+    assert len(found) == 3
+    middle = [frame[SIZE[1] // 2, SIZE[0] // 2] for frame in found]
+    assert middle[0][0] > 0.01
+    assert middle[0][2] < 1e-6
+    assert middle[2][2] > 0.01
+    assert middle[2][0] < 1e-6
+    assert min(middle[1][0], middle[1][2]) > 0.003  # half red and half blue
+    last = frames_of(client, request | {"path": {"eyes": eyes[1:]}, "looks": looks[1:], "frames": None}, tmp_path)
+    np.testing.assert_array_equal(found[2], last[0])
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"path": {"turntable": 0}},
+        {"path": {"turntable": 1_000_000}},
+        {"path": {"eyes": []}},
+        {"path": {"turntable": 3}, "frames": 4},
+        {"path": {"eyes": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
+        {"path": {"eyes": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
+        {"frames": 0},
+        {"frames": 1, "looks": [{}, {}]},
+        {"fps": 0},
+        {"size": [16000, 16000]},
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_refused_in_words(
+    client: TestClient, bake: str, view: dict[str, Any], bad: dict[str, Any]
+) -> None:
+    request = {"bake": bake, "view": view["name"], "looks": [{}], "format": "png"} | bad
+    answer = client.post("/api/renders", json=request)
+    assert answer.status_code == 422
+    assert len(answer.json()["detail"]) > 10
+
+
+def test_a_fixed_view_follows_looks_but_no_path(
+    client: TestClient, scene: dict[str, Any], material: str, tmp_path: Path
+) -> None:
+    request = {"scene": scene["id"], "size": SIZE, "lights": 50}
+    fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+    name = scene["views"][0]["name"]
+    refused = client.post(
+        "/api/renders",
+        json={"bake": fixed["id"], "view": name, "looks": [{}], "format": "png", "path": {"turntable": 3}},
+    )
+    assert refused.status_code == 422
+    assert "surface" in refused.json()["detail"]
+    looks = [of(material, [0.8, 0.4, 0.0]), of(material, [0.0, 0.4, 0.8])]
+    found = frames_of(client, {"bake": fixed["id"], "view": name, "looks": looks, "frames": 3}, tmp_path)
+    np.testing.assert_allclose(found[1], (found[0] + found[2]) / 2, rtol=2e-3, atol=2e-3)
+
+
+def test_a_video_is_made_where_there_is_an_encoder(
+    client: TestClient, bake: str, view: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = {
+        "bake": bake, "view": view["name"], "looks": [{}], "format": "mp4", "path": {"turntable": 5}, "size": [33, 25],
+        "exact": False,
+    }  # fmt: skip
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    refused = client.post("/api/renders", json=request)
+    assert refused.status_code == 422
+    assert "ffmpeg" in refused.json()["detail"]
+    monkeypatch.undo()
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed: no video can be made")
+    url = client.post("/api/renders", json=request).headers["location"]
+    assert wait_until_done(client, url)["state"] == "ready"
+    answer = client.get(f"{url}/video.mp4")
+    assert answer.headers["content-type"] == "video/mp4"
+    assert answer.content[4:8] == b"ftyp"
+    assert len(client.get(f"{url}/frames/4").content) > 100
