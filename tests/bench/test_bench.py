@@ -22,7 +22,8 @@ IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
     "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
     "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.gather", "bench.surface",
-    "bench.gather_follow", "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting", "bench.in_out",
+    "bench.gather_follow", "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting",
+    "bench.in_out",
 ]  # fmt: skip
 LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
