@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import time
+import zipfile
 from collections.abc import Iterator
+from pathlib import Path
 
+import numpy as np
 import pytest
 from editor_page import WAIT_MS, Editor, changed, opened_page
 from editor_server import Server
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 BAKE_S, MOVED_S = 120.0, 30.0
@@ -133,3 +137,21 @@ def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, scene: 
     expect(moving.page.get_by_text("The camera is kept as “View 1”")).to_be_visible()
     kept = server.call(f"/api/scenes/{scene}/cameras")
     assert [camera["name"] for camera in kept if camera["name"] == "View 1"] == ["View 1"]
+
+
+def test_a_turntable_from_where_the_eye_is_is_taken_away(moving: Editor, tmp_path: Path) -> None:
+    page, first = moving.page, moving.pixels_now()
+    moving.canvas.focus()
+    page.keyboard.press("ArrowUp")
+    differs(moving, first)
+    page.get_by_role("button", name="More ways to export").click()
+    with page.expect_download(timeout=WAIT_MS) as download:
+        page.get_by_role("button", name="Turntable, quick").click()
+    download.value.save_as(tmp_path / "round.zip")
+    with zipfile.ZipFile(tmp_path / "round.zip") as archive:
+        frames = [np.asarray(Image.open(archive.open(name)), np.float64) for name in sorted(archive.namelist())]
+    assert len(frames) == 72
+    assert frames[0].shape == (120, 120, 3)
+    for k in (1, 18, 36, 71):
+        assert np.abs(frames[k] - frames[0]).mean() > 1
+    assert np.abs(frames[36] - frames[0]).mean() > np.abs(frames[1] - frames[0]).mean()
