@@ -26,9 +26,7 @@ def check_frames(output: Path, num: int, resumes: bool) -> None:
     if not output.parent.is_dir():
         raise ParameterError("--output", str(output), "a folder in a folder that exists")
     if not resumes and any(output.glob("*.png")):
-        raise ParameterError(
-            "--output", output.name, "an empty folder; --resume goes on with what is there"
-        )
+        raise ParameterError("--output", output.name, "an empty folder; --resume goes on with what is there")
 
 
 def render_turntable(transfer: MovingViews, view_name: str, look: Any, output: Path, num: int, stills: Any) -> None:

@@ -270,7 +270,7 @@ export interface FinderBody {
   framing: CameraFrame;
 }
 
-/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. */
+/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -285,6 +285,7 @@ export interface FrameHeader {
   kind: "picture" | "brush";
   alpha: boolean;
   eye: number | null;
+  was_off: number | null;
   ms: FrameTimes;
 }
 

@@ -184,7 +184,15 @@ class RestingPicture:
         if not step.exact:
             return self._moving.advance(max_coefficients)
         self._is_still = True
-        return replace(step, tiles=self._still.all_tiles())
+        return replace(step, tiles=self._still.all_tiles(), was_off=self._was_off(self._still))
+
+    def _was_off(self, still: Picture) -> float | None:
+        """How far the moving picture is from a still, relative RMS; None where it has not caught up, or all is dark."""
+        if self._moving.advance(None).fidelity != "approximate":
+            return None
+        exact = still.image()
+        size = float(np.mean(np.square(exact, dtype=np.float64)))
+        return float(np.sqrt(np.mean((self._moving.image() - exact) ** 2) / size)) if size else None
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture."""

@@ -38,12 +38,14 @@ class Advance:
     Attributes:
         tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
         fidelity: how nearly it shows it. complete: something of every term is shown.
+        was_off: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
     """
 
     tiles: list[Tile]
     exact: bool
     fidelity: Word
     complete: bool
+    was_off: float | None = None
 
     @property
     def changed(self) -> bool:

@@ -38,6 +38,10 @@ class Advance(Protocol):
 
     @property
     def changed(self) -> bool: ...
+    @property
+    def was_off(self) -> float | None:
+        """How far the picture that an exact one replaces was from it, relative RMS, where its eye moved."""
+        ...
 
 
 class Picture(Protocol):

@@ -305,7 +305,8 @@ class FrameTimes(Message):
 
 
 class FrameHeader(Message):
-    """Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views."""
+    """Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views.
+    `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS."""
 
     frame: int
     revision: int
@@ -320,4 +321,5 @@ class FrameHeader(Message):
     kind: Literal["picture", "brush"]
     alpha: bool = False
     eye: int | None = None
+    was_off: float | None = None
     ms: FrameTimes

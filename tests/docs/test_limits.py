@@ -17,7 +17,7 @@ from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
 from relume.trace.view_samples import POSITIONS_A_PIXEL
 from server.queues.work_queue import MAX_QUEUED
 from server.records import looks, shares
-from server.wire import bodies, protocol
+from server.wire import bodies, protocol, renders
 from worker import cameras
 
 KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
@@ -57,9 +57,9 @@ ROWS = {
     "shared look; number of them; all together": (
         f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"
     ),
-    "looks of one batch render; passes of a comparison; of each kind waiting": (
-        f"{bodies.MAX_LOOKS:,}; {most('passes'):,}; {MAX_QUEUED}"
-    ),
+    "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
+    "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {MAX_QUEUED}",
+    "pixels of a view whose eye moves": f"{protocol.MAX_EYE_PIXELS:,}",
 }
 
 

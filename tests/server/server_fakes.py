@@ -131,7 +131,8 @@ class FakeJob:
 def advance_of(tiles: list[Any], exact: bool) -> SimpleNamespace:
     """What a step of a whole picture says."""
     fidelity = "exact" if exact else "approximate"
-    return SimpleNamespace(tiles=tiles, exact=exact, fidelity=fidelity, complete=True, changed=bool(tiles))
+    shown = {"exact": exact, "fidelity": fidelity, "complete": True, "was_off": None}
+    return SimpleNamespace(tiles=tiles, changed=bool(tiles), **shown)
 
 
 @dataclass

@@ -1,7 +1,7 @@
 /** Whether what is on the screens is the look's picture, and how near it is. */
 import { stage } from "../picture/stage";
 import type { FrameHeader } from "../protocol";
-import { exact, fidelity, worst } from "../state/fidelity";
+import { exact, fidelity, movingError, worst } from "../state/fidelity";
 import { connections, type BakeConnection } from "./connections";
 
 const waiters: (() => void)[] = [];
@@ -25,6 +25,7 @@ export function noteShown(of: BakeConnection, header: FrameHeader): void {
   const picture = stage.of(header.view);
   picture.exactRevision = header.exact ? header.revision : -1;
   picture.fidelity = header.fidelity;
+  if (header.was_off !== null) movingError.value = header.was_off;
   exact.value = stage.shown.every((each) => each.exactRevision >= of.session.revision);
   sayFidelity();
   if (exact.value) for (const done of waiters.splice(0)) done();

@@ -9,6 +9,9 @@ export const settled = signal(false);
 /** Of the shown pictures the worst; of no picture nothing bad is said. */
 export const fidelity = signal<Fidelity>("exact");
 
+/** How far the moving picture was from the exact one where an eye rested last, relative RMS; null before. */
+export const movingError = signal<number | null>(null);
+
 /** As the server ranks them, worst first. */
 const ORDER: Fidelity[] = ["preview", "approximate", "followed", "near", "exact"];
 

@@ -2,7 +2,7 @@
  * that nothing flickers while a hand drags. */
 import { computed, effect, signal } from "@preact/signals";
 import type { Fidelity } from "../protocol";
-import { fidelity, settled } from "../state/fidelity";
+import { fidelity, movingError, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
 import { moves } from "../state/views";
 
@@ -22,10 +22,19 @@ const OTHER_LIGHT: Mark = {
   title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
 };
 
-const MOVING: Mark = {
-  words: "Moving view, approximate",
-  title: "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer. Where the eye rests the exact picture follows.",
-};
+const WHY_MOVING = "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer.";
+const THEN = "Where the eye rests the exact picture follows.";
+
+/** With how far it was off where the exact picture is known. */
+function movingMark(): Mark {
+  const off = movingError.value;
+  if (off === null) return { words: "Moving view, approximate", title: `${WHY_MOVING} ${THEN}` };
+  const percent = Math.max(1, Math.round(100 * off));
+  return {
+    words: `Moving view, about ${percent} % off`,
+    title: `${WHY_MOVING} Where the eye rested last this was ${percent} % of the picture (RMS). ${THEN}`,
+  };
+}
 
 const SHOWN_AFTER_MS = 300;
 const rough = signal<Exclude<Fidelity, "exact"> | null>(null);
@@ -52,6 +61,6 @@ effect(() => {
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
   const isMoving = moves.value && rough.value === "approximate";
-  const ofPicture = rough.value === null ? [] : [isMoving ? MOVING : MARKS[rough.value]];
+  const ofPicture = rough.value === null ? [] : [isMoving ? movingMark() : MARKS[rough.value]];
   return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
 }

@@ -131,6 +131,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
         kind="picture",
         alpha=alpha is not None,
         eye=request.shown_eye,
+        was_off=advance.was_off,
         ms=times(wait_ms, update_ms, encode_ms),
     )
     return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
