@@ -20,7 +20,8 @@ _TRUTHS = (*_IMAGES, "reference")
 _BAKES = ("methods.registry", "scene.archive", "store.fill")
 _AFTER_BAKES = (  # methods import these to open what was baked
     "operators", "picture", "project",
-    "methods.cell_light", "methods.local_lights", "methods.reflected", "methods.thinned", "methods.transfer",
+    "methods.cell_light", "methods.local_lights", "methods.moving_views", "methods.reflected", "methods.thinned",
+    "methods.transfer",
 )  # fmt: skip
 
 

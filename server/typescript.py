@@ -50,6 +50,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     *CLIENT_MESSAGES,
     bodies.BakeRequest,
     renders.RenderRequest,
+    bodies.InOutRequest,
     bodies.TruthRequest,
     bodies.ShareRequest,
 )
@@ -63,6 +64,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     cameras.PlaceBody,
     bodies.BuiltInBody,
     bodies.ModelBody,
+    bodies.InOutBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,

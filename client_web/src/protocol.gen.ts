@@ -83,6 +83,11 @@ export interface FocusMessage {
   view: string;
 }
 
+/** Terms as they stand in a look. */
+export interface InOutRequest {
+  terms: Record<string, unknown>[];
+}
+
 /** One operation of a JSON Patch (RFC 6902) on the look. */
 export interface PatchOperation {
   op: "replace" | "add" | "remove" | "test";
@@ -313,6 +318,14 @@ export interface HelloMessage {
   views: ViewInfo[];
   materials: string[];
   resume: string;
+}
+
+/** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
+export interface InOutBody {
+  functions: number;
+  missed: number;
+  needed: number | null;
+  is_mirror: boolean;
 }
 
 /** A saved look in the list of them. */

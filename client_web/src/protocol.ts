@@ -17,6 +17,7 @@ export type {
   FinderBody,
   FrameHeader,
   HelloMessage,
+  InOutBody,
   LookEntry,
   MaterialMapBody,
   ModelBody,

@@ -16,11 +16,11 @@ from relume.light.triangles import TriangleLights
 from relume.memory import Memory
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
+from relume.moving.basis.zernike import NUM_FUNCTIONS
 from relume.moving.light_vectors import light_vectors
+from relume.moving.points.surface import Surface, pattern_of_points, read_surface
 from relume.moving.sky import Sky, sky_of
-from relume.moving.surface import Surface, pattern_of_points, read_surface
 from relume.moving.view import FreeView
-from relume.moving.zernike import NUM_FUNCTIONS
 from relume.picture.light import Light
 from relume.picture.transfer import Axis, Eyes
 from relume.project.receivers import GatherRays, Rays

@@ -4,12 +4,12 @@ What is baked is what `gather` bakes for view samples, for points that no view o
 and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
 points, the cells), then "visibility and gather rays" (rows of cells and of points).
 
-    scene/positions, faces, face_material, uvs, textures, …  what the eye sees: relume.moving.surface
+    scene/positions, faces, face_material, uvs, textures, …  what the eye sees: relume.moving.points.surface
     lights/…                                                 as in relume.methods.sampled_views
     cells/…                                                  as in relume.methods.gather
-    lattice/num_rows, first, node                            relume.moving.lattice.Lattice
-    vertices/normal, point, weight                           relume.moving.vertices.Vertices
-    points/position, normal, tangent, material               relume.moving.lattice.Placed
+    lattice/num_rows, first, node                            relume.moving.points.lattice.Lattice
+    vertices/normal, point, weight                           relume.moving.points.vertices.Vertices
+    points/position, normal, tangent, material               relume.moving.points.lattice.Placed
     points/visibility, points/links                          lights that a point sees, cells that its rays hit
 """
 
@@ -30,10 +30,10 @@ from relume.methods.last_read import LastRead
 from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
 from relume.methods.store_io import read_gather_samples, read_tree
-from relume.moving.lattice import MAX_POINTS, most_nodes, place_points
-from relume.moving.sides import open_sides
-from relume.moving.surface import pattern_of_points, read_surface_points, textures_of
-from relume.moving.vertices import POINTS_A_VERTEX
+from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
+from relume.moving.points.sides import open_sides
+from relume.moving.points.surface import pattern_of_points, read_surface_points, textures_of
+from relume.moving.points.vertices import POINTS_A_VERTEX
 from relume.scene.model import Scene
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.coherent import trace_coherent

@@ -3,7 +3,7 @@
     t_k(x) = ∫ L(x, ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s w_s h_k(ω_s)
 
 where s are light triangles that the point sees, and rays from cells and local lights. Nothing of it knows a BRDF or an
-eye: they multiply it (`relume.moving.out_factors`).
+eye: they multiply it (`relume.moving.basis.out_factors`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.light.triangles import TriangleLights
-from relume.moving.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
+from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
 from relume.project.receivers import Listed, Rays, Receivers

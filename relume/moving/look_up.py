@@ -9,8 +9,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.moving.lattice import node_of
-from relume.moving.surface import Surface
+from relume.moving.points.lattice import node_of
+from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene

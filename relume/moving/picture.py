@@ -12,9 +12,9 @@ from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
+from relume.moving.basis.lobes import Lobes, lobes_of
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
-from relume.moving.lobes import Lobes, lobes_of
 from relume.moving.look_up import Seen, at_vertices, look
 from relume.moving.pixels import Mirrored, combine
 from relume.moving.sky import Sky, fill_sky, turn_of

@@ -9,12 +9,12 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.glints import LEAST_COSINE, row_of
-from relume.moving.lobes import NUM_GROUPS, Lobes
 from relume.moving.look_up import Seen
+from relume.moving.points.surface import Surface
+from relume.moving.points.texels import sample_texture
 from relume.moving.sky import Sky, sky_about
-from relume.moving.surface import Surface
-from relume.moving.texels import sample_texture
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relume.errors import CancelledError, ParameterError, RelumeError
 from relume.look import Look
 from relume.memory import Memory
+from relume.moving.arriving import LightJob
 from relume.moving.picture import MovingPicture
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
@@ -112,9 +113,9 @@ class RestingPicture:
         Raises:
             ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
         """
-        self._moving.set_look(look, hand=hand, solo=solo)
-        if self._still is not None:
+        if self._still is not None:  # first, for it refuses whatever the other does
             self._still.set_look(look, hand=hand, solo=solo)
+        self._moving.set_look(look, hand=hand, solo=solo)
         self._look, self._hand, self._solo = look, hand, solo
         self._num_looks += 1
 
@@ -164,8 +165,10 @@ class RestingPicture:
         """Go on with what a job has made."""
         if isinstance(job, StillJob):
             job.install(made)
-        else:
-            (self._still or self._moving).install(job, made)
+        elif isinstance(job, LightJob):
+            self._moving.install(job, made)
+        elif self._still is not None:  # else it was made for one that is gone
+            self._still.install(job, made)
 
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring what is shown to its look and its eye; a still is shown once it is exact, and from then on."""

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.moving.points.surface import Surface
 from relume.moving.sky import Sky
-from relume.moving.surface import Surface
 from relume.moving.view import FreeView
 from relume.picture.light import Light
 from relume.picture.transfer import Opened

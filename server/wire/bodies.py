@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from relume.look.document import MAX_BOUNCES
+from relume.look.document import MAX_BOUNCES, MAX_TERMS
 from relume.look.model import Show
 from relume.remarks import Effect
 from server.wire.body import Body, Id, Name
@@ -154,6 +154,23 @@ class ModelBody(Body):
     needs_data: bool
     parameters: list[ParameterBody]
     curves: list[CurveBody]
+
+
+class InOutRequest(Body):
+    """Terms as they stand in a look."""
+
+    terms: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_TERMS)]
+
+
+class InOutBody(Body):
+    """How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share
+    of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as
+    a blurred mirror instead."""
+
+    functions: int
+    missed: float
+    needed: int | None
+    is_mirror: bool
 
 
 class MeasuredBody(Body):

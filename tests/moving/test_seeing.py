@@ -11,12 +11,12 @@ from relume.environments.equirect import lookup, turned
 from relume.errors import PlanError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
+from relume.moving.basis.lobes import lobes_of
 from relume.moving.evaluate import send, send_numpy, tables_of
-from relume.moving.lattice import node_of, num_nodes, place_points
-from relume.moving.lobes import lobes_of
 from relume.moving.look_up import at_vertices, look
 from relume.moving.pixels import Mirrored, combine
-from relume.moving.sides import open_sides
+from relume.moving.points.lattice import node_of, num_nodes, place_points
+from relume.moving.points.sides import open_sides
 from relume.moving.sky import fill_sky, turn_of
 from relume.scene.model import Camera
 from relume.store import bake_here

@@ -146,6 +146,19 @@ def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:
     assert client.get(f"/api/bakes/{baked.bake}/views/none/materials.png").status_code == 404
 
 
+def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
+    terms = [{"model": "lambert"}, {"model": "phong", "params": {"exponent": 400.0}}]
+    diffuse, sharp = client.post("/api/models/in-out", json={"terms": terms}).json()
+    assert (diffuse["needed"], diffuse["is_mirror"]) == (1, False)
+    assert (sharp["needed"], sharp["is_mirror"]) == (None, True)
+    assert 0 <= diffuse["missed"] < 0.01 < sharp["missed"] <= 1
+    worded = [{"model": "phong", "params": {"exponent": "x"}}]
+    for bad in ([], [{"model": "nothing"}], worded, [{"model": "lambert"}] * 99):
+        answer = client.post("/api/models/in-out", json={"terms": bad})
+        assert answer.status_code == 422, bad
+        assert len(answer.json()["detail"]) > 10
+
+
 def test_models_are_listed(client: TestClient) -> None:
     models = {model["model"]: model for model in client.get("/api/models").json()}
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]

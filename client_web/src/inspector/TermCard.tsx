@@ -11,6 +11,7 @@ import { modelOf, models } from "../state/scene";
 import { selectedCurve, selectedTerm, selectTerm } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
+import { InMotion } from "./InMotion";
 import { ParamRow } from "./ParamRow";
 import { modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 
@@ -144,6 +145,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             />
           ))}
           {model !== undefined && <Curves model={model} term={term} index={index} />}
+          <InMotion term={term} />
         </>
       )}
     </section>

@@ -5,6 +5,7 @@ import type {
   BuiltInBody,
   DryRunBody,
   EnvironmentBody,
+  InOutBody,
   MaterialBody,
   MaterialMapBody,
   MeasuredBody,
@@ -111,6 +112,11 @@ export async function startBake(body: BakeRequest): Promise<BakeBody> {
 
 export async function cancelBake(id: string): Promise<void> {
   await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+
+/** How terms are sent in views whose eye moves. */
+export async function getInOut(terms: Term[]): Promise<InOutBody[]> {
+  return (await (await request("/api/models/in-out", json("POST", { terms }))).json()) as InOutBody[];
 }
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {

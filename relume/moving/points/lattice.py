@@ -3,7 +3,8 @@
 A face whose longest edge is R spacings long has (R + 1)(R + 2) / 2 nodes, rows parallel to its first edge. Nodes of
 different faces that lie together, look the same way and are of one material are one point, so that light is continuous
 across edges, and a mesh finer than the spacing has fewer points than corners, which then follow from the points about
-them (`relume.moving.vertices`). Each side of a face that can be seen has nodes of its own (`relume.moving.sides`).
+them (`relume.moving.points.vertices`). Each side of a face that can be seen has nodes of its own
+(`relume.moving.points.sides`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import PlanError
-from relume.moving.vertices import Nodes, Vertices, find_vertices, shared_points
+from relume.moving.points.vertices import Nodes, Vertices, find_vertices, shared_points
 from relume.points import Points
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits

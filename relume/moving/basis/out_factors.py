@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.zernike import NUM_FUNCTIONS, in_basis, ladder
+from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -37,11 +37,17 @@ class OutFactors:
 
     Attributes:
         table: (`NUM_ROWS`, columns, 3, K) float32; of one column, for φo = 0, where the term is isotropic.
-        missed: what the K functions miss of the term, cosine-weighted RMS over its own, the mean over θo; in [0, 1].
+        missed_by_degree: what the functions up to each degree miss of the term, cosine-weighted RMS over its own, the
+            mean over θo; in [0, 1].
     """
 
     table: F32
-    missed: float
+    missed_by_degree: tuple[float, ...]
+
+    @property
+    def missed(self) -> float:
+        """What all K functions miss."""
+        return self.missed_by_degree[-1]
 
 
 def cosines() -> F64:
@@ -75,7 +81,7 @@ def out_factors(term_document: Mapping[str, Any]) -> OutFactors:
     white = {**term_document, "color": [1.0, 1.0, 1.0], "texture": None}
     known = _of_white(json.dumps(white, sort_keys=True))
     color = np.asarray(term_document["color"], np.float32)
-    return OutFactors(known.table * color[:, None], known.missed)
+    return OutFactors(known.table * color[:, None], known.missed_by_degree)
 
 
 @lru_cache(maxsize=_MOST_KNOWN)
@@ -100,11 +106,10 @@ def _of_white(term_text: str) -> OutFactors:
         value = eval_brdf(document, wi, wo[row][:, None])  # (columns, directions, 3)
         table[row] = np.einsum("pnc,n,nk->pck", value, weight, functions, optimize=True)
         whole[row] = np.einsum("pnc,n->p", value**2, weight)
-    kept = (table**2).sum(axis=(2, 3))
-    missed = np.sqrt(np.clip(1 - kept / np.maximum(whole, 1e-30), 0, 1))
-    return OutFactors(
-        table.astype(np.float32), float(np.average(missed, weights=np.repeat(cosine[:, None], len(phi), 1)))
-    )
+    kept = np.cumsum((table**2).sum(axis=2), axis=-1)[..., [num_functions(n) - 1 for n in range(DEGREE + 1)]]
+    missed = np.sqrt(np.clip(1 - kept / np.maximum(whole, 1e-30)[..., None], 0, 1)).mean(axis=1)
+    by_degree = np.average(missed, weights=cosine, axis=0)
+    return OutFactors(table.astype(np.float32), tuple(by_degree.tolist()))
 
 
 def _is_isotropic(document: Mapping[str, Any]) -> bool:

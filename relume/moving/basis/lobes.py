@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.out_factors import NUM_ROWS, cosines, out_factors
+from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

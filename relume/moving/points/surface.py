@@ -12,8 +12,8 @@ from relume.bake import StoreReader
 from relume.brdf.albedo import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import Pattern, make_pattern
-from relume.moving.lattice import Lattice, num_nodes
-from relume.moving.vertices import Vertices
+from relume.moving.points.lattice import Lattice, num_nodes
+from relume.moving.points.vertices import Vertices
 from relume.points import Points
 from relume.scene.model import Scene, Texture
 from relume.trace.texture import MipMap

@@ -1,0 +1,1 @@
+"""What a function of direction becomes: the in-basis, out-factors, narrow lobes."""

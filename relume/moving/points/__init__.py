@@ -1,0 +1,1 @@
+"""Points on surfaces: where they are, what a mesh between them takes from them, textures."""

@@ -1,0 +1,44 @@
+"""What people are told of the in-out factorisation of a term."""
+
+import numpy as np
+import pytest
+from test_out_factors import document
+from test_zernike import hemisphere
+
+from relume.brdf.evaluate import eval_brdf
+from relume.moving.basis.in_out import BOUND, in_out
+from relume.moving.basis.out_factors import cosines, out_factors
+from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis, num_functions
+
+
+def test_one_function_is_enough_for_a_diffuse_surface():
+    told = in_out(document("lambert"))
+    assert (told.functions, told.needed, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
+    assert told.missed < 1e-3
+
+
+def test_sharper_highlights_need_more_until_they_are_mirrors():
+    told = [in_out(document("phong", params={"exponent": e})) for e in (1.0, 4.0, 8.0, 300.0)]
+    needed = [one.needed or 1000 for one in told]
+    assert needed == sorted(needed)
+    assert len(set(needed)) > 2
+    assert [one.is_mirror for one in told] == [False, False, False, True]
+    assert told[-1].needed is None
+    missed = [one.missed for one in told]
+    assert missed == sorted(missed)
+
+
+@pytest.mark.parametrize("exponent", [3.0, 15.0])
+def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
+    term = document("blinn_phong", params={"exponent": exponent})
+    wi, weight = hemisphere(64, 128)
+    functions, cosine = in_basis(wi), cosines()
+    missed = out_factors(term).missed_by_degree
+    for degree in (0, 3, 7):
+        basis, left = functions[:, : num_functions(degree)], []
+        for z in cosine:
+            value = eval_brdf(term, wi, np.array([np.sqrt(1 - z * z), 0, z]))[:, 0]
+            fitted = basis @ np.linalg.lstsq(basis * np.sqrt(weight)[:, None], value * np.sqrt(weight), rcond=None)[0]
+            left.append(np.sqrt((weight * (value - fitted) ** 2).sum() / (weight * value**2).sum()))
+        assert missed[degree] == pytest.approx(np.average(left, weights=cosine), abs=0.01)
+    assert in_out(term).needed in (None, *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND))
