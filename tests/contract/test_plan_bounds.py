@@ -66,7 +66,7 @@ def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None
 
 
 @linux
-@pytest.mark.parametrize("make", [large_environment, large_textures])
+@pytest.mark.parametrize("make", [large_environment, pytest.param(large_textures, marks=pytest.mark.slow)])
 def test_what_a_scene_brings_is_planned(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
 

@@ -50,7 +50,11 @@ def num_terms(picture):
     return sum(len(m.terms) for m in picture._images.by_name.values() if m.num_samples)
 
 
-@pytest.mark.parametrize("fields", [{"scale": 3.0}, {"color": [1.0, 0.2, 0.0]}, {"emission": [1, 7, 1]}, {"on": False}])
+OTHERS = {"color": [1.0, 0.2, 0.0]}, {"emission": [1, 7, 1]}
+SLOW = (pytest.param(fields, marks=pytest.mark.slow) for fields in OTHERS)
+
+
+@pytest.mark.parametrize("fields", [{"scale": 3.0}, {"on": False}, *SLOW])
 def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fields):
     lit.set_look(look_with(transfer, changed("Panel", **fields)))
     assert num_made(lit) <= num_terms(lit)

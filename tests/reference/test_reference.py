@@ -103,6 +103,7 @@ def corner_of(albedo):
     return scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=(material,))
 
 
+@pytest.mark.slow
 def test_white_corner_in_a_white_furnace_vanishes() -> None:
     """What a wall hides of the sky it makes good by what it reflects."""
     image = image_of(corner_of(1.0), (16, 16), 2048, reflects=True)  # noise of the mean: 0.4 %

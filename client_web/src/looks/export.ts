@@ -63,7 +63,7 @@ async function finished(what: string, render: RenderBody): Promise<RenderBody | 
     if (!isStopped) state = await getRender(render.id);
   }
   if (isStopped) return null;
-  if (state.state === "failed") throw new Error(`${what} could not be rendered: ${problemText(state.problem)}`);
+  if (state.state === "failed") throw new Error(`The ${what} could not be rendered: ${problemText(state.problem)}`);
   return state;
 }
 
@@ -80,7 +80,7 @@ async function render(what: string, fetchFrom: string, more: Pick<RenderRequest,
   if (id === null || current === null || exporting.value !== null) return;
   await attempt(async () => {
     const looks = [{ ...seenOf(current) }];
-    note(`Rendering on the server${lightLimitWords()}: ${what}…`);
+    note(`Rendering the ${what} on the server${lightLimitWords()}…`);
     const asked = await startRender({ bake: id, view: viewName.value, looks, name: fileStem(), ...more });
     const done = await finished(what, asked);
     if (done !== null) download(`/api/renders/${encodeURIComponent(done.id)}/${fetchFrom}`, "");

@@ -101,6 +101,7 @@ def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_
     expect(start.get_by_text("material 'Wall' is see-through; it is opaque here")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_several_files_are_several_scenes_and_what_is_lacking_is_said(
     start: Page, server: Server, tmp_path: Path
 ) -> None:
