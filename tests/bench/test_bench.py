@@ -21,7 +21,7 @@ FIXED_NAMES = {
 IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
     "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
-    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.surface",
+    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms",
     "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting",
     "bench.in_out",
 ]  # fmt: skip
@@ -29,6 +29,7 @@ LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
     "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights", "bench.memory",
     "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather", "bench.gather_follow",
+    "bench.surface",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = ("accuracy.", "paper.", "truth.", "gather.rmse_", "lights.rmse_", "estimators.", "peer.")

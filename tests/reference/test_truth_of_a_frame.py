@@ -141,7 +141,8 @@ def metals(roughness: float):
     return scene_of(*meshes, camera=camera, environment=sun_and_sky(), materials=materials)
 
 
-@pytest.mark.parametrize("roughness", [0.2, *(pytest.param(value, marks=pytest.mark.slow) for value in (0.05, 0.5))])
+@pytest.mark.slow
+@pytest.mark.parametrize("roughness", [0.05, 0.2, 0.5])
 def test_right_frame_under_a_small_sun_is_not_blamed_and_wrong_ones_are(roughness: float) -> None:
     """A frame of the same brute force, drawn apart and four times as much, against passes of few texels."""
     scene, size = metals(roughness), (40, 30)

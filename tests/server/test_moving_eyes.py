@@ -224,6 +224,24 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
     assert "probe" in answer.json()["detail"]
 
 
+def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClient) -> None:
+    file = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2)).export(file_type="glb")
+    scene = client.post("/api/scenes", files={"scene": ("gone.glb", file)}).json()["id"]
+    request = {"scene": scene, "method": "surface", "size": SIZE, "lights": 50, "points": 500}
+    made = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+    with open_session(client, made["id"]) as session:
+        (view,) = hello(session)["views"]
+        before = shown(session.exact(0))
+        assert client.delete(f"/api/scenes/{scene}").status_code == 204
+        for number, aside in ((1, 0.3), (2, 0.5)):
+            session.send(**eye(view, number, aside))
+            picture = shown(of_eye(session, number))
+            assert np.abs(picture - before).max() > 0.01
+            session.ready("the exact picture from here")  # given up: what it needs is gone
+        session.send(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+        assert session.text("probe")["material"] is not None
+
+
 def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
     found = hello(session)
     (view,) = found["views"]

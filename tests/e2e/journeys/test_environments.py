@@ -46,6 +46,7 @@ def test_another_environment_is_chosen_by_click_and_by_key_and_undone(editor: Ed
     assert changed(before, editor.pixels()) < 0.01
 
 
+@pytest.mark.slow
 def test_a_chosen_file_lights_the_scene(editor: Editor, dusk_file: Path) -> None:
     before = editor.pixels()
     editor.page.get_by_label("Environment file").set_input_files(dusk_file)
