@@ -12,7 +12,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
-TOGETHER = ("gestures", "journeys", "views")  # folders whose tests share what is dear to start: a server, a browser
+TOGETHER = ("gestures", "journeys")  # folders whose tests share what is dear to start: a server, its bake, a browser
 
 
 class _Sharing(LoadScopeScheduling):
