@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from relume.methods.moving_views import MovingViews
     from relume.scene.model import Camera
 
-MAX_FRAMES = 3600
-
 
 def check_frames(output: Path, num: int, resumes: bool) -> None:
     """Raise ParameterError before hours of work where frames could not be written, or others are there."""
+    from server.wire.renders import MAX_FRAMES
+
     if not 1 <= num <= MAX_FRAMES:
         raise ParameterError("--turntable", num, f"1 to {MAX_FRAMES} frames")
     if output.exists() and not output.is_dir():

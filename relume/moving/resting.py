@@ -31,6 +31,25 @@ MakeStill = Callable[[Camera, tuple[int, int], Progress, Cancelled], Transfer]
 TRACING = 0.5  # of what a still tells to be done; the rest is shading
 
 
+def exact_picture(
+    make_still: MakeStill, eye: Eye, look: Look, solo: Solo, memory: Memory, progress: Progress, cancelled: Cancelled
+) -> Picture:
+    """Trace and shade what an eye sees.
+
+    Args:
+        make_still: finds what it sees. eye: camera, and size of its picture. look, solo: that it is shown in.
+        memory: of what is made for the picture. progress: called with about the share done.
+        cancelled: asked now and then.
+    Raises:
+        CancelledError: `cancelled` said so.
+    """
+    transfer = make_still(*eye, lambda share: progress(TRACING * share), cancelled)
+    picture = Picture(transfer, next(iter(transfer.views)), memory)
+    picture.set_look(look, solo=solo)
+    finish(picture, look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
+    return picture
+
+
 @dataclass(frozen=True)
 class StillJob:
     """The exact picture of where an eye rests, made beside the frames; a `relume.picture.jobs.Job`.
@@ -62,15 +81,11 @@ class StillJob:
     def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
         """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
         try:
-            transfer = self.make_still(*self.eye, lambda share: progress(TRACING * share), cancelled)
-            picture = Picture(transfer, next(iter(transfer.views)), self.memory)
-            picture.set_look(self.look, solo=self.solo)
-            finish(picture, self.look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
+            return exact_picture(self.make_still, self.eye, self.look, self.solo, self.memory, progress, cancelled)
         except CancelledError:
             raise
         except RelumeError:  # the scene is gone, or it needs more memory than there is: the moving picture stays
             return None
-        return picture
 
     def install(self, made: Picture | None) -> None:
         """Hand it over."""

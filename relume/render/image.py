@@ -12,6 +12,7 @@ from relume.look import Look
 from relume.methods.moving_views import MovingViews
 from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
+from relume.moving.resting import exact_picture
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.picture import Picture
@@ -52,30 +53,17 @@ def render_image(
         eye = eye or (view.camera, size or (view.width, view.height))
         if stills is None:
             return _moving_image(transfer, view_name, look, eye)
-        still = stills.make(*eye, lambda share: progress(share / 2), cancelled)
-        return _exact(
-            still, next(iter(still.views)), look, lambda share: progress((1 + share) / 2), cancelled, for_display
-        )
+        memory = transfer.memory.passing
+        return _pixels(exact_picture(stills.make, eye, look, None, memory, progress, cancelled), for_display)
     if size is not None and tuple(size) != (view.width, view.height):
         raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
-    return _exact(cast("Transfer", transfer), view_name, look, progress, cancelled, for_display)
-
-
-def _second_half(progress: Progress, share: float) -> None:
-    progress((1 + share) / 2)
-
-
-def _exact(
-    transfer: Transfer,
-    view_name: str,
-    look: Look,
-    progress: Progress,
-    cancelled: Cancelled,
-    for_display: bool,
-) -> NDArray[np.float32]:
-    picture = Picture(transfer, view_name, transfer.memory.passing)
+    picture = Picture(cast("Transfer", transfer), view_name, transfer.memory.passing)
     picture.set_look(look)
     finish(picture, look, progress, cancelled)
+    return _pixels(picture, for_display)
+
+
+def _pixels(picture: Picture, for_display: bool) -> NDArray[np.float32]:
     image, alpha = picture.image(), picture.alpha(for_display=for_display)
     return image if alpha is None else np.dstack([image, alpha])
 
@@ -93,7 +81,7 @@ def render_small(transfer: Opened, view_name: str, look: Look, width: int) -> ND
     step = max(1, view.width // width)
     if isinstance(transfer, MovingViews):
         small = view.width // step, max(1, view.height // step)
-        return _moving_image(transfer, view_name, look, (transfer.views[view_name].camera, small))
+        return _moving_image(transfer, view_name, look, (view.camera, small))
     return render_image(transfer if step < 2 else cast("Transfer", transfer).thinned(view_name, step), view_name, look)
 
 

@@ -37,12 +37,14 @@ def check_animation(request: RenderRequest, transfer: Opened) -> None:
 
 
 def eyes_of(request: RenderRequest, transfer: Opened) -> Sequence[Camera | None]:
-    """Where each frame is seen from; None where the view itself says it. Raises ParameterError for bad cameras."""
+    """Where each frame is seen from; None where it was baked. Raises ParameterError for bad cameras."""
     from relume.moving.paths import along, turntable  # SciPy, which a process that describes its API does without
 
-    if request.path is None:
+    if transfer.eyes is not Eyes.FREE:
         return [None] * request.num_frames
     view = cast("FreeView", transfer.views[request.view])
+    if request.path is None:
+        return [view.camera] * request.num_frames
 
     def placed(eye: CameraFrame) -> Camera:
         return placed_camera(view.name, eye.to_world, eye.yfov).camera

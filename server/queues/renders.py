@@ -15,7 +15,7 @@ from relume.exr.layers import layers_of
 from relume.exr.picture import Progress, export_exr
 from relume.imageio import write_image
 from relume.imageio.shrink import shrink
-from relume.picture.transfer import Axis, Eyes, Opened
+from relume.picture.transfer import Axis, Opened
 from relume.replacing import replacing
 from server.files.downloads import safe_stem
 from server.files.video import write_video
@@ -100,8 +100,7 @@ class RenderQueue(WorkQueue[RenderRequest]):
         if path.exists():
             return
         view = transfer.views[request.view]
-        moved = camera is not None or (transfer.eyes is Eyes.FREE and request.size is not None)
-        eye = (camera or view.camera, request.size or (view.width, view.height)) if moved else None
+        eye = None if camera is None else (camera, request.size or (view.width, view.height))
 
         def render(look: Any, progress: Progress) -> F32:
             image = self._library.render(
