@@ -14,9 +14,13 @@ _MAX_EXPONENT = 31
 RGB9E5_LARGEST = (2**_MANTISSA_BITS - 1) / 2**_MANTISSA_BITS * 2.0 ** (_MAX_EXPONENT - _BIAS)
 
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Y of linear Rec. 709 red, green and blue (ITU-R BT.709-6)."""
+
+
 def luminance(rgb: F32) -> F32:
-    """Y of linear Rec. 709 RGB (ITU-R BT.709-6). (..., 3) -> (...)"""
-    return rgb @ np.array([0.2126, 0.7152, 0.0722], rgb.dtype)
+    """Y of linear Rec. 709 RGB. (..., 3) -> (...)"""
+    return rgb @ np.array(LUMINANCE, rgb.dtype)
 
 
 def srgb_encode(linear: F32) -> F32:

@@ -29,8 +29,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Sharing:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One process more than there are processors: tests of servers and browsers wait as long as they compute."""
-    return (os.cpu_count() or 1) + 1
+    """Two processes more than there are processors: tests of servers and browsers wait as long as they compute."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -46,14 +46,14 @@ def triangles_bytes(scene: Scene) -> int:
     return sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
 
 
-def uv_bytes(scene: Scene) -> int:
-    """Of the store: the corners' places in textures."""
-    return sum(mesh.uvs.nbytes for mesh in scene.meshes)
+def corner_bytes(scene: Scene) -> int:
+    """Of the store: the corners' places in textures, and their tangents in half precision."""
+    return sum(mesh.uvs.nbytes + mesh.tangents.nbytes // 2 for mesh in scene.meshes)
 
 
 def texture_bytes(scene: Scene) -> int:
-    """Of all textures but normals, in half precision."""
-    return sum(texture.pixels.size * 2 for material in scene.materials for texture in material.textures.values())
+    """Of all textures and normal maps, in half precision."""
+    return sum(texture.pixels.size * 2 for texture in _textures(scene))
 
 
 def num_triangles(scene: Scene) -> int:

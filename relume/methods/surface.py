@@ -32,7 +32,7 @@ from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, re
 from relume.methods.store_io import read_gather_samples, read_tree
 from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
 from relume.moving.points.sides import open_sides
-from relume.moving.points.surface import pattern_of_points, read_surface_points, textures_of
+from relume.moving.points.surface import pattern_of_points, read_surface_points, tangents_of, textures_of
 from relume.moving.points.vertices import POINTS_A_VERTEX
 from relume.scene.model import Scene
 from relume.trace.cells import POINTS_A_CELL, choose_cells
@@ -92,7 +92,7 @@ class SurfaceMethod:
             + (4 + _VERTEX_BYTES) * nodes
             + triangles * 10
             + bounds.triangles_bytes(scene)
-            + bounds.uv_bytes(scene)
+            + bounds.corner_bytes(scene)
             + textures
             + bounds.lights_bytes(scene, recipe)
             + (1 << 20),
@@ -151,8 +151,11 @@ class SurfaceMethod:
 
     def _lights(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         geometry = self._views.geometry_of(scene)
-        of_scene = {"scene/uvs": geometry.uvs, **textures_of(scene).arrays}
-        return {**lights_of(scene, recipe), **triangles_of(geometry), **of_scene}
+        of_corners: dict[str, NDArray[Any]] = {
+            "scene/uvs": geometry.uvs,
+            "scene/tangents": tangents_of(scene, geometry),
+        }
+        return {**lights_of(scene, recipe), **triangles_of(geometry), **of_corners, **textures_of(scene).arrays}
 
     def _points(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         geometry = self._views.geometry_of(scene)

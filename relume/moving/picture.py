@@ -13,10 +13,11 @@ from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.basis.lobes import Lobes, lobes_of
+from relume.moving.bumps import towards_light
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices, look
-from relume.moving.pixels import Mirrored, combine
+from relume.moving.pixels import Mirrored, Sent, combine
 from relume.moving.sky import Sky, fill_sky, turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
@@ -154,16 +155,23 @@ class MovingPicture:
         eye = camera.to_world[:3, 3].astype(np.float32)
         materials = self._materials_of(shown)
         light = self._vectors_now(seen)
-        sent = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
+        broad = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
         glances = glance(transfer.surface, transfer.sky_share, light.others, materials.lobes, eye, seen.is_needed)
         mirrored = Mirrored(materials.lobes, *self._sky_now(), at_vertices(transfer.surface, seen.is_seen, glances))
-        sent = at_vertices(transfer.surface, seen.is_seen, sent)
+        sent = Sent(at_vertices(transfer.surface, seen.is_seen, broad), self._towards_light(light, seen))
         emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
         pixel_angle = camera.yfov / height
         out = combine(transfer.surface, seen, pixel_angle, sent, emission, mirrored)
         out *= np.array(gain_of(shown, self._solo), np.float32)
         self._fill_background(shown, seen, out)
         return out.reshape(height, width, 3)
+
+    def _towards_light(self, light: Arriving, seen: Seen) -> F32:
+        """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
+        surface = self._transfer.surface
+        if not len(surface.tangents):
+            return np.empty((0, 3), np.float32)
+        return at_vertices(surface, seen.is_seen, towards_light(surface, light.total, seen.is_needed))
 
     def _fill_background(self, shown: Look, seen: Seen, out: F32) -> None:
         """What is seen past all surfaces; transparent backgrounds are black."""

@@ -1,4 +1,4 @@
-"""From points to pixels: what is sent is interpolated, textures and mirrored light are found for each pixel."""
+"""From points to pixels: what is sent is interpolated; textures, slopes and mirrored light are found for each pixel."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
+from relume.moving.bumps import leaning, shading_ratio, unit
 from relume.moving.glints import LEAST_COSINE, row_of
 from relume.moving.look_up import Seen
-from relume.moving.points.surface import Surface
+from relume.moving.points.surface import NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
 from relume.moving.sky import Sky, sky_about
 from relume.parallel import for_shares
@@ -38,22 +39,28 @@ class Mirrored(NamedTuple):
     glances: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _mirror(mirrored, normals, vertex, weight, directions, p, lobe, light):  # type: ignore[no-untyped-def]
-    """Find what the lobe of pixel p sees. light: written, radiance. (3,)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _share_above(x):  # type: ignore[no-untyped-def]
+    """Approximate the share of a normal distribution above −x."""
+    return np.float32(1) / (np.float32(1) + math.exp(np.float32(-1.702) * max(x, np.float32(-20))))
 
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
+    """Find what the lobe of a pixel sees.
+
+    Args:
+        mirrored, vertex, weight, direction, lobe: see `combine`; of the pixel.
+        outward: of its face, where it is not the way that `n`, its normal, leans.
+        light: written, radiance. (3,)
     Returns:
         A row of the lobe's table and the share of the next, for its albedo.
     """
-    lobes = mirrored.lobes
-    nx = ny = nz = open_sky = np.float32(0)
+    lobes, open_sky = mirrored.lobes, np.float32(0)
     for k in range(3):
-        v, w = vertex[p, k], weight[p, k]
-        nx, ny, nz = nx + w * normals[v, 0], ny + w * normals[v, 1], nz + w * normals[v, 2]
-        open_sky += w * mirrored.glances[v, 0]
-    scale = np.float32(1) / math.sqrt(max(nx * nx + ny * ny + nz * nz, np.float32(1e-20)))
-    nx, ny, nz = scale * nx, scale * ny, scale * nz
-    dx, dy, dz = directions[p, 0], directions[p, 1], directions[p, 2]
+        open_sky += weight[k] * mirrored.glances[vertex[k], 0]
+    nx, ny, nz = n
+    dx, dy, dz = direction[0], direction[1], direction[2]
     facing = -(nx * dx + ny * dy + nz * dz)
     cosine: Any = min(max(facing, LEAST_COSINE), np.float32(1))
     row, share = row_of(cosine)
@@ -62,22 +69,59 @@ def _mirror(mirrored, normals, vertex, weight, directions, p, lobe, light):  # t
     ax, ay, az = dx + facing * nx, dy + facing * ny, dz + facing * nz
     length = math.sqrt(max(ax * ax + ay * ay + az * az, np.float32(1e-20)))
     flat = math.sqrt(max(np.float32(1) - mean * mean, np.float32(0))) / length
-    sky_about(
-        mirrored.sky, mirrored.turn, flat * ax + mean * nx, flat * ay + mean * ny, flat * az + mean * nz, sigma, light
-    )
+    rx, ry, rz = flat * ax + mean * nx, flat * ay + mean * ny, flat * az + mean * nz
+    sky_about(mirrored.sky, mirrored.turn, rx, ry, rz, sigma, light)
+    along = dx * outward[0] + dy * outward[1] + dz * outward[2]
+    away = (rx * outward[0] + ry * outward[1] + rz * outward[2]) * (np.float32(-1) if along > 0 else np.float32(1))
+    # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
+    above = min(_share_above(away / sigma) / _share_above(abs(along) / sigma), np.float32(1))
     for channel in range(3):
         light[channel] *= open_sky * mirrored.gain[channel]
         for k in range(3):
-            light[channel] += weight[p, k] * mirrored.glances[vertex[p, k], 1 + channel]
+            light[channel] += weight[k] * mirrored.glances[vertex[k], 1 + channel]
+        light[channel] *= above
     return row, share
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _blend(values, vertex, weight):  # type: ignore[no-untyped-def]
+    """Interpolate vectors (vertices, 3) of the three vertices about a pixel."""
+    x = y = z = np.float32(0)
+    for k in range(3):
+        v, w = vertex[k], weight[k]
+        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
+    return x, y, z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
+    """Find the place in textures of a place in a triangle."""
+    a, b, c = corners
+    w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
+    return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _lean(textures, texture, place, footprint, tangents, corners, uv, n, outward, is_behind, scratch):  # type: ignore[no-untyped-def]
+    """Look up where the normal n of a pixel leans. outward: of the face. is_behind: its other side is seen."""
+    a, b, c = corners
+    w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
+    side = np.float32(-1) if is_behind else np.float32(1)
+    t = (
+        w0 * tangents[a, 0] + w1 * tangents[b, 0] + w2 * tangents[c, 0],
+        w0 * tangents[a, 1] + w1 * tangents[b, 1] + w2 * tangents[c, 1],
+        w0 * tangents[a, 2] + w1 * tangents[b, 2] + w2 * tangents[c, 2],
+    )
+    out = side * outward[0], side * outward[1], side * outward[2]
+    return leaning(textures, texture, place, footprint, n, t, tangents[a, 3], out, scratch)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _combine(  # type: ignore[no-untyped-def]
-    surface, pixel_angle, hits, directions, vertex, weight, sent, emission, mirrored, start, stop, out
+    surface, pixel_angle, hits, directions, vertex, weight, sent, towards_light, emission, mirrored, start, stop, out
 ):
     """Sum what vertices and lobes send along the rays of pixels [start, stop), and what surfaces emit."""
-    textures, uvs, faces, face_material, face_normal, uv_scale, normals = surface
+    textures, uvs, tangents, faces, face_material, face_normal, uv_scale, normals = surface
     face, uv, distance = hits
     lobes = mirrored.lobes
     texture_value, light = np.empty(3, np.float32), np.empty(3, np.float32)
@@ -85,32 +129,35 @@ def _combine(  # type: ignore[no-untyped-def]
         f = face[p]
         if f < 0:
             continue
-        material = face_material[f]
-        lobe, row, share = lobes.of[material], 0, np.float32(0)
+        material, outward = face_material[f], face_normal[f]
+        corners = faces[f, 0], faces[f, 1], faces[f, 2]
+        lobe, row, share, ratio = lobes.of[material], 0, np.float32(0), np.float32(1)
+        d = directions[p]
+        along = outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2]
+        footprint = distance[p] * pixel_angle * uv_scale[f] / math.sqrt(max(abs(along), _LEAST_SLANT))
+        place = _in_texture(uvs, corners, uv[p])
+        n = unit(_blend(normals, vertex[p], weight[p]))
+        if textures.of_material[material, NORMAL_MAP] >= 0:
+            leant = _lean(
+                textures, textures.of_material[material, NORMAL_MAP], place, footprint, tangents, corners, uv[p],
+                n, outward, along > 0, texture_value,
+            )  # fmt: skip
+            ratio = shading_ratio(_blend(towards_light, vertex[p], weight[p]), n, leant)
+            n = leant
         if lobe >= 0:
-            row, share = _mirror(mirrored, normals, vertex, weight, directions, p, lobe, light)
+            row, share = _mirror(mirrored, vertex[p], weight[p], d, outward, lobe, n, light)
         for channel in range(3):
             out[p, channel] = emission[material, channel]
         for group in range(NUM_GROUPS):
             texture_value[:] = 1
             texture = textures.of_material[material, group - 1] if group else -1
             if texture >= 0:
-                a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-                w0, w1, w2 = np.float32(1) - uv[p, 0] - uv[p, 1], uv[p, 0], uv[p, 1]
-                u = w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0]
-                v = w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
-                cosine = abs(
-                    face_normal[f, 0] * directions[p, 0]
-                    + face_normal[f, 1] * directions[p, 1]
-                    + face_normal[f, 2] * directions[p, 2]
-                )
-                footprint = distance[p] * pixel_angle * uv_scale[f] / math.sqrt(max(cosine, _LEAST_SLANT))
-                sample_texture(textures, texture, u, v, footprint, texture_value)
+                sample_texture(textures, texture, place[0], place[1], footprint, texture_value)
             for channel in range(3):
                 total = np.float32(0)
                 for k in range(3):
                     total += weight[p, k] * sent[vertex[p, k], group, channel]
-                total = max(total, np.float32(0))
+                total = ratio * max(total, np.float32(0))
                 if lobe >= 0:
                     near = lobes.albedo[lobe, row, group, channel]
                     albedo = near + share * (lobes.albedo[lobe, row + 1, group, channel] - near)
@@ -118,11 +165,23 @@ def _combine(  # type: ignore[no-untyped-def]
                 out[p, channel] += texture_value[channel] * total
 
 
+class Sent(NamedTuple):
+    """What vertices send to an eye, and what leaning pixels about them make of it.
+
+    Attributes:
+        broad: radiance, untextured, then by each of `TEXTURES`. (vertices, groups, 3) float32
+        towards_light: from `relume.moving.bumps`; empty where no material has a normal map. (vertices, 3) float32
+    """
+
+    broad: F32
+    towards_light: F32
+
+
 def combine(
     surface: Surface,
     seen: Seen,
     pixel_angle: float,
-    sent: F32,
+    sent: Sent,
     emission: F32,
     mirrored: Mirrored,
 ) -> F32:
@@ -131,21 +190,20 @@ def combine(
     Args:
         surface: that is seen. seen: what pixels see of it.
         pixel_angle: angle that a pixel spans, radians.
-        sent: radiance of every vertex to the eye: untextured, then by each of `TEXTURES`. (vertices, groups, 3) float32
+        sent: by every vertex. mirrored: what lobes send besides.
         emission: radiance of each material's own. (materials, 3) float32
-        mirrored: what lobes send besides.
     Returns:
         (pixels, 3) float32
     """
     out = np.zeros((len(seen.directions), 3), np.float32)
     hits = (seen.hits.face, seen.hits.uv, seen.hits.distance)
     of_surface = (
-        surface.textures, surface.uvs, surface.faces, surface.face_material, surface.face_normal, surface.uv_scale,
-        surface.vertices.normal,
+        surface.textures, surface.uvs, surface.tangents, surface.faces, surface.face_material, surface.face_normal,
+        surface.uv_scale, surface.vertices.normal,
     )  # fmt: skip
     args = (
-        of_surface, np.float32(pixel_angle), hits, seen.directions, seen.vertex, seen.weight, sent,
-        emission, mirrored,
+        of_surface, np.float32(pixel_angle), hits, seen.directions, seen.vertex, seen.weight,
+        *sent, emission, mirrored,
     )  # fmt: skip
     for_shares(lambda start, stop: _combine(*args, start, stop, out), len(out))
     return out

@@ -14,7 +14,7 @@ from relume.methods.registry import METHODS, open_bake
 from relume.moving.basis.lobes import lobes_of
 from relume.moving.evaluate import send, send_numpy, tables_of
 from relume.moving.look_up import at_vertices, look
-from relume.moving.pixels import Mirrored, combine
+from relume.moving.pixels import Mirrored, Sent, combine
 from relume.moving.points.lattice import node_of, num_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import fill_sky, turn_of
@@ -150,7 +150,7 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
         np.zeros(3, np.float32),
         np.zeros((len(sent), 4), np.float32),
     )
-    found = combine(surface, seen, angle, sent, dark, mirrored)
+    found = combine(surface, seen, angle, Sent(sent, np.empty((0, 3), np.float32)), dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured
     for index in textured:

@@ -153,6 +153,7 @@ BOUNDED = {
     "moving/basis/lobes.py",
     "moving/basis/out_factors.py",
     "moving/basis/zernike.py",
+    "moving/bumps.py",
     "operators/nodes.py",
     "picture/light.py",
     "scene/cornell.py",

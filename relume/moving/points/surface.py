@@ -16,12 +16,15 @@ from relume.moving.points.lattice import Lattice, num_nodes
 from relume.moving.points.vertices import Vertices
 from relume.points import Points
 from relume.scene.model import Scene, Texture
+from relume.trace.geometry import Geometry
 from relume.trace.texture import MipMap
 
+F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
 MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
 _WRAPS = ("repeat", "mirror", "clamp")
+NORMAL_MAP = len(TEXTURES)  # its column in `Textures.of_material`
 
 
 class StoredTextures(NamedTuple):
@@ -29,8 +32,8 @@ class StoredTextures(NamedTuple):
 
     Attributes:
         arrays: "textures/<k>", (height, width, 3) float16.
-        described: attributes of the store: which texture each material has in each of `TEXTURES`, −1 for none, and how
-            each texture continues outside.
+        described: attributes of the store: which texture each material has in each of `TEXTURES` and which normal map,
+            −1 for none, and how each texture continues outside.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -41,18 +44,32 @@ def textures_of(scene: Scene) -> StoredTextures:
     """Collect the textures of a scene's materials, each once, at most `MAX_TEXTURE_SIDE` wide and high."""
     known: dict[int, int] = {}
     kept: list[Texture] = []
-    for material in scene.materials:
-        for texture in (material.textures[name] for name in TEXTURES if name in material.textures):
-            if id(texture) not in known:
-                known[id(texture)] = len(kept)
-                kept.append(texture)
-    of_material = [
-        [known[id(material.textures[name])] if name in material.textures else -1 for name in TEXTURES]
-        for material in scene.materials
-    ]
+
+    def number_of(texture: Texture | None) -> int:
+        if texture is None:
+            return -1
+        if id(texture) not in known:
+            known[id(texture)] = len(kept)
+            kept.append(texture)
+        return known[id(texture)]
+
+    described = {
+        "textures": [[number_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
+        "normal_maps": [number_of(m.normal_map) for m in scene.materials],
+    }
     arrays = {f"textures/{k}": _level(texture).astype(np.float16) for k, texture in enumerate(kept)}
     wraps = [[_WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
-    return StoredTextures(arrays, {"textures": of_material, "wraps": wraps})
+    return StoredTextures(arrays, {**described, "wraps": wraps})
+
+
+def tangents_of(scene: Scene, geometry: Geometry) -> F16:
+    """What normal maps of a scene lie along: tangents of the triangles' corners, none where there is no such map.
+
+    Returns:
+        With the sign of the bitangent. (num_vertices or 0, 4)
+    """
+    has_maps = any(material.normal_map is not None for material in scene.materials)
+    return (geometry.tangents if has_maps else geometry.tangents[:0]).astype(np.float16)
 
 
 def _level(texture: Texture) -> F32:
@@ -67,7 +84,8 @@ class Textures(NamedTuple):
         levels: first texel, height, width of each level, finest first. (levels, 3) int64
         first: of each texture, where its levels begin; one more at the end. (textures + 1,) int64
         wraps: how u and v continue: repeat, mirror, clamp. (textures, 2) int64
-        of_material: texture of each material in each of `TEXTURES`, −1 for none. (materials, 2) int64
+        of_material: texture of each material in each of `TEXTURES`, then its normal map, −1 for none.
+            (materials, 3) int64
     """
 
     texels: F32
@@ -85,6 +103,8 @@ class Surface:
         vertices: of the lattice, which follow from points.
         points: that light is kept at. material: of each. (n,) uint16
         uvs: places in textures, of the triangles' corners. (num_vertices, 2) float32
+        tangents: along u, of the same, with the sign of the bitangent; empty where no material has a normal map.
+            (num_vertices, 4) float32
         faces: the triangles. (num_faces, 3) uint32. face_material: of each. (num_faces,) int32
         face_normal: where the corners are counter-clockwise, unit. (num_faces, 3) float32
         uv_scale: side in textures of a square metre of each. (num_faces,) float32
@@ -95,6 +115,7 @@ class Surface:
     points: Points
     material: NDArray[np.uint16]
     uvs: F32
+    tangents: F32
     faces: NDArray[np.uint32]
     face_material: NDArray[np.int32]
     face_normal: F32
@@ -134,6 +155,9 @@ def read_surface(store: StoreReader) -> Surface:
         *_read_faces(store),
         _read_textures(store),
     )
+    has_maps = bool((surface.textures.of_material[:, NORMAL_MAP] >= 0).any())
+    if has_maps and len(surface.tangents) != len(surface.uvs):
+        raise ChunkDamagedError("scene/tangents", "there are normal maps, and corners without a tangent")
     num_points, num_materials = surface.points.num_points, len(store.attributes["materials"])
     ends = lattice.first.astype(np.int64) + num_nodes(lattice.num_rows)
     fits = lattice.num_rows.shape == lattice.first.shape == (len(surface.face_material), 2)
@@ -146,9 +170,10 @@ def read_surface(store: StoreReader) -> Surface:
     return surface
 
 
-def _read_faces(store: StoreReader) -> tuple[F32, NDArray[np.uint32], NDArray[np.int32], F32, F32]:
+def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArray[np.int32], F32, F32]:
     """The fields `uvs` to `uv_scale` of `Surface`."""
     positions, faces, uvs = (store.read(f"scene/{name}") for name in ("positions", "faces", "uvs"))
+    tangents = store.read("scene/tangents").astype(np.float32)
     if int(faces.max(initial=0)) >= min(len(positions), len(uvs)):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner that the scene has not")
     a, b, c = positions[faces].transpose(1, 0, 2)
@@ -157,12 +182,13 @@ def _read_faces(store: StoreReader) -> tuple[F32, NDArray[np.uint32], NDArray[np
     (du_0, dv_0), (du_1, dv_1) = (uvs[faces][:, k].T - uvs[faces][:, 0].T for k in (1, 2))
     uv_scale = np.sqrt(np.abs(du_0 * dv_1 - dv_0 * du_1) / twice_area)
     face_normal = (normal / twice_area[:, None]).astype(np.float32)
-    return uvs, faces, store.read("scene/face_material"), face_normal, uv_scale.astype(np.float32)
+    return uvs, tangents, faces, store.read("scene/face_material"), face_normal, uv_scale.astype(np.float32)
 
 
 def _read_textures(store: StoreReader) -> Textures:
     try:
-        of_material = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
+        of_channels = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
+        of_material = np.column_stack([of_channels, np.array(store.attributes["normal_maps"], np.int64)])
         wraps = np.array(store.attributes["wraps"], np.int64).reshape(-1, 2)
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error

@@ -1,0 +1,136 @@
+"""Normal maps where the eye moves: how what points send changes as the normal of a pixel leans away from theirs.
+
+A surface that leans by little sees the same lights under other cosines,
+
+    E(n') = Σ_s w_s n'·ω_s = n' · D,   D = Σ_s w_s ω_s
+
+exact where no light lies between the two horizons. The tangential parts of D are integrals of the light times x and y;
+against light vectors, which hold the cosine already, those of x / z and y / z, expanded in the in-basis. What is
+broad is multiplied by n'·D / n·D, of D's luminance; what is narrow looks along the leaning normal itself.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.color import LUMINANCE
+from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis
+from relume.moving.points.surface import Surface
+from relume.moving.points.texels import sample_texture
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NODES = 64  # of quadrature along each of θ and φ: exact for what is expanded
+_MOST = np.float32(4)  # times: a slope that the light grazes is not blown up
+_LEAST = np.float32(1e-12)
+
+
+@lru_cache(maxsize=1)
+def expansions() -> F32:
+    """Expand x / z, y / z and 1: their inner products with light vectors are D in the local frame. (3, K) float32"""
+    place, weight = np.polynomial.legendre.leggauss(_NODES)
+    theta, phi = (place + 1) * np.pi / 4, np.arange(_NODES) * 2 * np.pi / _NODES
+    around = np.stack([np.cos(phi), np.sin(phi), np.ones(_NODES)])
+    wi = np.sin(theta)[:, None, None] * around.T
+    wi[..., 2] = np.cos(theta)[:, None]
+    # h is expanded under dx dy = cos θ dω, so that x / z leaves x dω
+    solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NODES)
+    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, in_basis(wi), solid_angle), np.float32)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _lean(expanded, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
+    """Find D of points [start, stop)."""
+    for p in range(start, stop):
+        if not is_needed[p]:
+            continue
+        x = y = z = np.float32(0)
+        for channel in range(3):
+            for k in range(vectors.shape[2]):
+                value = luminance[channel] * vectors[p, channel, k]
+                x, y, z = x + expanded[0, k] * value, y + expanded[1, k] * value, z + expanded[2, k] * value
+        n, t = normal[p], tangent[p]
+        out[p, 0] = x * t[0] + y * (n[1] * t[2] - n[2] * t[1]) + z * n[0]
+        out[p, 1] = x * t[1] + y * (n[2] * t[0] - n[0] * t[2]) + z * n[1]
+        out[p, 2] = x * t[2] + y * (n[0] * t[1] - n[1] * t[0]) + z * n[2]
+
+
+def towards_light(surface: Surface, vectors: F32, is_needed: NDArray[np.uint8]) -> F32:
+    """Find where light comes from at points: D, its length their irradiance where it comes from one side.
+
+    Args:
+        surface: whose points. vectors: t of each. (points, 3, K) float32
+        is_needed: points that are asked; the others get nothing. (points,) uint8
+    Returns:
+        World space, luminance. (points, 3) float32
+    """
+    out = np.zeros((len(vectors), 3), np.float32)
+    points = surface.points
+    args = (expansions(), np.array(LUMINANCE, np.float32), points.normal, points.tangent, vectors, is_needed)
+    for_shares(lambda start, stop: _lean(*args, start, stop, out), len(vectors))
+    return out
+
+
+def towards_light_numpy(surface: Surface, vectors: F32, point: int) -> F64:
+    """Do as `towards_light` for one point, in plain NumPy: its oracle.
+
+    Args:
+        surface, vectors: as there. point: number of the point.
+    Returns:
+        (3,) float64
+    """
+    n, t = (getattr(surface.points, name)[point].astype(np.float64) for name in ("normal", "tangent"))
+    luminous = np.asarray(LUMINANCE) @ vectors[point].astype(np.float64)
+    assert luminous.shape == (NUM_FUNCTIONS,)
+    return np.asarray((expansions().astype(np.float64) @ luminous) @ np.stack([t, np.cross(n, t), n]))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def unit(vector):  # type: ignore[no-untyped-def]
+    """Scale a vector, a tuple of three, to length one."""
+    x, y, z = vector
+    scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, _LEAST))
+    return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def leaning(textures, texture, place, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
+    """Look up where a normal map turns a normal; see `relume.trace.surface`, which does so for fixed views.
+
+    Args:
+        textures: all of them. texture: number of the map. place, footprint: u and v, and see `sample_texture`.
+        n: the normal, unit. t: tangent, not yet across it. handedness: of the bitangent; its sign counts.
+        outward: the face's normal on the side that is seen. scratch: (3,)
+    Returns:
+        The unit normal; n itself where the map leans it below the face.
+    """
+    sample_texture(textures, texture, place[0], place[1], footprint, scratch)
+    along: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
+    tx, ty, tz = unit((t[0] - along * n[0], t[1] - along * n[1], t[2] - along * n[2]))
+    sign = np.float32(-1) if handedness < 0 else np.float32(1)
+    bx, by, bz = n[1] * tz - n[2] * ty, n[2] * tx - n[0] * tz, n[0] * ty - n[1] * tx
+    a, b, c = scratch[0], sign * scratch[1], scratch[2]
+    x, y, z = unit((a * tx + b * bx + c * n[0], a * ty + b * by + c * n[1], a * tz + b * bz + c * n[2]))
+    if x * outward[0] + y * outward[1] + z * outward[2] <= 0:
+        return n[0], n[1], n[2]
+    return x, y, z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def shading_ratio(light, n, leant):  # type: ignore[no-untyped-def]
+    """Compute n'·D / n·D, bounded.
+
+    Args:
+        light: D, a tuple of three. n: the surface's normal. leant: n', where it leans to.
+    """
+    before: Any = light[0] * n[0] + light[1] * n[1] + light[2] * n[2]
+    after: Any = light[0] * leant[0] + light[1] * leant[1] + light[2] * leant[2]
+    return min(max(after, np.float32(0)) / max(before, _LEAST), _MOST)

@@ -1,0 +1,83 @@
+"""Normal maps in moving pictures, against pictures of fixed views, whose every sample is lit along its own normal."""
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, quad, scene_of, studio
+
+from relume.bake import Recipe
+from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis
+from relume.moving.bumps import expansions, towards_light, towards_light_numpy
+from relume.render.image import render_image
+from relume.scene.model import Material, Texture
+from relume.store import bake_here
+
+WAVES = 4
+LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
+METAL = ({"model": "ggx", "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.25}},)
+CAMERA = looking("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
+SIZE = (96, 72)
+
+
+def waves(size=128, slope=0.35, wrap=("repeat", "repeat")):
+    """Normals of a surface that rises and falls along u, and half as much along v."""
+    v, u = np.mgrid[:size, :size] * 2 * np.pi * WAVES / size
+    normals = np.stack([slope * np.sin(u), 0.5 * slope * np.cos(v), np.ones_like(u)], axis=-1)
+    return Texture((normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32), wrap)
+
+
+def floor(terms, normal_map):
+    material = Material("Floor", terms, normal_map=normal_map)
+    ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    return scene_of(ground, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
+
+
+def picture_of(scene, method, folder):
+    recipe = Recipe(method, ("front",), SIZE, 2000, num_points=3000)
+    opened = open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return render_image(opened, "front", validate(complete({}, opened.default_look), opened.default_look))
+
+
+def error(found, expected):
+    """Relative to what is expected, root mean square."""
+    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+
+
+@pytest.mark.parametrize(("terms", "at_most"), [(LAMBERT, 0.02), (METAL, 0.04)], ids=["broad", "narrow"])
+def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
+    """And not as flat ones are: what the map does to the picture is several times what is left."""
+    bumpy, flat = floor(terms, waves()), floor(terms, None)
+    expected = picture_of(bumpy, "direct", tmp_path)
+    found = error(picture_of(bumpy, "surface", tmp_path), expected)
+    ignored = error(picture_of(flat, "surface", tmp_path / "flat"), expected)
+    assert found < at_most
+    assert ignored > 4 * found
+
+
+def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
+    """D is the sum of w ω: of lights well above the horizon, about what the expansion holds."""
+    rng = np.random.default_rng(4)
+    wi = rng.normal(size=(400, 3)) * [0.5, 0.5, 0.2] + [0, 0, 1]
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    vectors = np.einsum("s,sk->k", wi[:, 2], in_basis(wi)) / len(wi)
+    np.testing.assert_allclose(expansions() @ vectors, wi.mean(axis=0), atol=0.03)
+
+
+def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
+    scene = floor(LAMBERT, waves())
+    recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
+    surface = open_bake(bake_here(METHODS["surface"], scene, recipe, tmp_path / "s.zarr"), Memory(1 << 30)).surface
+    num = surface.points.num_points
+    vectors = np.random.default_rng(1).normal(size=(num, 3, NUM_FUNCTIONS)).astype(np.float32)
+    is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
+    found = towards_light(surface, vectors, is_needed)
+    expected = np.array([towards_light_numpy(surface, vectors, point) for point in range(num)])
+    np.testing.assert_allclose(found, expected * is_needed[:, None], atol=1e-4)
+
+
+def test_scenes_without_normal_maps_keep_no_tangents(tmp_path):
+    recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
+    store = bake_here(METHODS["surface"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
+    assert open_bake(store, Memory(1 << 30)).surface.tangents.shape == (0, 4)
