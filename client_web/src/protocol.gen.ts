@@ -88,6 +88,14 @@ export interface InOutRequest {
   terms: Record<string, unknown>[];
 }
 
+/** Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is between goes from one to the next. `between`: from parameter to parameter, or across the material map (GET /api/materials/map) where both are of its kind. */
+export interface Keyframes {
+  bake: string;
+  looks: Record<string, unknown>[];
+  frames?: number | null;
+  between?: "parameters" | "map";
+}
+
 /** One operation of a JSON Patch (RFC 6902) on the look. */
 export interface PatchOperation {
   op: "replace" | "add" | "remove" | "test";
@@ -103,18 +111,19 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares, what is between them going from one to the next. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
-  view: string;
   looks: Record<string, unknown>[];
+  frames?: number | null;
+  between?: "parameters" | "map";
+  view: string;
   format: "exr" | "png" | "webp" | "mp4";
   size?: [number, number] | null;
   name?: string | null;
   layers?: boolean;
   precision?: "half" | "float";
   path?: Turntable | EyePath | null;
-  frames?: number | null;
   fps?: number;
   exact?: boolean;
 }
@@ -334,6 +343,11 @@ export interface LookEntry {
   etag: string;
   modified: string;
   bytes: number;
+}
+
+/** The complete look of each frame. */
+export interface LooksBody {
+  looks: Record<string, unknown>[];
 }
 
 /** A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry. */

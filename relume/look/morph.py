@@ -1,29 +1,55 @@
 """Looks between looks: what an animation shows from one keyframe to the next.
 
 Numbers go evenly from one value to the other, parameters whose sliders are logarithmic evenly in their logarithm. What
-has nothing between, as a model, a map or a light that only one look has, changes half way.
+has nothing between, as a model, a map or a light that only one look has, changes half way. Across the navigation map
+(Sun 2007, 4.2) materials of its kind go through those that lie between them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from relume.brdf.registry import TERMS
 
+Way = Literal["parameters", "map"]
 
-def morph(looks: Sequence[Mapping[str, Any]], share: float) -> Mapping[str, Any]:
+
+def neighbours(num_looks: int, share: float) -> tuple[int, int, float]:
+    """Find the two of some looks, at even distances, that a share of the way through them lies between.
+
+    Args:
+        num_looks: at least one. share: 0 for the first, 1 for the last.
+    Returns:
+        Their places, the same where it lies on one of them, and the share of the way from the one to the other.
+    """
+    at = share * (num_looks - 1)
+    first = min(int(at), num_looks - 1)
+    part = at - first
+    return (first, first, 0.0) if part == 0 else (first, first + 1, part)
+
+
+def morph(looks: Sequence[Mapping[str, Any]], share: float, way: Way = "parameters") -> Mapping[str, Any]:
     """The look at a share of the way through some.
 
     Args:
         looks: complete documents, at least one, at even distances. share: 0 for the first, 1 for the last.
+        way: of materials: from parameter to parameter, or across the navigation map where both are of its kind.
     """
-    at = share * (len(looks) - 1)
-    first = min(int(at), len(looks) - 1)
-    if first == len(looks) - 1 or at == first:
+    first, second, part = neighbours(len(looks), share)
+    if first == second:
         return looks[first]
-    found: Mapping[str, Any] = _between(looks[first], looks[first + 1], at - first)
+    one, other = looks[first], looks[second]
+    found: Mapping[str, Any] = _between(one, other, part)
+    if way == "map":
+        from relume.look.library.way import across_map  # SciPy, which a process that describes its API does without
+
+        for name, material in found["materials"].items():
+            ends = [look["materials"].get(name) for look in (one, other)]
+            if None not in ends and ends[0] != ends[1]:
+                between = across_map(ends[0]["terms"], ends[1]["terms"], material["terms"], part)
+                found["materials"][name] = {**material, "terms": between}
     return found
 
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, cast
 
 from relume import look as looks
 from relume.errors import ParameterError
-from relume.look.morph import morph
+from relume.look import Look
+from relume.look.morph import morph, neighbours
 from relume.picture.transfer import Eyes, Opened
 from relume.scene.placed_camera import placed_camera
 from server.wire.cameras import CameraFrame
-from server.wire.renders import RenderRequest, Turntable
+from server.wire.renders import Keyframes, RenderRequest, Turntable
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
@@ -30,9 +31,8 @@ def check_animation(request: RenderRequest, transfer: Opened) -> None:
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
     num_eyes = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
-    for name, keys in (("looks", len(request.looks)), ("path/eyes", num_eyes)):
-        if keys > num:
-            raise ParameterError(name, f"{keys} keyframes", f"at most as many as frames, {num}")
+    if num_eyes > num:
+        raise ParameterError("path/eyes", f"{num_eyes} keyframes", f"at most as many as frames, {num}")
     eyes_of(request, transfer)
 
 
@@ -55,9 +55,15 @@ def eyes_of(request: RenderRequest, transfer: Opened) -> Sequence[Camera | None]
     return along([placed(eye) for eye in request.path.eyes], request.num_frames)
 
 
-def look_of(request: RenderRequest, default: Mapping[str, Any], index: int) -> Any:
+def look_of(request: Keyframes, default: Mapping[str, Any], index: int) -> Look:
     """The look of a frame, validated: one of the batch's, or between two of them."""
+    return looks.validate(document_of(request, default, index), default)
+
+
+def document_of(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
+    """The complete look of a frame; only those that it lies between are completed."""
     if len(request.looks) == request.num_frames:
-        return looks.validate(request.looks[index], default)
+        return looks.complete(request.looks[index], default)
     share = index / max(1, request.num_frames - 1)
-    return looks.validate(morph([looks.complete(partial, default) for partial in request.looks], share), default)
+    first, second, part = neighbours(len(request.looks), share)
+    return morph([looks.complete(request.looks[k], default) for k in (first, second)], part, request.between)

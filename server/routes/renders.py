@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
@@ -13,17 +14,19 @@ from relume.errors import NotFoundError, ParameterError
 from relume.picture.transfer import Eyes, Opened
 from server.errors import NotReadyError
 from server.files.video import check_encoder
-from server.queues.animation import check_animation
+from server.queues.animation import check_animation, document_of
 from server.queues.renders import Render
 from server.routes.bakes import ready_bake
 from server.services import Shared
 from server.wire.body import MAX_NAME, Id
 from server.wire.protocol import MAX_EYE_PIXELS
-from server.wire.renders import MAX_FRAMES, RenderBody, RenderRequest
+from server.wire.renders import MAX_FRAMES, Keyframes, LooksBody, RenderBody, RenderRequest
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
 MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
+MAX_PLAYED = 600  # frames whose looks are told at once
+MAX_PLAYED_BYTES = 16 << 20
 
 
 @router.post("", status_code=202)
@@ -38,6 +41,35 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
     identity = await run_in_threadpool(services.renders.submit, request)
     response.headers["Location"] = f"/api/renders/{identity}"
     return _body(await run_in_threadpool(services.renders.get, identity))
+
+
+@router.post("/looks")
+async def frame_looks(request: Keyframes, services: Shared) -> LooksBody:
+    """What each frame of a batch with these keyframes shows: an editor plays them as they will be rendered."""
+    if request.num_frames > MAX_PLAYED:
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_PLAYED} to be looked at")
+    await run_in_threadpool(ready_bake, services, request.bake)
+    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        return await run_in_threadpool(_frame_looks, request, transfer)
+
+
+def _frame_looks(request: Keyframes, transfer: Opened) -> LooksBody:
+    _check_looks(request, transfer)
+    size, found = 0, []
+    for index in range(request.num_frames):
+        found.append(dict(document_of(request, transfer.default_look, index)))
+        size += len(json.dumps(found[-1]))
+        if size > MAX_PLAYED_BYTES:
+            raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
+    return LooksBody(looks=found)
+
+
+def _check_looks(request: Keyframes, transfer: Opened) -> None:
+    if len(request.looks) > request.num_frames:
+        few = f"at most as many as frames, {request.num_frames}"
+        raise ParameterError("looks", f"{len(request.looks)} keyframes", few)
+    for index, partial in enumerate(request.looks):
+        check_look(partial, transfer, f"/looks/{index}")
 
 
 def baked_view(name: str, transfer: Opened) -> Any:
@@ -68,8 +100,7 @@ def _check(request: RenderRequest, transfer: Opened) -> None:
     elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
-    for index, partial in enumerate(request.looks):
-        check_look(partial, transfer, f"/looks/{index}")
+    _check_looks(request, transfer)
     check_animation(request, transfer)
 
 

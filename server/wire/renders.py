@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from relume.look.morph import Way
 from server.wire.body import Body, Id, Name
 from server.wire.cameras import CameraFrame
 
@@ -30,7 +31,29 @@ class EyePath(Body):
     eyes: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
 
 
-class RenderRequest(Body):
+class Keyframes(Body):
+    """Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is
+    between goes from one to the next. `between`: from parameter to parameter, or across the material map (GET
+    /api/materials/map) where both are of its kind."""
+
+    bake: Id
+    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
+    frames: Frames | None = None
+    between: Way = "parameters"
+
+    @property
+    def num_frames(self) -> int:
+        """How many pictures come of it."""
+        return len(self.looks) if self.frames is None else self.frames
+
+
+class LooksBody(Body):
+    """The complete look of each frame."""
+
+    looks: list[dict[str, Any]]
+
+
+class RenderRequest(Keyframes):
     """A batch of exact pictures; looks may be partial.
 
     `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
@@ -38,20 +61,18 @@ class RenderRequest(Body):
     picture, and `precision` of the values.
 
     Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at
-    even shares, what is between them going from one to the next. `format` "mp4" makes a video of them, `fps` frames a
-    second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner.
+    even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format`
+    "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the
+    eye moves, a hundred times sooner.
     """
 
-    bake: Id
     view: Name
-    looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
     format: ImageFormat | Literal["mp4"]
     size: tuple[Side, Side] | None = None
     name: Name | None = None
     layers: bool = False
     precision: Literal["half", "float"] = "half"
     path: Turntable | EyePath | None = None
-    frames: Frames | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25
     exact: bool = True
 

@@ -1,10 +1,13 @@
 """Looks between looks."""
 
 import copy
+import math
 
+import numpy as np
 import pytest
 
 from relume.look import complete, default_look
+from relume.look.library.navigation import navigation_map
 from relume.look.morph import morph
 from relume.scene.model import Material
 
@@ -67,3 +70,41 @@ def test_drawn_curves_of_as_many_points_go_point_by_point():
     ball(last)[1]["curves"] = {"theta_h": {"points": [[0.0, 3.0], [50.0, 0.0]]}}
     found = ball(morph([complete(first, DEFAULT), complete(last, DEFAULT)], 0.5))[1]["curves"]["theta_h"]["points"]
     assert found == [[0.0, 2.0], [40.0, 0.0]]
+
+
+def of_map(color, f0, sigma):
+    """Terms of the map's kind."""
+    root = math.sqrt(f0)
+    params = {"sigma": sigma, "ior": (1 + root) / (1 - root)}
+    return [
+        {"model": "lambert", "color": [color] * 3},
+        {"model": "cook_torrance", "color": [1.0 - color] * 3, "params": params},
+    ]
+
+
+def test_a_way_across_the_map_goes_through_what_lies_between():
+    """Straight in reflectance and in the logarithm of roughness, from and to materials that are not of the map."""
+    ends = [look(materials={"Ball": {"terms": of_map(*end)}}) for end in ((0.9, 0.02, 0.05), (0.1, 0.5, 0.45))]
+    for share, end in ((0.0, ends[0]), (1.0, ends[1])):
+        assert ball(morph(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
+    nearly = [ball(morph(ends, share, "map")) for share in (1e-9, 1 - 1e-9)]
+    for found, end in zip(nearly, ends, strict=True):
+        np.testing.assert_allclose([t["color"] for t in found], [t["color"] for t in ball(end)], atol=1e-6)
+    between = morph(ends, 0.5, "map")
+    assert complete(between, DEFAULT) == between
+    params = ball(between)[1]["params"]
+    assert params["sigma"] == pytest.approx(0.15)
+    assert ((params["ior"] - 1) / (params["ior"] + 1)) ** 2 == pytest.approx(0.26)
+    passed = navigation_map().at(0.26, 0.15)
+    beside = [
+        np.array([t["color"] for t in ball(end)]) - np.array([t["color"] for t in navigation_map().at(*place)])
+        for end, place in zip(ends, ((0.02, 0.05), (0.5, 0.45)), strict=True)
+    ]
+    expected = np.array([t["color"] for t in passed]) + np.mean(beside, axis=0)
+    np.testing.assert_allclose([t["color"] for t in ball(between)], np.maximum(expected, 0), atol=1e-6)
+
+
+def test_what_is_not_of_the_map_goes_from_parameter_to_parameter():
+    last = copy.deepcopy(look())
+    ball(last)[1]["params"]["exponent"] = 1000.0
+    assert morph([look(), last], 0.3, "map") == morph([look(), last], 0.3)

@@ -143,3 +143,37 @@ def test_a_video_is_made_where_there_is_an_encoder(
     assert answer.headers["content-type"] == "video/mp4"
     assert answer.content[4:8] == b"ftyp"
     assert len(client.get(f"{url}/frames/4").content) > 100
+
+
+def test_looks_of_frames_are_told_as_they_will_be_rendered(
+    client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
+) -> None:
+    keys = {"bake": bake, "looks": [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])], "frames": 5}
+    answer = client.post("/api/renders/looks", json=keys)
+    assert answer.status_code == 200, answer.text
+    looks = answer.json()["looks"]
+    colors = [look["materials"][material]["terms"][0]["color"] for look in looks]
+    np.testing.assert_allclose(colors, [[0.8 - 0.2 * k, 0, 0.2 * k] for k in range(5)], atol=1e-9)
+    small = {"view": view["name"], "size": [20, 15], "exact": False}
+    told = frames_of(client, {"bake": bake, "looks": looks, **small}, tmp_path)
+    rendered = frames_of(client, {**keys, **small}, tmp_path)
+    for one, other in zip(told, rendered, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [
+        ({"frames": 601}, "frames"),
+        ({"frames": 1}, "looks"),
+        ({"looks": [{"materials": {"Nothing": {}}}]}, "/looks/0"),
+        ({"between": "magic"}, "between"),
+        ({"bake": "0" * 16}, "bake"),
+    ],
+)
+def test_looks_of_frames_that_cannot_be_are_refused_in_words(
+    client: TestClient, bake: str, fields: dict[str, Any], word: str
+) -> None:
+    answer = client.post("/api/renders/looks", json={"bake": bake, "looks": [{}, {}], "frames": 3, **fields})
+    assert answer.status_code in (404, 422)
+    assert word in answer.text

@@ -5,8 +5,9 @@ import { Filmstrip } from "../looks/Filmstrip";
 import { Outline } from "../outline/Outline";
 import { take } from "../outline/environments";
 import { useFileDrop } from "../start/useFileDrop";
-import { filmstripOpen, helpOpen } from "../state/panels";
+import { filmstripOpen, helpOpen, timelineOpen } from "../state/panels";
 import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/room";
+import { Timeline } from "../timeline/Timeline";
 import { TruthPanel } from "../truth/TruthPanel";
 import { Splitter } from "../ui/Splitter";
 import { PictureView } from "../viewport/PictureView";
@@ -37,6 +38,7 @@ export function Editor() {
           </aside>
         )}
       </div>
+      {timelineOpen.value && <Timeline />}
       {filmstripOpen.value && <Filmstrip />}
       <StatusBar />
       {helpOpen.value && <Help />}

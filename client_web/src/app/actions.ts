@@ -8,7 +8,8 @@ import { zoomActual, zoomBy, zoomFit } from "../picture/zoom";
 import { toggleSolo } from "../seen/solo";
 import { falseColour, handlesOpen, showBefore, wipe } from "../state/display";
 import { look } from "../state/look";
-import { filmstripOpen, helpOpen, histogramOpen, inspectorOpen, outlineOpen } from "../state/panels";
+import { filmstripOpen, helpOpen, histogramOpen, inspectorOpen, outlineOpen, timelineOpen } from "../state/panels";
+import { togglePlay } from "../timeline/play";
 import { toggleSideBySide } from "../state/views";
 
 export interface Action {
@@ -53,6 +54,8 @@ export const ACTIONS: readonly Action[] = [
   { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: redo },
   { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
   { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
+  { group: "Look", label: "Time line", keys: ["m"], run: () => (timelineOpen.value = !timelineOpen.value) },
+  { group: "Look", label: "Play or pause the time line", keys: ["k"], run: togglePlay },
   { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: markA },
   { group: "Compare", label: "Swap A and B", keys: ["x"], run: swapA },
   { group: "Compare", label: "Wipe between A and B, the live picture", keys: ["w"], run: toggleWipe },

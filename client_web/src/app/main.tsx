@@ -7,6 +7,7 @@ import { followPlace } from "../scene/persistence";
 import { placeFromUrl } from "../scene/url";
 import { StartPage } from "../start/StartPage";
 import { followPanels } from "../state/panels";
+import { followTimeline } from "../looks/keyframes";
 import { followRoom } from "../state/room";
 import { page } from "../state/scene";
 import { Toasts } from "../ui/toasts";
@@ -22,6 +23,7 @@ import "../start/bake.css";
 import "../curve/curve.css";
 import "../library/library.css";
 import "../lights/lights.css";
+import "../timeline/timeline.css";
 import "../truth/truth.css";
 import "./layout.css";
 import "./bars.css";
@@ -42,6 +44,7 @@ function start(): void {
   else if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
   followPanels();
+  followTimeline();
   followRoom();
   followThumbnails();
   // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another

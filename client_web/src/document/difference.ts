@@ -36,7 +36,7 @@ function isCurveTable(path: string): boolean {
 }
 
 function replaceWhole(path: string, from: unknown, to: unknown, patch: PatchOp[]): void {
-  if (JSON.stringify(from) !== JSON.stringify(to)) patch.push({ op: "replace", path, value: to });
+  if (!isSame(from, to)) patch.push({ op: "replace", path, value: to });
 }
 
 /** The operations of a JSON Patch that lead from a look to another. */
@@ -48,7 +48,9 @@ export function differenceOf(from: Look, to: Look): PatchOp[] {
 
 /** Whether two values of a look say the same, in whatever order their members are. */
 export function isSame(a: unknown, b: unknown): boolean {
-  const patch: PatchOp[] = [];
-  walk("", a, b, patch);
-  return patch.length === 0;
+  if (a === b) return true;
+  if (Array.isArray(a) && Array.isArray(b)) return a.length === b.length && a.every((value, k) => isSame(value, b[k]));
+  if (!isObject(a) || !isObject(b)) return false;
+  const keys = Object.keys(a);
+  return keys.length === Object.keys(b).length && keys.every((key) => Object.hasOwn(b, key) && isSame(a[key], b[key]));
 }

@@ -1,4 +1,6 @@
-/** The one way to change the look: an undoable step, and its patch to the server. */
+/** The one way to change the look: an undoable step, and its patch to the server. What is shown in passing, as while looks
+ * play, is no step until somebody keeps it or changes it. */
+import { signal } from "@preact/signals";
 import { changeAt, changeTo, type Change } from "../document/change";
 import type { Look } from "../protocol";
 import { look } from "../state/look";
@@ -28,8 +30,37 @@ export function show(change: Change, held: string | null = null): void {
   listener(change, inputNow());
 }
 
+/** What was there before something was shown in passing, and what a step of it is called; null where nothing is. */
+export const passing = signal<{ before: Look; label: string } | null>(null);
+
+/** Show a look in passing. */
+export function showPassing(label: string, next: Look): void {
+  const current = look.peek();
+  if (current === null) return;
+  passing.value = { before: passing.peek()?.before ?? current, label };
+  const change = changeTo(current, next);
+  if (change.patch.length > 0) show(change);
+}
+
+/** Go back to what was there before. */
+export function leavePassing(): void {
+  const [passed, current] = [passing.peek(), look.peek()];
+  passing.value = null;
+  if (passed !== null && current !== null && current !== passed.before) show(changeTo(current, passed.before));
+}
+
+/** Make what is shown in passing a step. */
+export function keepPassing(): void {
+  const [passed, current] = [passing.peek(), look.peek()];
+  passing.value = null;
+  if (passed === null || current === null || current === passed.before) return;
+  history.record({ of: "look", label: passed.label, ...changeTo(passed.before, current) });
+  history.seal();
+}
+
 function commit(label: string, change: Change, key?: string): void {
   if (change.patch.length === 0) return;
+  keepPassing();
   show(change, key === undefined ? null : heldAt(key, change.after));
   history.record({ of: "look", label, ...(key === undefined ? {} : { key }), ...change });
 }

@@ -25,7 +25,15 @@ export interface ShelfStep {
   after: NamedLook | null;
 }
 
-export type Step = LookStep | ShelfStep;
+/** What became of the looks on the time line. */
+export interface TimelineStep {
+  of: "timeline";
+  label: string;
+  before: readonly NamedLook[];
+  after: readonly NamedLook[];
+}
+
+export type Step = LookStep | ShelfStep | TimelineStep;
 
 /** Makes a step happen again, or undoes it. */
 export type Perform = (step: Step, back: boolean) => void | Promise<void>;
@@ -36,8 +44,8 @@ const IDLE_MS = 800;
 /** Steps that lead from the end of some steps to their beginning; the looks are gone back over in one. */
 function wayBack(steps: readonly Step[], label: string): Step[] {
   const looks = steps.filter((step) => step.of === "look");
-  const shelf = steps.filter((step) => step.of === "shelf").reverse();
-  const back: Step[] = shelf.map(({ before, after }) => ({ of: "shelf", label, before: after, after: before }));
+  const others = steps.filter((step) => step.of !== "look").reverse();
+  const back = others.map((step): Step => ({ ...step, label, before: step.after, after: step.before }) as Step);
   const [first, last] = [looks[0], looks.at(-1)];
   if (first !== undefined && last !== undefined) back.push({ of: "look", label, ...changeTo(last.after, first.before) });
   return back;

@@ -3,7 +3,7 @@
 import { changeBy } from "../document/change";
 import { differenceOf, isSame } from "../document/difference";
 import type { Look, PatchOp } from "../protocol";
-import type { LookStep, ShelfStep, Step } from "./history";
+import type { LookStep, ShelfStep, Step, TimelineStep } from "./history";
 
 export interface Story {
   steps: readonly Step[];
@@ -26,7 +26,7 @@ interface KeptStory {
   /** The first look. */
   start: Look | null;
   picture: string | null;
-  steps: (KeptLookStep | ShelfStep)[];
+  steps: (KeptLookStep | ShelfStep | TimelineStep)[];
   cursor: number;
 }
 

@@ -1,4 +1,5 @@
 /** What each message of a server does to what the editor knows. */
+import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import { problemText } from "../net/api";
 import type { SessionHandlers } from "../net/session";
@@ -51,7 +52,8 @@ function welcome(of: BakeConnection, hello: HelloMessage): void {
 
 /** The server has refused the edit that was made last: what it took before is shown again. */
 function takeBack(of: BakeConnection, lastGood: Look | null): void {
-  history.drop();
+  if (passing.peek() === null) history.drop();
+  passing.value = null;
   if (lastGood === null) return;
   look.value = wholeOf(lastGood);
   want(of, look.value, performance.now());

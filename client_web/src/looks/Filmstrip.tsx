@@ -1,9 +1,11 @@
 /** Saved looks, and the steps of this visit: click one to return to it. */
 import { useEffect, useRef } from "preact/hooks";
+import { isSame } from "../document/difference";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
 import type { Look } from "../protocol";
 import { defaultLook, look } from "../state/look";
+import { timelineOpen } from "../state/panels";
 import { scene } from "../state/scene";
 import { lookThumbnail, thumbnailsMade } from "../state/thumbnails";
 import { IconButton } from "../ui/Button";
@@ -38,7 +40,7 @@ function Picture({ image, text }: { image: string | null; text: string }) {
 function SavedTile({ saved }: { saved: SavedLook }) {
   thumbnailsMade.value;
   const whole = completed(saved.look);
-  const shown = JSON.stringify(whole) === JSON.stringify(look.value);
+  const shown = isSame(whole, look.value);
   return (
     <li class={`tile ${shown ? "shown" : ""}`}>
       <button
@@ -75,7 +77,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
 /** A look that came with the scene's file: to show, to compare with, not to change. */
 function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
   const whole = completed(partial);
-  const shown = JSON.stringify(whole) === JSON.stringify(look.value);
+  const shown = isSame(whole, look.value);
   return (
     <li class={`tile ${shown ? "shown" : ""}`}>
       <button
@@ -177,6 +179,15 @@ export function Filmstrip() {
       >
         <Icon name="plus" />
         Save look
+      </button>
+      <button
+        class="save"
+        aria-expanded={timelineOpen.value}
+        onClick={() => (timelineOpen.value = !timelineOpen.value)}
+        title="Play looks one after another, and render what lies between (M)"
+      >
+        <Icon name="film" />
+        Time line
       </button>
       {defaultLook.value !== null && shelf.value.length > 0 && (
         <ul class="tiles saved" aria-label="Saved looks">

@@ -6,7 +6,7 @@ import { frameOf } from "../cameras/orbit";
 import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
-import type { RenderBody, RenderRequest } from "../protocol";
+import type { Look, RenderBody, RenderRequest } from "../protocol";
 import { lightLimits, lightLimitWords } from "../seen/limits";
 import { seenOf } from "../seen/rendered";
 import { bake } from "../state/bakes";
@@ -68,20 +68,21 @@ async function finished(what: string, render: RenderBody): Promise<RenderBody | 
 }
 
 /** Where the view in hand is seen from, if its eye moves. */
-function eyeNow(): { to_world: number[]; yfov: number } | null {
+export function eyeNow(): { to_world: number[]; yfov: number } | null {
   const eye = eyeOf(viewName.peek());
   if (eye === null) return null;
   return eye.isFirst ? eye.first : frameOf(eye.orbit);
 }
 
-/** Have the server render the look that is seen; `fetchFrom` is the file of the finished batch. */
-async function render(what: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
+/** Have the server render the look that is seen, or others in the same light; `fetchFrom` is the file of the finished batch. */
+export async function render(what: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null || exporting.value !== null) return;
   await attempt(async () => {
-    const looks = [{ ...seenOf(current) }];
+    const looks = (more.looks as Look[] | undefined) ?? [current];
     note(`Rendering the ${what} on the server${lightLimitWords()}…`);
-    const asked = await startRender({ bake: id, view: viewName.value, looks, name: fileStem(), ...more });
+    const seen = looks.map((of) => ({ ...seenOf(of) }));
+    const asked = await startRender({ bake: id, view: viewName.value, name: fileStem(), ...more, looks: seen });
     const done = await finished(what, asked);
     if (done !== null) download(`/api/renders/${encodeURIComponent(done.id)}/${fetchFrom}`, "");
   }).finally(() => (exporting.value = null));

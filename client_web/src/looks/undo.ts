@@ -1,9 +1,10 @@
 /** Undo and redo for buttons and keys: what cannot be undone now is said, and stays to be undone later. */
 import { changeTo, type Change } from "../document/change";
-import { show } from "../edit/edit";
+import { leavePassing, show } from "../edit/edit";
 import { history, type LookStep, type Step } from "../edit/history";
 import { look } from "../state/look";
 import { attempt } from "../ui/toasts";
+import { keyframes } from "./keyframes";
 import { exchange } from "./shelf";
 
 function reversed({ before, after, patch, inverse }: LookStep): Change {
@@ -13,12 +14,16 @@ function reversed({ before, after, patch, inverse }: LookStep): Change {
 /** Make a change of the look that is there: where that is not what the change begins with, because the server refused
  * an edit in between, the way to its end is another. */
 function perform(step: Step, back: boolean): void | Promise<void> {
+  if (step.of === "timeline") return void (keyframes.value = back ? step.before : step.after);
   if (step.of === "shelf") return back ? exchange(step.after, step.before) : exchange(step.before, step.after);
   const change = back ? reversed(step) : step;
   const current = look.peek();
   show(current === null || current === change.before ? change : changeTo(current, change.after));
 }
 
-export const goTo = (count: number) => void attempt(() => history.goTo(count, perform));
+export function goTo(count: number): void {
+  leavePassing();
+  void attempt(() => history.goTo(count, perform));
+}
 export const undo = () => goTo(history.heading - 1);
 export const redo = () => goTo(history.heading + 1);

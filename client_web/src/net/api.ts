@@ -6,6 +6,9 @@ import type {
   DryRunBody,
   EnvironmentBody,
   InOutBody,
+  Keyframes,
+  Look,
+  LooksBody,
   MaterialBody,
   MaterialMapBody,
   MeasuredBody,
@@ -121,6 +124,10 @@ export async function getInOut(terms: Term[]): Promise<InOutBody[]> {
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
+}
+/** The complete look of each frame of an animation. */
+export async function frameLooks(body: Keyframes): Promise<readonly Look[]> {
+  return ((await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody).looks as unknown as Look[];
 }
 export async function deleteRender(id: string): Promise<void> {
   await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });

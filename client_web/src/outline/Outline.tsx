@@ -1,5 +1,6 @@
 /** What is in the scene: materials to select, the lights and the light around them. */
 import { toHex } from "../color/color";
+import { isSame } from "../document/difference";
 import { LightsPanel } from "../lights/LightsPanel";
 import type { MaterialLook } from "../protocol";
 import { solo, toggleMaterialSolo } from "../seen/solo";
@@ -51,8 +52,7 @@ function Materials() {
         const material = look.value?.materials[name];
         const changed =
           look.value !== null &&
-          material !== defaultLook.value?.materials[name] &&
-          JSON.stringify(material) !== JSON.stringify(defaultLook.value?.materials[name]);
+          !isSame(material, defaultLook.value?.materials[name]);
         return (
           <button
             key={name}

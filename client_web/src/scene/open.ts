@@ -1,4 +1,5 @@
 /** Opening a scene: the finest bake there is, or a preview at once and the full bake behind it. */
+import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import { disconnect } from "../live/connections";
 import { getScene, listModels } from "../net/api";
@@ -27,6 +28,7 @@ function reset(to: SceneBody): void {
   stopFollowing();
   stage.clear();
   history.clear();
+  passing.value = null;
   scene.value = to;
   look.value = defaultLook.value = null;
   bake.value = coming.value = method.value = null;

@@ -1,6 +1,7 @@
 /** Where the user is, kept so that a reload comes back to it: scene, bake, views and selection in the URL; look, zoom and
  * history in the tab's own storage. */
 import { effect } from "@preact/signals";
+import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import { fromText, toText } from "../edit/journal";
 import type { Transform } from "../picture/transform";
@@ -62,7 +63,7 @@ function keep(key: string, text: string): void {
 }
 
 export function remember(): void {
-  const [id, current] = [scene.value?.id, look.value];
+  const [id, current] = [scene.value?.id, passing.value?.before ?? look.value];
   if (page.value !== "editor" || id === undefined || current === null) return;
   const kept: Kept = {
     look: current,

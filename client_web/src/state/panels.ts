@@ -3,9 +3,10 @@ import { effect, signal, type Signal } from "@preact/signals";
 
 export const outlineOpen = signal(true);
 export const inspectorOpen = signal(true);
-/** These two are closed again at the next visit. */
+/** These are closed again at the next visit. */
 export const libraryOpen = signal(false);
 export const truthOpen = signal(false);
+export const timelineOpen = signal(false);
 export const filmstripOpen = signal(true);
 export const inspectorWidth = signal(320);
 export const histogramOpen = signal(false);

@@ -1,0 +1,141 @@
+/** The time line: looks shown in passing, keyframes as steps of the history, playing what the server says. */
+import { beforeEach, expect, test, vi } from "vitest";
+import type { Change } from "../src/document/change";
+import { edit, keepPassing, leavePassing, onChange, passing, showPassing } from "../src/edit/edit";
+import { history } from "../src/edit/history";
+import { fromText, toText } from "../src/edit/journal";
+import { addKeyframe, freeKeyframeName, keyframes, loops, moveKeyframe, removeKeyframe, seconds } from "../src/looks/keyframes";
+import { redo, undo } from "../src/looks/undo";
+import { bake } from "../src/state/bakes";
+import { look } from "../src/state/look";
+import { timelineOpen } from "../src/state/panels";
+import { at, frames, numFrames, play, playing, seek } from "../src/timeline/play";
+import { LOOK, lookWith } from "./look";
+
+const EXPOSURE = "/display/exposure";
+const exposure = () => look.value?.display.exposure;
+const [DARK, BRIGHT] = [lookWith(LOOK, EXPOSURE, -2), lookWith(LOOK, EXPOSURE, 2)];
+
+let heard: Change[];
+let ticks: FrameRequestCallback[];
+
+beforeEach(() => {
+  ticks = [];
+  vi.stubGlobal("window", { setTimeout: (run: () => void) => void run() });
+  vi.stubGlobal("requestAnimationFrame", (tick: FrameRequestCallback) => ticks.push(tick));
+  heard = [];
+  timelineOpen.value = false;
+  bake.value = null;
+  passing.value = null;
+  history.clear();
+  keyframes.value = [];
+  look.value = LOOK;
+  onChange((change) => heard.push(change));
+});
+
+async function press(key: () => void): Promise<void> {
+  key();
+  await vi.waitFor(() => expect(history.heading).toBe(history.cursor.value));
+}
+
+/** A time line from dark to bright whose frames the server has told. */
+async function prepared(): Promise<void> {
+  const told = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told })));
+  bake.value = "b";
+  timelineOpen.value = true;
+  addKeyframe({ name: "Dark", look: DARK });
+  addKeyframe({ name: "Bright", look: BRIGHT });
+  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+}
+
+test("what is shown in passing is no step, and is gone from without a trace", () => {
+  showPassing("on the way", DARK);
+  showPassing("on the way", BRIGHT);
+  expect(exposure()).toBe(2);
+  expect(history.steps.value).toEqual([]);
+  leavePassing();
+  expect(look.value).toEqual(LOOK);
+  expect(heard.length).toBe(3);
+  leavePassing();
+  expect(heard.length).toBe(3);
+});
+
+test("kept, it is one step from what was there before", async () => {
+  showPassing("on the way", DARK);
+  showPassing("at 1 s", BRIGHT);
+  keepPassing();
+  expect(history.steps.value.map(({ label }) => label)).toEqual(["at 1 s"]);
+  await press(undo);
+  expect(look.value).toEqual(LOOK);
+  await press(redo);
+  expect(exposure()).toBe(2);
+});
+
+test("an edit keeps what it changes: undo goes back to that, then to before", async () => {
+  showPassing("on the way", DARK);
+  edit("Rotation", "/environment/rotation", 45);
+  expect(passing.value).toBeNull();
+  await press(undo);
+  expect([exposure(), look.value?.environment.rotation]).toEqual([-2, 0]);
+  await press(undo);
+  expect(look.value).toEqual(LOOK);
+});
+
+test("undo first leaves what is shown in passing", async () => {
+  edit("Exposure", EXPOSURE, 1);
+  showPassing("on the way", DARK);
+  await press(undo);
+  expect(look.value).toEqual(LOOK);
+  await press(redo);
+  expect(exposure()).toBe(1);
+});
+
+test("keyframes are put on, moved and taken off in steps that can be undone and outlive a reload", async () => {
+  for (const name of ["a", "b", "c"]) addKeyframe({ name, look: LOOK });
+  const names = () => keyframes.value.map(({ name }) => name).join("");
+  moveKeyframe(2, -1);
+  expect(names()).toBe("acb");
+  moveKeyframe(0, -1);
+  removeKeyframe(0);
+  expect(names()).toBe("cb");
+  for (const shown of ["acb", "abc", "ab"]) {
+    await press(undo);
+    expect(names()).toBe(shown);
+  }
+  const text = toText({ steps: history.steps.value, cursor: history.cursor.value }, 1 << 20, () => null);
+  const kept = fromText(text, LOOK, () => undefined);
+  expect(kept?.steps).toEqual(history.steps.value);
+});
+
+test("keyframes without a name are told apart", () => {
+  addKeyframe({ name: freeKeyframeName(), look: LOOK });
+  addKeyframe({ name: freeKeyframeName(), look: LOOK });
+  removeKeyframe(0);
+  expect(freeKeyframeName()).not.toBe(keyframes.value[0]?.name);
+});
+
+test("a place on the way shows the frame that is nearest, and closing shows what was there", async () => {
+  await prepared();
+  seek(0.25);
+  expect(exposure()).toBeCloseTo(-1, 9);
+  seek(7);
+  expect([at.value, exposure()]).toEqual([1, 2]);
+  timelineOpen.value = false;
+  expect(look.value).toEqual(LOOK);
+});
+
+test.each([true, false])("playing goes on with the clock and %s: again from the beginning", async (again) => {
+  await prepared();
+  loops.value = again;
+  seek(0);
+  play();
+  const start = performance.now();
+  ticks.at(-1)?.(start + 250 * seconds.value);
+  expect(at.value).toBeCloseTo(0.25, 1);
+  ticks.at(-1)?.(start + 1100 * seconds.value);
+  expect(at.value).toBeCloseTo(again ? 0.1 : 1, 1);
+  expect(playing.value).toBe(again);
+  edit("Rotation", "/environment/rotation", 45);
+  expect(playing.value).toBe(false);
+});

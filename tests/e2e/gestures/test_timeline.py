@@ -1,0 +1,58 @@
+"""The time line in a browser: looks put on it, gone through and played twice, kept, closed, found again by a reload."""
+
+from __future__ import annotations
+
+import numpy as np
+from editor_page import Editor, changed
+from playwright.sync_api import expect
+
+SIGMA = "Roughness σ"
+
+
+def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Editor) -> None:
+    page = editor.page
+    editor.choose("Ball", 1)
+    page.keyboard.press("m")
+
+    def sigma() -> str | None:
+        return editor.slider(SIGMA).get_attribute("aria-valuenow")
+
+    sigmas = [sigma()]
+    add = page.get_by_label("Add a look to the time line")
+    add.select_option("live")
+    expect(page.locator(".timeline-hint")).to_have_text("Add one more look.")
+    editor.drag(editor.slider(SIGMA), 0.3, 0.9)
+    add.select_option("live")
+    expect(page.locator(".keyframe")).to_have_count(2)
+    rough = editor.pixels()
+    sigmas.append(sigma())
+    assert sigmas[0] != sigmas[1]
+    time = page.get_by_role("slider", name="Time")
+    for _ in range(2):
+        before = time.get_attribute("aria-valuetext")
+        page.get_by_role("button", name="Play").click()
+        expect(time).not_to_have_attribute("aria-valuetext", before or "")
+        page.get_by_role("button", name="Pause").click()
+    shown = []
+    for place in ("Home", "End", "Home", "End"):
+        time.focus()
+        page.keyboard.press(place)
+        shown.append(editor.pixels())
+    assert changed(shown[0], shown[1]) > 0.005
+    np.testing.assert_array_equal(shown[0], shown[2])
+    assert changed(shown[1], rough) < 0.005
+    page.get_by_role("button", name="Key 1", exact=True).click()
+    assert sigma() == sigmas[0]
+    page.get_by_label("Close the time line").click()
+    expect(page.locator(".timeline")).to_have_count(0)
+    assert sigma() == sigmas[1]
+    page.reload()
+    editor.wait_until_exact()
+    page.keyboard.press("m")
+    expect(page.locator(".keyframe")).to_have_count(2)
+    assert changed(editor.pixels(), rough) < 0.005
+    page.get_by_role("button", name="Key 1", exact=True).click()
+    page.get_by_role("button", name="Keep this look").click()
+    assert changed(editor.pixels(), shown[0]) < 0.005
+    page.keyboard.press("Control+z")
+    assert changed(editor.pixels(), rough) < 0.005
