@@ -23,6 +23,7 @@ from relume.moving.sky import Sky, sky_of
 from relume.moving.view import FreeView
 from relume.picture.light import Light
 from relume.picture.transfer import Axis, Eyes
+from relume.points import Points
 from relume.project.receivers import GatherRays, Rays
 from relume.trace.embree import EmbreeScene
 from relume.views.store_io import read_camera
@@ -146,6 +147,38 @@ class MovingViews:
         out = np.zeros(self.vectors_shape, np.float32)
         out[chosen] = light_vectors(points, self._visible[chosen], lights, rays, _PREVIEW_DEGREE)
         return out
+
+    def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
+        """What white points of a material would send if nothing were in the light's way; of others nothing.
+
+        Args:
+            light: straight from the sky and from lamps, not from surfaces that shine, which are not there.
+            material: whose points. is_preview: of another sky than the baked one, quickly.
+        Returns:
+            (points, 3) float32
+        """
+        rows = np.flatnonzero(self.surface.material == material)
+        points, kept = self.surface.points.rows(rows), self.memory.passing
+        key = self.key, "unhidden light", material
+        sky = kept.keep(
+            (*key, light.environment, is_preview), lambda: self._open_sky(light, points, is_preview=is_preview)
+        )
+        found = sky * np.array(light.environment_gain, np.float32)
+        for lamp, gain in light.local:
+            if lamp.kind != "mesh":
+                one = kept.keep((*key, lamp), lambda lamp=lamp: self.lit.local.unhidden(lamp, points))  # type: ignore[misc]
+                found += np.outer(one, np.array(gain, np.float32) / np.float32(np.pi))
+        out = np.zeros((self.surface.points.num_points, 3), np.float32)
+        out[rows] = found
+        return out
+
+    def _open_sky(self, light: Light, points: Points, *, is_preview: bool) -> F32:
+        """What white points send under the whole sky, of which there are few that differ. (n, 3) float32"""
+        _, first, of_normal = np.unique(points.normal, axis=0, return_index=True, return_inverse=True)
+        lights, receivers = self.lit.open_sky(light, points.rows(first), is_preview=is_preview)
+        # the first function is constant, and its light vector the irradiance
+        constant = light_vectors(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
+        return np.asarray(constant[of_normal.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)
 
     @cached_property
     def _pattern(self) -> Pattern:

@@ -10,20 +10,23 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
+from relume.imageio import to_bytes
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.basis.lobes import Lobes, lobes_of
+from relume.moving.behind import Caught, alpha_of, lay_over, seen_behind
 from relume.moving.bumps import towards_light
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices, look
 from relume.moving.pixels import Mirrored, Sent, combine
-from relume.moving.sky import Sky, fill_sky, turn_of
+from relume.moving.sky import Sky, turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
 from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
+from relume.picture.view_images import documents_of
 from relume.scene.model import Camera
 from relume.views.resolve import encode_pixels
 
@@ -56,6 +59,7 @@ class MovingPicture:
         self._is_rough = False  # what is shown was found quickly
         self._shown: tuple[Any, ...] | None = None
         self._image = np.zeros((view.height, view.width, 3), np.float32)
+        self._hides: F32 | None = None  # how much of what is behind it, where the background is transparent
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, _Materials] | None = None
         self._vectors: tuple[Light, Arriving] | None = None
@@ -162,9 +166,25 @@ class MovingPicture:
         emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
         pixel_angle = camera.yfov / height
         out = combine(transfer.surface, seen, pixel_angle, sent, emission, mirrored)
-        out *= np.array(gain_of(shown, self._solo), np.float32)
-        self._fill_background(shown, seen, out)
+        gain = np.array(gain_of(shown, self._solo), np.float32)
+        out *= gain
+        caught = self._caught(shown, seen)
+        behind = seen_behind(transfer, shown.background, self._now(), gain, seen, caught.is_catcher)
+        is_direct = self._now().paths.direct
+        hides = lay_over(transfer.surface, seen, behind, caught, gain, is_direct=is_direct, out=out)
+        self._hides = hides.reshape(height, width) if shown.background.kind == "transparent" else None
         return out.reshape(height, width, 3)
+
+    def _caught(self, shown: Look, seen: Seen) -> Caught:
+        """What would arrive at catchers if nothing were in the way."""
+        transfer, light = self._transfer, self._now()
+        is_catcher = np.array([shown.materials[name].catcher for name in transfer.material_names])
+        if not is_catcher.any():
+            return Caught(is_catcher, np.empty((0, 3), np.float32))
+        of_points = np.zeros((transfer.surface.points.num_points, 3), np.float32)
+        for material in np.flatnonzero(is_catcher):
+            of_points += transfer.unhidden(light, int(material), is_preview=self._is_rough)
+        return Caught(is_catcher, at_vertices(transfer.surface, seen.is_seen, of_points))
 
     def _towards_light(self, light: Arriving, seen: Seen) -> F32:
         """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
@@ -172,17 +192,6 @@ class MovingPicture:
         if not len(surface.tangents):
             return np.empty((0, 3), np.float32)
         return at_vertices(surface, seen.is_seen, towards_light(surface, light.total, seen.is_needed))
-
-    def _fill_background(self, shown: Look, seen: Seen, out: F32) -> None:
-        """What is seen past all surfaces; transparent backgrounds are black."""
-        background, light = shown.background, self._now()
-        if background.kind == "color":
-            out[seen.hits.face < 0] = np.array(background.color, np.float32)
-        elif background.kind != "transparent" and light.paths.direct:
-            blur = background.blur if background.kind == "blurred" else 0.0
-            gain = np.array(light.environment_gain, np.float32) * np.array(gain_of(shown, self._solo), np.float32)
-            radiance = self._transfer.map_of(light.environment.map, blur)
-            fill_sky(radiance, light.environment.rotation, gain, seen.hits.face, seen.directions, out)
 
     def _now(self) -> Light:
         assert self._light is not None
@@ -196,7 +205,7 @@ class MovingPicture:
         return self._seen[1]
 
     def _materials_of(self, shown: Look) -> _Materials:
-        terms = [[dict(term) for term in shown.materials[name].terms] for name in self._transfer.material_names]
+        terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
         if self._materials is None or self._materials[0] != terms:
             self._materials = terms, _Materials(tables_of(terms), lobes_of(terms))
         return self._materials[1]
@@ -227,8 +236,15 @@ class MovingPicture:
         return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
-        """Moving pictures hide all that is behind them."""
-        return None
+        """How much each pixel of tiles hides of display values behind it; see `Picture.encode_alpha`."""
+        alpha = self.alpha(for_display=True)
+        if alpha is None:
+            return None
+        return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
+
+    def alpha(self, *, for_display: bool) -> F32 | None:
+        """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
+        return None if self._hides is None else alpha_of(self._hides, for_display=for_display)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""

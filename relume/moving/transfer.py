@@ -47,6 +47,14 @@ class MovingTransfer(Opened, Protocol):
         """The same of some points alone, found quickly. (points, 3, K) float32"""
         ...
 
+    def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
+        """What white points of a material would send if nothing were in the light's way. (points, 3) float32
+
+        Args:
+            light: straight from the sky and from lamps. is_preview: of another sky than the baked one, quickly.
+        """
+        ...
+
     def map_of(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
         ...

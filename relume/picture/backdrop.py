@@ -25,6 +25,7 @@ from relume.picture.view_images import ViewImages
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
+MOST_SHARE = 8.0  # times what is behind: where next to nothing but reflected light arrives there is no measure
 _LEAST_GAIN = 1e-12  # what is not the environment's is divided by its gain, which multiplies the finished picture
 
 
@@ -73,7 +74,7 @@ class Backdrop:
             if material.num_samples and look.materials[name].catcher:
                 self._catch(material, shown, light)
             else:
-                material.set_factor(None, None, None)
+                material.set_factor(None, None, None, None)
         if shown == self._shown:
             return False
         self._shown, self.is_transparent = shown, background.kind == "transparent"
@@ -115,7 +116,8 @@ class Backdrop:
             factor = np.divide(behind, unhidden, out=np.zeros_like(unhidden), where=is_lit)
             shows_unlit = shown.is_direct and not is_lit.all()
             unlit = np.where(is_lit, np.float32(0), behind).T if shows_unlit else None
-            material.set_factor((shown, of_light), np.ascontiguousarray(factor.T), unlit)
+            most = np.ascontiguousarray(MOST_SHARE * behind.T, np.float32)
+            material.set_factor((shown, of_light), np.ascontiguousarray(factor.T), most, unlit)
 
     def _unhidden(self, material: MaterialImage, light: Light) -> tuple[Hashable, F32]:
         """What tells a light from others here, and the image in it if nothing stood on the catcher, (n, 3): as rough as

@@ -36,6 +36,7 @@ class MaterialImage:
         self._emission = (0.0, 0.0, 0.0)
         self._shines: F32 | None = None
         self._factor: F32 | None = None
+        self._most: F32 | None = None
         self._unlit: F32 | None = None
         self.factor_key: Hashable = None
         self._is_current = False
@@ -69,15 +70,17 @@ class MaterialImage:
         if self._shines is None:
             self._shines = shines(self.index).astype(np.float32)
 
-    def set_factor(self, key: Hashable, factor: F32 | None, unlit: F32 | None) -> None:
+    def set_factor(self, key: Hashable, factor: F32 | None, most: F32 | None, unlit: F32 | None) -> None:
         """Every sample's finished radiance is multiplied, as on a ground that only catches shadows; None: by one.
 
         Args:
             key: that tells it from others, None for none. factor: (3, n) float32
+            most: that samples become by it. (3, n) float32
             unlit: added to what is multiplied: what samples show without any light. (3, n) float32 or None for nothing
         """
         if key != self.factor_key:
-            self.factor_key, self._factor, self._unlit, self._is_current = key, factor, unlit, False
+            self.factor_key, self._factor, self._most, self._unlit = key, factor, most, unlit
+            self._is_current = False
 
     @property
     def is_caught(self) -> bool:
@@ -96,6 +99,8 @@ class MaterialImage:
         own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:
             own[:] = 0
+        if self._most is not None:
+            np.minimum(own, self._most, out=own)
         if self._unlit is not None:
             own += self._unlit
         if self._shines is not None and any(self._emission):

@@ -52,7 +52,7 @@ def render_image(
     if isinstance(transfer, MovingViews):
         eye = eye or (view.camera, size or (view.width, view.height))
         if stills is None:
-            return _moving_image(transfer, view_name, look, eye)
+            return _pixels(_moving(transfer, view_name, look, eye), for_display)
         memory = transfer.memory.passing
         return _pixels(exact_picture(stills.make, eye, look, None, memory, progress, cancelled), for_display)
     if size is not None and tuple(size) != (view.width, view.height):
@@ -63,7 +63,7 @@ def render_image(
     return _pixels(picture, for_display)
 
 
-def _pixels(picture: Picture, for_display: bool) -> NDArray[np.float32]:
+def _pixels(picture: Picture | MovingPicture, for_display: bool) -> NDArray[np.float32]:
     image, alpha = picture.image(), picture.alpha(for_display=for_display)
     return image if alpha is None else np.dstack([image, alpha])
 
@@ -81,16 +81,14 @@ def render_small(transfer: Opened, view_name: str, look: Look, width: int) -> ND
     step = max(1, view.width // width)
     if isinstance(transfer, MovingViews):
         small = view.width // step, max(1, view.height // step)
-        return _moving_image(transfer, view_name, look, (view.camera, small))
+        return _moving(transfer, view_name, look, (view.camera, small)).image()
     return render_image(transfer if step < 2 else cast("Transfer", transfer).thinned(view_name, step), view_name, look)
 
 
-def _moving_image(
-    transfer: MovingViews, view_name: str, look: Look, eye: tuple[Camera, tuple[int, int]]
-) -> NDArray[np.float32]:
-    """What is seen while the eye moves. (height, width, 3) float32"""
+def _moving(transfer: MovingViews, view_name: str, look: Look, eye: tuple[Camera, tuple[int, int]]) -> MovingPicture:
+    """What is seen while the eye moves."""
     picture = MovingPicture(transfer, view_name)
     picture.set_look(look)
     picture.set_eye(*eye)
     picture.advance(None)
-    return picture.image()
+    return picture

@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from grounds import (
+    CAMERA,
+    CENTRE,
+    POINT,
+    RADIUS,
+    SIZE,
+    background,
+    ball_scene,
+    changes,
+    environment,
+    inner,
+    lamp_alone,
+    plain_ground,
+    shining_ball_alone,
+    show,
+    spot_alone,
+)
 from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from tiny_scenes import quad, scene_of, studio
 
 from relume.color import srgb_encode
 from relume.environments.equirect import lookup, texel_directions, texel_solid_angles, turned
 from relume.imageio import to_bytes
 from relume.light.blur import blurred, reduced
 from relume.memory import Memory
-from relume.picture.backdrop import Backdrop
+from relume.picture.backdrop import MOST_SHARE, Backdrop
 from relume.picture.picture import Picture
 from relume.render.image import render_image
-from relume.scene.ground import with_ground
-from relume.scene.model import Light, Material
-
-SIZE = (40, 30)
-CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
-RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
-SHINING = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
-CAMERA = looking("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
-POINT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
-
-
-def ball_scene(environment):
-    """A red ball, which may shine, above a ground."""
-    ball = sphere("ball", CENTRE, RADIUS, 0, rings=24)
-    scene = scene_of(ball, camera=CAMERA, environment=environment, materials=[RED])
-    return with_ground(replace(scene, lights=(SHINING,)))
+from relume.scene.model import Material
 
 
 @pytest.fixture(scope="module")
@@ -47,35 +47,6 @@ def reflecting(tmp_path_factory):
     return bake_corner(ball_scene(studio()), "gather", tmp_path_factory.mktemp("reflecting"))
 
 
-def background(**fields):
-    return lambda document: document["background"].update(fields)
-
-
-def environment(**fields):
-    return lambda document: document["environment"].update(fields)
-
-
-def show(paths):
-    return lambda document: document["transport"].update(show=paths)
-
-
-def plain_ground(document):
-    document["materials"]["Ground"]["catcher"] = False
-
-
-def changes(*several):
-    def change(document):
-        for one in several:
-            one(document)
-
-    return change
-
-
-def lamp_alone(document):
-    document["environment"]["scale"] = 0.0
-    document["lights"]["Lamp"] = POINT
-
-
 def rendered(transfer, *several):
     return render_image(transfer, "front", look_of(transfer, changes(*several)))
 
@@ -87,13 +58,6 @@ def directions(transfer):
     position[: view.num_surface_samples] -= CAMERA.to_world[:3, 3].astype(np.float32)
     towards = position[view.order[view.first[:-1]]]
     return (towards / np.linalg.norm(towards, axis=1, keepdims=True)).reshape(view.height, view.width, 3)
-
-
-def inner(transfer, name):
-    """Pixels of one sample, of a material (None: of the background). (height, width)"""
-    view = transfer.views["front"]
-    number = 65535 if name is None else list(transfer.material_names).index(name)
-    return (view.material_ids() == number) & (np.diff(view.first) == 1).reshape(view.height, view.width)
 
 
 def ground_points(transfer):
@@ -161,16 +125,6 @@ def test_ground_is_as_dark_as_its_lamp_says(standing):
     np.testing.assert_allclose(shares[miss > 1.03 * RADIUS], 1, rtol=1e-4)
 
 
-def spot_alone(document):
-    document["environment"]["scale"] = 0.0
-    document["lights"]["Lamp"] = {**POINT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
-
-
-def shining_ball_alone(document):
-    document["environment"]["scale"] = 0.0
-    document["lights"]["Ball"]["on"] = True
-
-
 def blue_lamp_alone(document):
     document["environment"]["scale"] = 0.0
     document["lights"]["Lamp"] = {**POINT, "emission": [0.0, 0.0, 5.0]}
@@ -196,6 +150,14 @@ def test_ground_where_no_light_would_fall_shows_what_is_behind(standing):
         composed = np.dstack(image) + (1 - alpha[..., None]) * colour
         np.testing.assert_allclose(composed, expected, rtol=3e-4, atol=1e-5)  # alpha says nothing of shares over one
         assert not rendered(standing, alone, behind, show("further_bounces"))[ground].any()
+
+
+def test_reflected_light_beside_the_rim_of_a_cone_is_held_against_no_less_than_there_is(reflecting):
+    """Else single pixels would shine thousands of times as bright as what is behind."""
+    image = rendered(reflecting, spot_alone, background(kind="color", color=[2.0, 1.0, 0.5]))
+    shares = image[inner(reflecting, "Ground")] / [2.0, 1.0, 0.5]
+    assert shares.max() <= MOST_SHARE * (1 + 1e-5)
+    assert np.median(shares) == pytest.approx(1, abs=0.01)
 
 
 def test_ground_under_a_lamp_of_one_channel_hides_that_channel_alone(standing):

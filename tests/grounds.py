@@ -1,0 +1,71 @@
+"""A ball above a ground that catches its shadow, and the looks in which both are tried."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from tiny_scenes import looking, scene_of, sphere
+
+from relume.scene.ground import with_ground
+from relume.scene.model import Light, Material
+
+SIZE = (40, 30)
+CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
+RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
+SHINING = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
+CAMERA = looking("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
+POINT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
+
+
+def ball_scene(environment):
+    """A red ball, which may shine, above a ground."""
+    ball = sphere("ball", CENTRE, RADIUS, 0, rings=24)
+    scene = scene_of(ball, camera=CAMERA, environment=environment, materials=[RED])
+    return with_ground(replace(scene, lights=(SHINING,)))
+
+
+def background(**fields):
+    return lambda document: document["background"].update(fields)
+
+
+def environment(**fields):
+    return lambda document: document["environment"].update(fields)
+
+
+def show(paths):
+    return lambda document: document["transport"].update(show=paths)
+
+
+def plain_ground(document):
+    document["materials"]["Ground"]["catcher"] = False
+
+
+def changes(*several):
+    def change(document):
+        for one in several:
+            one(document)
+
+    return change
+
+
+def lamp_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Lamp"] = POINT
+
+
+def inner(transfer, name):
+    """Pixels of one sample, of a material (None: of the background). (height, width)"""
+    view = transfer.views["front"]
+    number = 65535 if name is None else list(transfer.material_names).index(name)
+    return (view.material_ids() == number) & (np.diff(view.first) == 1).reshape(view.height, view.width)
+
+
+def spot_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Lamp"] = {**POINT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
+
+
+def shining_ball_alone(document):
+    document["environment"]["scale"] = 0.0
+    document["lights"]["Ball"]["on"] = True
