@@ -191,9 +191,10 @@ class _Scene:
         """Pixels whose neighbours see the same face's plane: no edge of an object. (height, width)"""
         seen = look_around(self.moving.surface, self.moving.embree, self._scene.cameras[0], self.size)
         width, height = self.size
-        face = seen.hits.face.reshape(height, width)
+        num = width * height  # the first rays go through the middles of pixels
+        face = seen.hits.face[:num].reshape(height, width)
         normal = np.where(face[..., None] >= 0, self.moving.surface.face_normal[np.maximum(face, 0)], 0)
-        place = (seen.hits.distance[:, None] * seen.directions).reshape(height, width, 3)
+        place = (seen.hits.distance[:num, None] * seen.directions[:num]).reshape(height, width, 3)
         level = np.einsum("hwc,hwc->hw", normal, np.where(face[..., None] >= 0, place, 0))
         inner = face >= 0
         for axis in (0, 1):

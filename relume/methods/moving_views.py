@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
+from relume.look import LightGeometry
 from relume.memory import Memory
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
@@ -157,16 +158,19 @@ class MovingViews:
         Returns:
             (points, 3) float32
         """
-        rows = np.flatnonzero(self.surface.material == material)
-        points, kept = self.surface.points.rows(rows), self.memory.passing
+        rows, kept = np.flatnonzero(self.surface.material == material), self.memory.passing
         key = self.key, "unhidden light", material
-        sky = kept.keep(
-            (*key, light.environment, is_preview), lambda: self._open_sky(light, points, is_preview=is_preview)
-        )
-        found = sky * np.array(light.environment_gain, np.float32)
+
+        def sky() -> F32:
+            return self._open_sky(light, self.surface.points.rows(rows), is_preview=is_preview)
+
+        def of(lamp: LightGeometry) -> F32:
+            return self.lit.local.unhidden(lamp, self.surface.points.rows(rows))
+
+        found = kept.keep((*key, light.environment, is_preview), sky) * np.array(light.environment_gain, np.float32)
         for lamp, gain in light.local:
             if lamp.kind != "mesh":
-                one = kept.keep((*key, lamp), lambda lamp=lamp: self.lit.local.unhidden(lamp, points))  # type: ignore[misc]
+                one = kept.keep((*key, lamp), lambda lamp=lamp: of(lamp))  # type: ignore[misc]
                 found += np.outer(one, np.array(gain, np.float32) / np.float32(np.pi))
         out = np.zeros((self.surface.points.num_points, 3), np.float32)
         out[rows] = found

@@ -26,6 +26,7 @@ F32 = NDArray[np.float32]
 
 _MOST = np.float32(MOST_SHARE)
 
+
 class Caught(NamedTuple):
     """What catchers compare with.
 
@@ -47,11 +48,11 @@ def seen_behind(
     seen: Seen,
     is_catcher: NDArray[np.bool_],
 ) -> F32:
-    """Find what lies behind, where the background or a catcher is seen. (pixels, 3) float32
+    """Find what lies behind, where the background or a catcher is seen. (rays, 3) float32
 
     Args:
         transfer: of the picture. background, light: of its look. gain: of the finished picture, in each channel. (3,)
-        seen: by the pixels. is_catcher: of every material. (materials,)
+        seen: by the rays. is_catcher: of every material. (materials,)
     """
     num = len(seen.directions)
     if background.kind == "color":
@@ -70,12 +71,12 @@ def lay_over(surface: Surface, seen: Seen, behind: F32, caught: Caught, gain: F3
     """Put surfaces over what is behind them, and shadows of catchers onto it.
 
     Args:
-        surface: that is seen. seen: by the pixels. behind: from `seen_behind`. caught: by catchers.
+        surface: that is seen. seen: by the rays. behind: from `seen_behind`. caught: by catchers.
         gain: that `out` has been multiplied by. (3,) float32
         is_direct: light that comes straight is shown, and with it the background.
-        out: radiance of surfaces, of catchers as white ones; changed to the picture. (pixels, 3) float32
+        out: radiance of surfaces, of catchers as white ones; changed to the picture. (rays, 3) float32
     Returns:
-        How much of the light behind them pixels hide. (pixels,) float32
+        How much of the light behind it is hidden along each ray. (rays,) float32
     """
     hides = np.empty(len(out), np.float32)
     args = (
@@ -91,7 +92,7 @@ def _lay_over(  # type: ignore[no-untyped-def]
     luminance, face, face_material, is_catcher, unhidden, vertex, weight, behind, gain, is_direct, start, stop, out,
     hides,
 ):  # fmt: skip
-    """Do so for pixels [start, stop)."""
+    """Do so for rays [start, stop)."""
     free = np.float32(1) if is_direct else np.float32(0)
     for p in range(start, stop):
         if face[p] < 0:

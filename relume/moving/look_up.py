@@ -9,6 +9,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.moving.edges import POSITIONS, find_edges, rays_an_edge
 from relume.moving.points.lattice import node_of
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
@@ -18,19 +19,23 @@ from relume.trace.primary import Hits, trace_from
 
 F32 = NDArray[np.float32]
 
+_MIDDLE = np.array([[0.5, 0.5]], np.float32)
+
 
 class Seen(NamedTuple):
-    """What the pixels of a picture see, row after row.
+    """What the eye's rays see: one through the middle of each pixel, row after row, then more across edges.
 
     Attributes:
-        hits: of the eye's rays. directions: of these, unit. (n, 3) float32
+        hits: of the rays. directions: of these, unit. (n, 3) float32
+        owner: pixels that those beyond one for each belong to. (m,) int32
         vertex: the three about each hit. (n, 3) uint32. weight: of each; all zero where there are none. (n, 3) float32
-        is_seen: whether any pixel shows a vertex. (vertices,) uint8
+        is_seen: whether any ray meets the surface about a vertex. (vertices,) uint8
         is_needed: whether one that is shown follows from a point. (points,) uint8
     """
 
     hits: Hits
     directions: F32
+    owner: NDArray[np.int32]
     vertex: NDArray[np.uint32]
     weight: F32
     is_seen: NDArray[np.uint8]
@@ -38,15 +43,16 @@ class Seen(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _aim(rotation, half_width, half_height, width, height, start, stop, out):  # type: ignore[no-untyped-def]
-    """Direct the rays through the middles of pixels [start, stop)."""
-    for p in range(start, stop):
-        y, x = p // width, p % width
-        a = (np.float32(2) * (x + np.float32(0.5)) / width - np.float32(1)) * half_width
-        b = (np.float32(1) - np.float32(2) * (y + np.float32(0.5)) / height) * half_height
+def _aim(rotation, half_width, half_height, width, height, pixels, places, start, stop, out):  # type: ignore[no-untyped-def]
+    """Direct rays [start, stop), several in a row through places in one of the pixels."""
+    for r in range(start, stop):
+        pixel, place = pixels[r // places.shape[0]], r % places.shape[0]
+        y, x = pixel // width, pixel % width
+        a = (np.float32(2) * (x + places[place, 0]) / width - np.float32(1)) * half_width
+        b = (np.float32(1) - np.float32(2) * (y + places[place, 1]) / height) * half_height
         scale = np.float32(1) / math.sqrt(a * a + b * b + np.float32(1))
         for axis in range(3):
-            out[p, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
+            out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -97,21 +103,40 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     Args:
         surface: that is seen. embree: its triangles. camera: the eye. size: width and height in pixels.
     """
-    width, height = size
-    num = width * height
-    half_height = np.float32(math.tan(camera.yfov / 2))
-    rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
-    directions = np.empty((num, 3), np.float32)
-    aim = (rotation, np.float32(half_height * width / height), half_height, width, height)
-    for_shares(lambda start, stop: _aim(*aim, start, stop, directions), num)
-    hits = trace_from(embree, camera.to_world[:3, 3].astype(np.float32), directions)
-    vertex, weight = np.zeros((num, 3), np.uint32), np.empty((num, 3), np.float32)
+    num = size[0] * size[1]
+    hits, directions = _trace(embree, camera, size, np.arange(num, dtype=np.int32), _MIDDLE)
+    edges = find_edges(surface, hits, directions, size)
+    more = rays_an_edge(len(edges), num)
+    owner = np.repeat(edges, more)
+    if len(owner):
+        beside, towards = _trace(embree, camera, size, edges, POSITIONS[:more])
+        hits = Hits(
+            np.concatenate([hits.face, beside.face]),
+            np.concatenate([hits.uv, beside.uv]),
+            np.concatenate([hits.distance, beside.distance]),
+        )
+        directions = np.concatenate([directions, towards])
+    num_rays = len(directions)
+    vertex, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
     is_seen = np.zeros(len(surface.vertices.normal), np.uint8)
     args = (surface.lattice, surface.face_normal, hits.face, hits.uv, directions)
-    for_shares(lambda start, stop: _find(*args, start, stop, vertex, weight, is_seen), num)
+    for_shares(lambda start, stop: _find(*args, start, stop, vertex, weight, is_seen), num_rays)
     is_needed = np.zeros(surface.points.num_points, np.uint8)
     _need(surface.vertices, is_seen, is_needed)
-    return Seen(hits, directions, vertex, weight, is_seen, is_needed)
+    return Seen(hits, directions, owner, vertex, weight, is_seen, is_needed)
+
+
+def _trace(
+    embree: EmbreeScene, camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32], places: F32
+) -> tuple[Hits, F32]:
+    """Trace rays through places in pixels, those of one pixel in a row. places: pixel units. (k, 2) float32"""
+    width, height = size
+    half_height = np.float32(math.tan(camera.yfov / 2))
+    rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
+    directions = np.empty((len(pixels) * len(places), 3), np.float32)
+    aim = (rotation, np.float32(half_height * width / height), half_height, width, height, pixels, places)
+    for_shares(lambda start, stop: _aim(*aim, start, stop, directions), len(directions))
+    return trace_from(embree, camera.to_world[:3, 3].astype(np.float32), directions), directions
 
 
 @nb.njit(nogil=True, cache=True)

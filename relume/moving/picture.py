@@ -16,6 +16,7 @@ from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.basis.lobes import Lobes, lobes_of
 from relume.moving.behind import Caught, alpha_of, lay_over, seen_behind
 from relume.moving.bumps import towards_light
+from relume.moving.edges import resolve
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices, look
@@ -39,6 +40,14 @@ class _Materials(NamedTuple):
 
     tables: Tables
     lobes: Lobes
+
+    @property
+    def sends(self) -> NDArray[np.bool_]:
+        """Whether a material sends anything of a group of terms. (materials, groups)"""
+        sends = np.asarray((self.tables.of >= 0).any(axis=2))
+        with_lobe = self.lobes.of >= 0
+        sends[with_lobe] |= np.asarray(self.lobes.albedo.any(axis=(1, 3)))[self.lobes.of[with_lobe]]
+        return sends
 
 
 class MovingPicture:
@@ -162,7 +171,8 @@ class MovingPicture:
         broad = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
         glances = glance(transfer.surface, transfer.sky_share, light.others, materials.lobes, eye, seen.is_needed)
         mirrored = Mirrored(materials.lobes, *self._sky_now(), at_vertices(transfer.surface, seen.is_seen, glances))
-        sent = Sent(at_vertices(transfer.surface, seen.is_seen, broad), self._towards_light(light, seen))
+        broad = at_vertices(transfer.surface, seen.is_seen, broad)
+        sent = Sent(broad, materials.sends, self._towards_light(light, seen))
         emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
         pixel_angle = camera.yfov / height
         out = combine(transfer.surface, seen, pixel_angle, sent, emission, mirrored)
@@ -172,8 +182,9 @@ class MovingPicture:
         behind = seen_behind(transfer, shown.background, self._now(), gain, seen, caught.is_catcher)
         is_direct = self._now().paths.direct
         hides = lay_over(transfer.surface, seen, behind, caught, gain, is_direct=is_direct, out=out)
-        self._hides = hides.reshape(height, width) if shown.background.kind == "transparent" else None
-        return out.reshape(height, width, 3)
+        is_transparent, num = shown.background.kind == "transparent", width * height
+        self._hides = resolve(hides, seen.owner, num).reshape(height, width) if is_transparent else None
+        return resolve(out, seen.owner, num).reshape(height, width, 3)
 
     def _caught(self, shown: Look, seen: Seen) -> Caught:
         """What would arrive at catchers if nothing were in the way."""

@@ -118,8 +118,9 @@ def _lean(textures, texture, place, footprint, tangents, corners, uv, n, outward
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _combine(  # type: ignore[no-untyped-def]
-    surface, pixel_angle, hits, directions, vertex, weight, sent, towards_light, emission, mirrored, start, stop, out
-):
+    surface, pixel_angle, hits, directions, vertex, weight, sent, sends, towards_light, emission, mirrored,
+    start, stop, out,
+):  # fmt: skip
     """Sum what vertices and lobes send along the rays of pixels [start, stop), and what surfaces emit."""
     textures, uvs, tangents, faces, face_material, face_normal, uv_scale, normals = surface
     face, uv, distance = hits
@@ -129,26 +130,35 @@ def _combine(  # type: ignore[no-untyped-def]
         f = face[p]
         if f < 0:
             continue
-        material, outward = face_material[f], face_normal[f]
+        material = face_material[f]
+        # tuples: rows of arrays would be counted as references, several times a ray
+        outward = face_normal[f, 0], face_normal[f, 1], face_normal[f, 2]
         corners = faces[f, 0], faces[f, 1], faces[f, 2]
+        about, shares = (vertex[p, 0], vertex[p, 1], vertex[p, 2]), (weight[p, 0], weight[p, 1], weight[p, 2])
+        at = uv[p, 0], uv[p, 1]
         lobe, row, share, ratio = lobes.of[material], 0, np.float32(0), np.float32(1)
-        d = directions[p]
+        d = directions[p, 0], directions[p, 1], directions[p, 2]
         along = outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2]
         footprint = distance[p] * pixel_angle * uv_scale[f] / math.sqrt(max(abs(along), _LEAST_SLANT))
-        place = _in_texture(uvs, corners, uv[p])
-        n = unit(_blend(normals, vertex[p], weight[p]))
-        if textures.of_material[material, NORMAL_MAP] >= 0:
+        place = _in_texture(uvs, corners, at)
+        is_mapped = textures.of_material[material, NORMAL_MAP] >= 0
+        n = d
+        if is_mapped or lobe >= 0:
+            n = unit(_blend(normals, about, shares))
+        if is_mapped:
             leant = _lean(
-                textures, textures.of_material[material, NORMAL_MAP], place, footprint, tangents, corners, uv[p],
+                textures, textures.of_material[material, NORMAL_MAP], place, footprint, tangents, corners, at,
                 n, outward, along > 0, texture_value,
             )  # fmt: skip
-            ratio = shading_ratio(_blend(towards_light, vertex[p], weight[p]), n, leant)
+            ratio = shading_ratio(_blend(towards_light, about, shares), n, leant)
             n = leant
         if lobe >= 0:
-            row, share = _mirror(mirrored, vertex[p], weight[p], d, outward, lobe, n, light)
+            row, share = _mirror(mirrored, about, shares, d, outward, lobe, n, light)
         for channel in range(3):
             out[p, channel] = emission[material, channel]
         for group in range(NUM_GROUPS):
+            if not sends[material, group]:
+                continue
             texture_value[:] = 1
             texture = textures.of_material[material, group - 1] if group else -1
             if texture >= 0:
@@ -156,7 +166,7 @@ def _combine(  # type: ignore[no-untyped-def]
             for channel in range(3):
                 total = np.float32(0)
                 for k in range(3):
-                    total += weight[p, k] * sent[vertex[p, k], group, channel]
+                    total += shares[k] * sent[about[k], group, channel]
                 total = ratio * max(total, np.float32(0))
                 if lobe >= 0:
                     near = lobes.albedo[lobe, row, group, channel]
@@ -170,10 +180,12 @@ class Sent(NamedTuple):
 
     Attributes:
         broad: radiance, untextured, then by each of `TEXTURES`. (vertices, groups, 3) float32
+        sends: whether a material sends anything of a group at all, by lobes too. (materials, groups) bool
         towards_light: from `relume.moving.bumps`; empty where no material has a normal map. (vertices, 3) float32
     """
 
     broad: F32
+    sends: NDArray[np.bool_]
     towards_light: F32
 
 
@@ -185,15 +197,15 @@ def combine(
     emission: F32,
     mirrored: Mirrored,
 ) -> F32:
-    """Find the radiance of every pixel that sees a surface; the others are black.
+    """Find the radiance along every ray that sees a surface; the others are black.
 
     Args:
-        surface: that is seen. seen: what pixels see of it.
+        surface: that is seen. seen: what rays see of it.
         pixel_angle: angle that a pixel spans, radians.
         sent: by every vertex. mirrored: what lobes send besides.
         emission: radiance of each material's own. (materials, 3) float32
     Returns:
-        (pixels, 3) float32
+        (rays, 3) float32
     """
     out = np.zeros((len(seen.directions), 3), np.float32)
     hits = (seen.hits.face, seen.hits.uv, seen.hits.distance)

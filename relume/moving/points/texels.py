@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -19,21 +20,43 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     return index % size
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _two(wrap, place, size):  # type: ignore[no-untyped-def]
+    """Find the two texels about a place along one side of an image, and the share of the second.
+
+    place: of the image's side. size: texels along it.
+    """
+    if wrap == 0:
+        place -= math.floor(place)  # so that what is outside is so by one texel at most, and nothing is divided
+    at = place * np.float32(size) - np.float32(0.5)
+    below = math.floor(at)
+    first: Any = np.int64(below)
+    second = first + 1
+    if wrap == 0:
+        return first + size if first < 0 else first, second - size if second >= size else second, np.float32(at - below)
+    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(at - below)
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-untyped-def]
     """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
-    first, height, width = textures.levels[textures.first[texture] + level]
-    x, y = u * width - 0.5, v * height - 0.5
-    x0, y0 = math.floor(x), math.floor(y)
-    fx, fy = x - x0, y - y0
-    for dy in range(2):
-        row = first + _texel(textures.wraps[texture, 1], np.int64(y0) + dy, height) * width
-        wy = share * (fy if dy else 1 - fy)
-        for dx in range(2):
-            at = row + _texel(textures.wraps[texture, 0], np.int64(x0) + dx, width)
-            w = wy * (fx if dx else 1 - fx)
-            for channel in range(3):
-                out[channel] += w * textures.texels[at, channel]
+    row = textures.first[texture] + level
+    first, height, width = textures.levels[row, 0], textures.levels[row, 1], textures.levels[row, 2]
+    left, right, fx = _two(textures.wraps[texture, 0], np.float32(u), width)
+    upper, lower, fy = _two(textures.wraps[texture, 1], np.float32(v), height)
+    one = np.float32(1)
+    above, below = share * (one - fy), share * fy
+    a, b, c, d = above * (one - fx), above * fx, below * (one - fx), below * fx
+    at_a, at_b = first + upper * width + left, first + upper * width + right
+    at_c, at_d = first + lower * width + left, first + lower * width + right
+    texels = textures.texels
+    for channel in range(3):
+        out[channel] += (
+            a * texels[at_a, channel]
+            + b * texels[at_b, channel]
+            + c * texels[at_c, channel]
+            + d * texels[at_d, channel]
+        )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -47,10 +70,10 @@ def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-
     first = textures.first[texture]
     last = textures.first[texture + 1] - first - 1
     size = max(textures.levels[first, 1], textures.levels[first, 2])
-    level = min(math.log2(max(footprint * size, 1.0)), last)
+    level: Any = min(math.log2(max(np.float32(footprint * size), np.float32(1))), np.float32(last))
     lower = np.int64(level)
-    share = level - lower
+    share = np.float32(level - lower)
     out[:] = 0
-    _add_level(textures, texture, lower, u, v, 1 - share, out)
+    _add_level(textures, texture, lower, u, v, np.float32(1) - share, out)
     if share > 0:
-        _add_level(textures, texture, min(lower + 1, last), u, v, share, out)
+        _add_level(textures, texture, lower + 1, u, v, share, out)

@@ -1,0 +1,100 @@
+"""Smooth edges while the eye moves: pixels across which what is seen changes get a few more rays, and the mean of all.
+
+A cheaper kin of what fixed views do (`relume.trace.view_samples`): the pixels are found from the middles of their
+neighbours, and the rays are as many as a frame has time for.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.moving.points.surface import Surface
+from relume.parallel import for_shares
+from relume.trace.primary import Hits
+
+F32 = NDArray[np.float32]
+
+# four positions that no row or column shares, pixel units
+POSITIONS = ((np.array([(1, 0), (3, 1), (0, 2), (2, 3)]) + 0.5) / 4).astype(np.float32)
+_MOST_MORE = 0.5  # rays, for each pixel of the picture
+_COS_CREASE = np.float32(np.cos(np.radians(20.0)))
+_DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface beside
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
+    """Tell whether two pixels see different things, or one thing turned or offset."""
+    f, g = faces[p], faces[q]
+    if f < 0 or g < 0:
+        return (f < 0) != (g < 0)
+    if f == g:
+        return False
+    if material[f] != material[g]:
+        return True
+    cosine = away = np.float32(0)
+    for axis in range(3):
+        cosine += normals[f, axis] * normals[g, axis]
+        away += normals[f, axis] * (distance[q] * directions[q, axis] - distance[p] * directions[p, axis])
+    # what is seen from behind has no other side beside it but across an edge
+    return abs(cosine) < _COS_CREASE or abs(away) > _DEPTH_EDGE * min(distance[p], distance[q])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _mark(material, normals, faces, distance, directions, width, height, start, stop, is_edge):  # type: ignore[no-untyped-def]
+    """Mark pixels [start, stop) and those to the right and below that differ from them; shares may mark one twice."""
+    for p in range(start, stop):
+        if p % width < width - 1 and _differ(material, normals, faces, distance, directions, p, p + 1):
+            is_edge[p] = is_edge[p + 1] = True
+        if p < width * (height - 1) and _differ(material, normals, faces, distance, directions, p, p + width):
+            is_edge[p] = is_edge[p + width] = True
+
+
+def find_edges(surface: Surface, hits: Hits, directions: F32, size: tuple[int, int]) -> NDArray[np.int32]:
+    """Find the pixels that lie across edges, row after row. (m,) int32
+
+    Args:
+        surface: that is seen. hits: of the rays through the middles of all pixels. directions: of these. (n, 3)
+        size: width and height in pixels.
+    """
+    width, height = size
+    is_edge = np.zeros(width * height, np.bool_)
+    args = (surface.face_material, surface.face_normal, hits.face, hits.distance, directions, width, height)
+    for_shares(lambda start, stop: _mark(*args, start, stop, is_edge), width * height)
+    return np.flatnonzero(is_edge).astype(np.int32)
+
+
+def rays_an_edge(num_edges: int, num_pixels: int) -> int:
+    """How many more rays each pixel across an edge may have, so that a frame of foliage takes no longer than others."""
+    return min(len(POSITIONS), int(_MOST_MORE * num_pixels) // max(1, num_edges))
+
+
+def resolve(values: F32, owner: NDArray[np.int32], num_pixels: int) -> F32:
+    """Take the mean of all rays of each pixel.
+
+    Args:
+        values: of the rays through the middles of all pixels, then of the others. (rays, …) float32
+        owner: pixels of the others. (m,) int32
+    Returns:
+        (num_pixels, …) float32
+    """
+    if not len(owner):
+        return values
+    flat = values.reshape(len(values), -1)
+    out = flat[:num_pixels].copy()
+    _mean(flat, owner, num_pixels, out)
+    return out.reshape(num_pixels, *values.shape[1:])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _mean(values, owner, num_pixels, out):  # type: ignore[no-untyped-def]
+    num = np.zeros(num_pixels, np.uint8)
+    for r in range(owner.shape[0]):
+        num[owner[r]] += 1
+        for c in range(out.shape[1]):
+            out[owner[r], c] += values[num_pixels + r, c]
+    for p in range(num_pixels):
+        if num[p]:
+            for c in range(out.shape[1]):
+                out[p, c] /= np.float32(1 + num[p])
