@@ -145,7 +145,10 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     if curve.factor is not None:
         values = np.array(curve.factor(gamma))
     else:
-        values = np.stack([curve.generator(gamma, params) for params in channel_params(term_document, curve)])
+        of_channels = channel_params(term_document, curve)
+        first = curve.generator(gamma, of_channels[0])
+        others = (first if params == of_channels[0] else curve.generator(gamma, params) for params in of_channels[1:])
+        values = np.stack([first, *others])
     for drawn in drawn_curves(term_document, curve):
         exact = _ground_values(drawn, values, gamma, curve.num_bands)
         if is_relative(drawn):

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from relume.brdf.albedo import TEXTURES
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors
+from relume.moving.basis.symmetry import is_mirrored
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -89,39 +90,46 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
 
 
 @lru_cache(maxsize=_MOST_KNOWN)
+def _about_mirror(num_spokes: int) -> tuple[F64, F64]:
+    """Spread directions about a pole, over the half where y > 0 for what is the same on the other.
+
+    Returns:
+        Unit directions (n, 3) and solid angles (n,).
+    """
+    ring = np.geomspace(_INNERMOST, np.pi, _RINGS + 1)
+    middle, spoke = np.sqrt(ring[1:] * ring[:-1]), (np.arange(num_spokes) + 0.5) * (2 * np.pi / _SPOKES)
+    around = np.stack([np.cos(spoke), np.sin(spoke), np.zeros(num_spokes)], axis=-1)
+    away = np.sin(middle)[:, None, None] * around + np.cos(middle)[:, None, None] * [0, 0, 1]
+    area = np.repeat((np.cos(ring[:-1]) - np.cos(ring[1:])) / num_spokes * 2 * np.pi, num_spokes)
+    return away.reshape(-1, 3), area
+
+
+@lru_cache(maxsize=_MOST_KNOWN)
 def _lobe_of(term_text: str) -> F64:
     """a of each channel, cos θm, and σ, in each row. (`NUM_ROWS`, 5)"""
     document = json.loads(term_text)
-    ring = np.geomspace(_INNERMOST, np.pi, _RINGS + 1)
-    middle, spoke = np.sqrt(ring[1:] * ring[:-1]), (np.arange(_SPOKES) + 0.5) * (2 * np.pi / _SPOKES)
-    area = np.repeat((np.cos(ring[:-1]) - np.cos(ring[1:])) / _SPOKES * 2 * np.pi, _SPOKES)
-    away = np.stack(
-        [
-            np.outer(np.sin(middle), np.cos(spoke)).ravel(),
-            np.outer(np.sin(middle), np.sin(spoke)).ravel(),
-            np.repeat(np.cos(middle), _SPOKES),
-        ],
-        axis=-1,
-    )
-    out = np.empty((NUM_ROWS, 5))
-    for row, cosine in enumerate(cosines()):
-        sine = np.sqrt(1 - cosine**2)
-        sent, mean = np.zeros(3), np.zeros(2)  # along the surface, away from the eye, and along the normal
-        for phi in np.arange(_EYES) * (2 * np.pi / _EYES):
-            wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
-            frame = np.array(
-                [
-                    [cosine * np.cos(phi), cosine * np.sin(phi), sine],
-                    [-np.sin(phi), np.cos(phi), 0],
-                    -wo + [0, 0, 2 * cosine],
-                ]
-            )
-            wi = away @ frame
-            value = eval_brdf(document, wi, wo) * (np.maximum(wi[:, 2], 0) * area)[:, None]
-            sent += value.sum(axis=0)
-            luminous = value.mean(axis=1)
-            mean += luminous @ np.stack([-(wi[:, 0] * np.cos(phi) + wi[:, 1] * np.sin(phi)), wi[:, 2]], axis=1)
-        length = np.linalg.norm(mean) / max(sent.mean(), 1e-30)
-        tilt = mean[1] / max(np.linalg.norm(mean), 1e-30)
-        out[row] = [*(sent / _EYES), tilt, np.sqrt(max(1 - length, 1e-8))]
-    return out
+    is_even = out_factors(document).is_isotropic
+    eyes = np.arange(_EYES) * (2 * np.pi / _EYES)
+    times = np.ones(_EYES)  # how many eyes each stands for
+    if is_even:
+        eyes, times = eyes[:1], times[:1]
+    elif is_mirrored(document):
+        eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
+    away, area = _about_mirror(_SPOKES // 2 if is_even else _SPOKES)
+    cosine = cosines()[:, None]
+    sine = np.sqrt(1 - cosine**2)
+    sent, mean = np.zeros((NUM_ROWS, 3)), np.zeros((NUM_ROWS, 2))  # along the surface, away from the eye; the normal
+    for phi, share in zip(eyes, times / times.sum(), strict=True):
+        aside = np.array([np.cos(phi), np.sin(phi), 0.0])
+        wo = sine * aside + cosine * [0, 0, 1]
+        across = np.broadcast_to([-np.sin(phi), np.cos(phi), 0.0], wo.shape)
+        frame = np.stack([cosine * aside + sine * [0, 0, 1], across, cosine * [0, 0, 1] - sine * aside], axis=1)
+        wi = away @ frame  # (rows, directions, 3)
+        value = eval_brdf(document, wi, wo[:, None]) * (share * np.maximum(wi[..., 2], 0) * area)[..., None]
+        sent += value.sum(axis=1)
+        luminous = value.mean(axis=2)
+        mean += np.stack([-(luminous * (wi @ aside)).sum(axis=1), (luminous * wi[..., 2]).sum(axis=1)], axis=-1)
+    reach = np.linalg.norm(mean, axis=1)
+    length = reach / np.maximum(sent.mean(axis=1), 1e-30)
+    tilt = mean[:, 1] / np.maximum(reach, 1e-30)
+    return np.column_stack([sent, tilt, np.sqrt(np.maximum(1 - length, 1e-8))])

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.moving.basis.symmetry import all_around, is_isotropic, is_mirrored
 from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 
 F32 = NDArray[np.float32]
@@ -27,7 +28,6 @@ NUM_ROWS = 32  # of tables, over sqrt(1 − cos θo) from 0 to 1
 NUM_COLUMNS = 32  # over φo, where a term is not isotropic
 _RADII, _TURNS = 40, 96  # of the quadrature over the disc
 _LEAST_COSINE = 1e-3
-_ISOTROPIC = 1e-6  # relative difference of a term turned by an angle that no symmetry has
 _MOST_KNOWN = 256
 
 
@@ -43,6 +43,11 @@ class OutFactors:
 
     table: F32
     missed_by_degree: tuple[float, ...]
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether the term looks the same when both directions turn about the normal, or are mirrored."""
+        return bool(self.table.shape[1] == 1)
 
     @property
     def missed(self) -> float:
@@ -87,43 +92,33 @@ def out_factors(term_document: Mapping[str, Any]) -> OutFactors:
 @lru_cache(maxsize=_MOST_KNOWN)
 def _of_white(term_text: str) -> OutFactors:
     document = json.loads(term_text)
-    cosine = cosines()
-    sine = np.sqrt(1 - cosine**2)
-    is_even = _is_isotropic(document)
-    phi = np.zeros(1) if is_even else np.arange(NUM_COLUMNS) * (2 * np.pi / NUM_COLUMNS)
-    wo = np.stack(
-        [
-            sine[:, None] * np.cos(phi),
-            sine[:, None] * np.sin(phi),
-            np.broadcast_to(cosine[:, None], (NUM_ROWS, len(phi))),
-        ],
-        axis=-1,
-    )
-    wi, weight, functions = _disc(is_even)
-    table = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS))
-    whole = np.empty((NUM_ROWS, len(phi)))
-    for row in range(NUM_ROWS):
-        value = eval_brdf(document, wi, wo[row][:, None])  # (columns, directions, 3)
-        table[row] = np.einsum("pnc,n,nk->pck", value, weight, functions, optimize=True)
-        whole[row] = np.einsum("pnc,n->p", value**2, weight)
+    is_even = is_isotropic(document)
+    is_quarter = not is_even and is_mirrored(document)
+    num = 1 if is_even else NUM_COLUMNS // 4 + 1 if is_quarter else NUM_COLUMNS
+    table, whole = _projected(document, np.linspace(0, 2 * np.pi, NUM_COLUMNS + 1)[:num], is_even)
     kept = np.cumsum((table**2).sum(axis=2), axis=-1)[..., [num_functions(n) - 1 for n in range(DEGREE + 1)]]
-    missed = np.sqrt(np.clip(1 - kept / np.maximum(whole, 1e-30)[..., None], 0, 1)).mean(axis=1)
-    by_degree = np.average(missed, weights=cosine, axis=0)
-    return OutFactors(table.astype(np.float32), tuple(by_degree.tolist()))
+    missed = np.sqrt(np.clip(1 - kept / np.maximum(whole, 1e-30)[..., None], 0, 1))
+    ends = np.where(np.isin(np.arange(num), (0, num - 1)), 0.5, 1.0) if is_quarter else np.ones(num)
+    by_degree = np.average(np.average(missed, weights=ends, axis=1), weights=cosines(), axis=0)
+    whole_table = all_around(table) if is_quarter else table
+    return OutFactors(whole_table.astype(np.float32), tuple(by_degree.tolist()))
 
 
-def _is_isotropic(document: Mapping[str, Any]) -> bool:
-    """Whether a term looks the same when both directions turn about the normal, or are mirrored."""
-    rng = np.random.default_rng(1)
-    wi, wo = (np.abs(rng.normal(size=(256, 3))) * [1, 1, 1] for _ in range(2))
-    wi[:128, 0] *= -1
-    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    cosine, sine = np.cos(1.2345), np.sin(1.2345)
-    turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-    plain = eval_brdf(document, wi, wo)
-    others = (eval_brdf(document, wi @ turned.T, wo @ turned.T), eval_brdf(document, wi * [1, -1, 1], wo * [1, -1, 1]))
-    scale = np.abs(plain).max() + 1e-30
-    return all(np.abs(other - plain).max() <= _ISOTROPIC * scale for other in others)
+def _projected(document: Mapping[str, Any], phi: F64, is_even: bool) -> tuple[F64, F64]:
+    """Project a term seen from all rows and some φo: factors (rows, columns, 3, K), energies (rows, columns)."""
+    cosine = np.broadcast_to(cosines()[:, None], (NUM_ROWS, len(phi)))
+    sine = np.sqrt(1 - cosine**2)
+    wo = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+    wi, weight, functions = _disc(is_even)
+    table, whole = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS)), np.empty((NUM_ROWS, len(phi)))
+    weighed = weight[:, None] * functions
+    together = NUM_ROWS if is_even else 1  # rows, as many as make arrays of some megabytes
+    for row in range(0, NUM_ROWS, together):
+        rows = slice(row, row + together)
+        value = np.moveaxis(eval_brdf(document, wi, wo[rows, :, None]), -1, -2)  # (rows, columns, 3, directions)
+        table[rows] = value @ weighed
+        whole[rows] = (value**2 @ weight).sum(axis=-1)
+    return table, whole
 
 
 def turned(row: F64, phi: float) -> F64:
