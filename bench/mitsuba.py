@@ -90,8 +90,8 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
     Args:
         scene: that is handed over. size: width and height, pixels.
         job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
-            and "seen" where reflected light alone is (peer_mitsuba_render.py); "emitters", Mitsuba's own descriptions
-            of lights beside the map.
+            and "seen" where reflected light alone is (peer_mitsuba_render.py); "integrator" where more than direct
+            light is; "emitters", of lights beside the map; both are Mitsuba's own descriptions.
         folder: where files of the exchange are written.
     Returns:
         What it wrote to result.json in `folder`.

@@ -47,7 +47,7 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
     middle, Mitsuba's +Z.
 
     Args:
-        folder: with scene.npz. job: of job.json: size, camera, emitters.
+        folder: with scene.npz. job: of job.json: size, camera, emitters, integrator, by default of direct light.
         bsdfs: descriptions, one a mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
@@ -67,7 +67,8 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
         "bitmap": mi.Bitmap(arrays["environment"]),
         "to_world": transform().rotate([0, 1, 0], 90),
     }
-    scene = {"type": "scene", "integrator": {"type": "direct"}, "sensor": sensor, "light": environment}
+    integrator = job.get("integrator", {"type": "direct"})
+    scene = {"type": "scene", "integrator": integrator, "sensor": sensor, "light": environment}
     for k, emitter in enumerate(job.get("emitters", [])):
         placed = {key: transform(np.reshape(emitter[key], (4, 4)).tolist()) for key in ("to_world",) if key in emitter}
         scene[f"emitter_{k}"] = {**emitter, **placed}

@@ -22,7 +22,7 @@ def check_output(path: Path) -> None:
 
 def save(path: Path, image: NDArray[Any], look: Any) -> None:
     """Write linear radiance, (H, W, 3); formats for the screen are shown as the look's display says."""
-    from relume.imageio import write_image
+    from relume.imageio.files import write_image
 
     write_image(path, image, look.display.exposure, look.display.tone_map)
 

@@ -1,8 +1,8 @@
 """Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.warm`.
 
 Bakes a thumbnail of the built-in scene, shows each term with each of its curves, and along each parameter that moves
-several, and moves local lights. The compiled kernels lie in the cache that `relume.kernel_cache` has chosen; every
-later process loads them from there.
+several, moves local lights and eyes, compares with the truth, looks measured materials up. The compiled kernels lie in
+the cache that `relume.kernel_cache` has chosen; every later process loads them from there.
 """
 
 from __future__ import annotations
@@ -11,20 +11,28 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from relume.bake import Recipe
+from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves
 from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
+from relume.measured.lookup import NUM_KNOTS, Part, quotients
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
+from relume.moving.bumps import towards_light
 from relume.moving.picture import MovingPicture
 from relume.picture.picture import Picture
 from relume.picture.transfer import Transfer
+from relume.reference import Points, reference_radiance, texels_of
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.demo import demo_scene
+from relume.scene.model import Scene
 from relume.store import bake_here
+from relume.trace.geometry import merge
 
 SIZE, NUM_LIGHTS = (64, 48), 64
 CACHE_BYTES = 1 << 28
@@ -49,6 +57,8 @@ def warm() -> None:
                 continue
             _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
             _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
+        _compare(scene)
+    _look_up()
 
 
 def _edit_everything(transfer: Transfer, picture: Picture) -> None:
@@ -67,24 +77,48 @@ def _edit_everything(transfer: Transfer, picture: Picture) -> None:
 
 
 def _move_lights(transfer: Transfer, picture: Picture) -> None:
-    """Add a light of each kind, one after another, and move each twice while it is in hand."""
+    """Add a light of each kind, one after another, and move each twice while it is in hand; one material is enough."""
+    dark: dict[str, Any] = {name: {"terms": []} for name in transfer.material_names[1:]}
     for kind in ("point", "spot", "directional", "rectangle"):
         picture.touch("/lights/Lamp")
         for height in (1.0, 1.1, 1.2):
             geometry = {} if kind == "directional" else {"position": [0.0, height, 0.5]}
-            partial = {"lights": {"Lamp": {"kind": kind, "scale": height, **geometry}}}
+            partial = {"materials": dark, "lights": {"Lamp": {"kind": kind, "scale": height, **geometry}}}
             picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
             _show(picture)
 
 
 def _move_eyes(transfer: MovingViews, picture: MovingPicture) -> None:
-    """See what a moving eye sees: the kernels are the same whatever the terms and the lights."""
+    """See what a moving eye sees, in a picture that is not all edges: kernels are the same whatever terms and lights.
+
+    Normal maps are asked for apart, for the scene has none.
+    """
     partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
     picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
     picture.advance(None)
     picture.advance(None)
+    picture.set_eye(picture.eye[0], (2 * SIZE[0], 2 * SIZE[1]))
+    picture.advance(None)
+    nothing, all_points = np.zeros(transfer.vectors_shape, np.float32), np.ones(transfer.vectors_shape[0], np.uint8)
+    towards_light(transfer.surface, nothing, all_points)
     for form in ("rgb9e5", "f32"):
         picture.encode(picture.all_tiles(), form)
+
+
+def _compare(scene: Scene) -> None:
+    """Find the true radiance of a point, of every texel and of a few."""
+    up, aside = np.array([[0, 1, 0]], np.float32), np.array([[1, 0, 0]], np.float32)
+    points = Points(position=9 * up, normal=up, tangent=aside, wo=up, textures={"diffuse": up})
+    terms = [[complete_term(("warm",), {"model": "lambert"}, None)]]
+    for spp in (0, 16):
+        reference_radiance(merge(scene), texels_of(scene.environment), points, terms, spp)
+
+
+def _look_up() -> None:
+    """Divide a measured material's curves out, in both precisions that quotients are asked in."""
+    table, curves = np.ones((90, 90, 180, 3), np.float32), np.ones((4, 3, NUM_KNOTS))
+    for kind in (np.float32, np.float64):
+        quotients(Part.DIFFUSE, table, curves, *np.array([[0], [0], [1], [0], [0], [1]], kind))
 
 
 def _show(picture: Picture) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.studio import studio
-from relume.imageio import png_bytes, to_bytes, tone_map
+from relume.imageio.files import png_bytes, to_bytes
+from relume.imageio.tonemap import tone_map
 from relume.light.triangles import TriangleLights, subdivide
 from relume.operators.shade import shade
 from relume.picture.wanted import Wanted

@@ -17,7 +17,7 @@ from PIL import Image
 
 from relume.balls.ball import THUMBNAIL_SIZE, ball_pixels
 from relume.brdf.document import complete_term
-from relume.imageio import png_bytes
+from relume.imageio.files import png_bytes
 from relume.look.library import Preset, presets
 
 ATLAS = Path(__file__).with_name("balls.webp")

@@ -19,9 +19,8 @@ import numpy as np
 from relume.asset_store import AssetStore
 from relume.environments.model import Environment
 from relume.environments.reading import read_environment
-from relume.environments.thumbnail import write_thumbnail
 from relume.errors import SceneError
-from relume.imageio import shrink
+from relume.imageio.shrink import shrink
 from relume.remarks import Remark, remark_of, simplified
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
@@ -58,6 +57,8 @@ def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
     Raises:
         SceneError: the file cannot be used, or the store is full.
     """
+    from relume.environments.thumbnail import write_thumbnail  # compiled kernels, which readers of scenes do without
+
     environment = _reduced(read_environment(source, name))
 
     def fill(made: Path) -> dict[str, Any]:

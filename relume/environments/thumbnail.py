@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.color import luminance
-from relume.imageio import png_bytes, shrink, to_bytes, tone_map
+from relume.imageio.files import png_bytes, to_bytes
+from relume.imageio.shrink import shrink
+from relume.imageio.tonemap import tone_map
 from relume.replacing import replacing
 
 WIDTH, HEIGHT = 192, 96

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
-from relume.imageio import to_bytes
+from relume.imageio.files import to_bytes
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.basis.lobes import Lobes, lobes_of

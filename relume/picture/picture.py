@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
-from relume.imageio import to_bytes
+from relume.imageio.files import to_bytes
 from relume.look import Look
 from relume.memory import Memory
 from relume.operators.shade import shaded_bytes

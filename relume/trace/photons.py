@@ -38,6 +38,7 @@ _LOBE = 200.0  # exponent of the mirror lobes
 _MIRROR_SHARE = 1 / 7  # of all photons, at most: a sixth of the others
 _MIRRORED = 4  # from each point that has a highlight
 _MOST_PASSES = 64  # of paths that nearly all leave the scene no more are worth their time
+_FEWEST_PASSES = 2  # after which none are, if all have left it
 
 
 @dataclass(frozen=True)
@@ -80,10 +81,11 @@ def shoot_photons(
     num_paths = max(256, _PATHS_A_PASS // len(cameras))
     shines = np.array([not all(map(is_diffuse, material.terms)) for material in scene.materials])
     found, num_short = _Found([], [], []), int(_CONTACT_SHARE * num_photons)
-    for _ in range(_MOST_PASSES):
+    for done in range(1, _MOST_PASSES + 1):
         for camera in cameras:
             _walk(geometry, camera, size, num_paths, num_short, shines, rng, found)
-        if sum(len(photons.directions) for photons in found.anywhere) >= num_photons:
+        num_found = [sum(len(photons.directions) for photons in kind) for kind in found]
+        if num_found[0] >= num_photons or (done >= _FEWEST_PASSES and not any(num_found)):
             break
     short = _some(found.at_contacts, num_short, rng)
     mirrored = _some(found.in_mirrors, int(_MIRROR_SHARE * num_photons), rng)

@@ -148,15 +148,22 @@ def _import_environment(request: ImportRequest) -> str:
 
 
 def _import_scene(request: ImportRequest) -> str:
-    from relume.scene.built_in import built_in
-    from relume.scene.ground import with_ground
+    scene = _built_in(request.name) if request.kind == "built_in" else _read_scene(request)
+    if request.ground:
+        from relume.scene.ground import with_ground
+
+        scene = with_ground(scene)
     from worker.database import open_database
     from worker.ledger import Ledger
     from worker.scenes import register_scene
 
-    scene = built_in(request.name) if request.kind == "built_in" else _read_scene(request)
-    scene = with_ground(scene) if request.ground else scene
     return register_scene(Path(request.data), Ledger(open_database(request.database)), scene)
+
+
+def _built_in(name: str) -> Scene:
+    from relume.scene.built_in import built_in
+
+    return built_in(name)
 
 
 def _put_on_ground(request: ImportRequest) -> str:

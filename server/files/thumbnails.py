@@ -8,7 +8,7 @@ from pathlib import Path
 
 from relume import look as looks
 from relume.code_version import image_code
-from relume.imageio import write_image
+from relume.imageio.files import write_image
 from relume.imageio.shrink import shrink
 from relume.picture.transfer import Opened
 from server.library.ports import Library

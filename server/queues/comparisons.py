@@ -20,7 +20,7 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from relume import look as looks
 from relume.code_version import truth_code
-from relume.imageio import write_image
+from relume.imageio.files import write_image
 from relume.picture.transfer import Axis, Opened
 from relume.reference.truth import Comparison, Estimate, compare, error_map
 from relume.replacing import replacing

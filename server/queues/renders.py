@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.exr.attributes import Origin, attributes_of
 from relume.exr.layers import layers_of
 from relume.exr.picture import Progress, export_exr
-from relume.imageio import write_image
+from relume.imageio.files import write_image
 from relume.imageio.shrink import shrink
 from relume.picture.transfer import Axis, Opened
 from relume.replacing import replacing

@@ -15,7 +15,7 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError
-from relume.imageio import png_bytes
+from relume.imageio.files import png_bytes
 from relume.picture.transfer import Eyes, Transfer
 from relume.scene.placed_camera import placed_camera
 from server.errors import NotReadyError

@@ -18,7 +18,7 @@ WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
 METAL = ({"model": "ggx", "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.25}},)
 CAMERA = looking("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
-SIZE = (96, 72)
+SIZE = (64, 48)
 
 
 def waves(size=128, slope=0.35, wrap=("repeat", "repeat")):
@@ -35,7 +35,7 @@ def floor(terms, normal_map):
 
 
 def picture_of(scene, method, folder):
-    recipe = Recipe(method, ("front",), SIZE, 2000, num_points=3000)
+    recipe = Recipe(method, ("front",), SIZE, 1000, num_points=2000)
     opened = open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
     return render_image(opened, "front", validate(complete({}, opened.default_look), opened.default_look))
 

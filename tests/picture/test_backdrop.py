@@ -26,7 +26,7 @@ from tiny_scenes import quad, scene_of, studio
 
 from relume.color import srgb_encode
 from relume.environments.equirect import lookup, texel_directions, texel_solid_angles, turned
-from relume.imageio import to_bytes
+from relume.imageio.files import to_bytes
 from relume.light.blur import blurred, reduced
 from relume.memory import Memory
 from relume.picture.backdrop import MOST_SHARE, Backdrop

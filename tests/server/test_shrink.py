@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.imageio import shrink
+from relume.imageio.shrink import shrink
 
 
 def test_whole_factors_average_blocks() -> None:

@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from relume.errors import ParameterError, RelumeError, ShapeMismatchError
-from relume.imageio import to_bytes, tone_map, write_image
+from relume.imageio.files import to_bytes, write_image
+from relume.imageio.tonemap import tone_map
 
 
 @pytest.fixture

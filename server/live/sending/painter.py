@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.imageio import to_bytes, tone_map
+from relume.imageio.files import to_bytes
 from relume.imageio.shrink import shrink
+from relume.imageio.tonemap import tone_map
 from server.library.ports import Advance, MovingPicture, Picture, Tile
 from server.live.state.target import Eye, Target
 from server.wire.protocol import FrameHeader, FrameTimes

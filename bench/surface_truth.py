@@ -1,0 +1,72 @@
+"""surface.rmse_*: the whole moving view against Mitsuba's whole path tracer.
+
+The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky; nothing but a
+Blinn–Phong highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
+Mitsuba follows every path, highlights that light other surfaces among them, which ours lack. Edges and background
+belong to the pictures. Its own noise is taken off: `bench.standard_error.over_passes`.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure, skipped
+from bench.indirect import PASSES
+from bench.mitsuba import bsdf, missing, render
+from bench.standard_error import over_passes
+from relume.bake import Recipe
+from relume.look import complete, validate
+from relume.look.document import MAX_BOUNCES
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.render.image import render_image
+from relume.scene.built_in import built_in
+from relume.store import bake_here
+
+_GREY = {"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}
+_KINDS = {
+    "diffuse": ("cornell_box", (400, 400)),
+    "glossy_0.5": ("still_life", (640, 480)),
+    "glossy_0.3": ("still_life", (640, 480)),
+}
+_GAIN = 0.23  # a highlight reflects up to four times its colour
+_UNIT = "%"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake, a frame and a render for each material."""
+    if (why := missing()) is not None:
+        return skipped(tuple(f"surface.rmse_{kind}" for kind in _KINDS), _UNIT, why)
+    return [_figure(kind, tiny) for kind in _KINDS]
+
+
+def _terms_of(kind: str) -> list[dict[str, Any]]:
+    if kind == "diffuse":
+        return [_GREY]
+    exponent = 2 / float(kind.partition("_")[2]) ** 4 - 2
+    return [{"model": "blinn_phong", "color": [_GAIN] * 3, "params": {"exponent": exponent}, "texture": None}]
+
+
+def _figure(kind: str, tiny: bool) -> Figure:
+    name, size = _KINDS[kind]
+    terms, scene = _terms_of(kind), built_in("cornell_box" if tiny else name)
+    size, spp, num_lights, num_points = ((40, 30), 2, 60, 2000) if tiny else (size, 32, 1000, 50_000)
+    recipe = Recipe("surface", (scene.cameras[0].name,), size, num_lights, num_points=num_points)
+    with tempfile.TemporaryDirectory() as folder:
+        opened = open_bake(bake_here(METHODS["surface"], scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
+        document = copy.deepcopy(complete({}, opened.default_look))
+        for material in document["materials"].values():
+            material["terms"] = copy.deepcopy(terms)
+        ours = render_image(opened, recipe.views[0], validate(document, opened.default_look))
+        integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(terms)] * len(scene.meshes), "integrator": integrator}
+        render(scene, size, job, Path(folder))
+        theirs = np.load(Path(folder) / "passes.npy", allow_pickle=False)
+    found = over_passes(ours.astype(np.float64), theirs)
+    context = {**found.context, "scene": scene.name, "size": list(size), "spp": PASSES * spp, "points": num_points}
+    return Figure(f"surface.rmse_{kind}", 100 * found.error.value, _UNIT, context, 100 * found.error.standard_error)
