@@ -23,6 +23,7 @@ beforeEach(() => {
   ticks = [];
   vi.stubGlobal("window", { setTimeout: (run: () => void) => void run() });
   vi.stubGlobal("requestAnimationFrame", (tick: FrameRequestCallback) => ticks.push(tick));
+  vi.stubGlobal("cancelAnimationFrame", (id: number) => ticks.splice(id - 1, 1, () => undefined));
   heard = [];
   timelineOpen.value = false;
   bake.value = null;
@@ -138,4 +139,17 @@ test.each([true, false])("playing goes on with the clock and %s: again from the 
   expect(playing.value).toBe(again);
   edit("Rotation", "/environment/rotation", 45);
   expect(playing.value).toBe(false);
+});
+
+test("a pause and a play within one frame do not play twice as fast", async () => {
+  await prepared();
+  seek(0);
+  play();
+  playing.value = false;
+  play();
+  const now = performance.now() + 100 * seconds.value;
+  for (const tick of [...ticks]) tick(now);
+  expect(at.value).toBeCloseTo(0.1, 1);
+  const due = ticks.filter((tick) => tick.name === "tick");
+  expect(due.length).toBe(1);
 });

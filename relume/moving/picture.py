@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,12 @@ from relume.errors import EditNotSupportedError, ParameterError
 from relume.imageio.files import to_bytes
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
-from relume.moving.basis.lobes import Lobes, lobes_of
-from relume.moving.behind import Caught, alpha_of, lay_over, seen_behind
-from relume.moving.bumps import towards_light
-from relume.moving.edges import resolve
-from relume.moving.evaluate import Tables, send, tables_of
-from relume.moving.glints import glance
-from relume.moving.look_up import Seen, at_vertices, look
-from relume.moving.pixels import Mirrored, Sent, combine
-from relume.moving.sky import Sky, turn_of
+from relume.moving.behind import alpha_of
+from relume.moving.frame import Frame, Materials, Wanted, frame_of
+from relume.moving.look_up import Seen, look
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
-from relume.picture.light import Light, Solo, emission_of, gain_of, light_of, vector_of
+from relume.picture.light import Light, Solo, gain_of, light_of, vector_of
 from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
@@ -33,21 +27,6 @@ from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
-
-
-class _Materials(NamedTuple):
-    """What materials send: tables of what the in-basis tells, lobes of the rest."""
-
-    tables: Tables
-    lobes: Lobes
-
-    @property
-    def sends(self) -> NDArray[np.bool_]:
-        """Whether a material sends anything of a group of terms. (materials, groups)"""
-        sends = np.asarray((self.tables.of >= 0).any(axis=2))
-        with_lobe = self.lobes.of >= 0
-        sends[with_lobe] |= np.asarray(self.lobes.albedo.any(axis=(1, 3)))[self.lobes.of[with_lobe]]
-        return sends
 
 
 class MovingPicture:
@@ -67,10 +46,9 @@ class MovingPicture:
         self._is_watched = is_watched
         self._is_rough = False  # what is shown was found quickly
         self._shown: tuple[Any, ...] | None = None
-        self._image = np.zeros((view.height, view.width, 3), np.float32)
-        self._hides: F32 | None = None  # how much of what is behind it, where the background is transparent
+        self._frame = Frame(np.zeros((view.height, view.width, 3), np.float32), None)
         self._seen: tuple[int, Seen] | None = None
-        self._materials: tuple[Any, _Materials] | None = None
+        self._materials: tuple[Any, Materials] | None = None
         self._vectors: tuple[Light, Arriving] | None = None
 
     def check(self, look: Look) -> None:
@@ -146,7 +124,7 @@ class MovingPicture:
         if self._look is None or (wanted == self._shown and self._is_rough == self._has_to_be_rough()):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)
         self._is_rough = self._has_to_be_rough()
-        self._image = self._evaluate(self._look)
+        self._frame = self._evaluate(self._look)
         self._shown = wanted
         return Advance(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
 
@@ -160,49 +138,11 @@ class MovingPicture:
         has_them = self._vectors is not None and self._vectors[0] == light
         return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
 
-    def _evaluate(self, shown: Look) -> F32:
-        """The picture, (height, width, 3) float32."""
-        transfer, camera = self._transfer, self._camera
-        width, height = self._size
-        seen = self._look_around()
-        eye = camera.to_world[:3, 3].astype(np.float32)
-        materials = self._materials_of(shown)
-        light = self._vectors_now(seen)
-        broad = send(transfer.surface, light.total, materials.tables, eye, seen.is_needed)
-        glances = glance(transfer.surface, transfer.sky_share, light.others, materials.lobes, eye, seen.is_needed)
-        mirrored = Mirrored(materials.lobes, *self._sky_now(), at_vertices(transfer.surface, seen.is_seen, glances))
-        broad = at_vertices(transfer.surface, seen.is_seen, broad)
-        sent = Sent(broad, materials.sends, self._towards_light(light, seen))
-        emission = np.array([emission_of(self._now(), name) for name in transfer.material_names], np.float32)
-        pixel_angle = camera.yfov / height
-        out = combine(transfer.surface, seen, pixel_angle, sent, emission, mirrored)
-        gain = np.array(gain_of(shown, self._solo), np.float32)
-        out *= gain
-        caught = self._caught(shown, seen)
-        behind = seen_behind(transfer, shown.background, self._now(), gain, seen, caught.is_catcher)
-        is_direct = self._now().paths.direct
-        hides = lay_over(transfer.surface, seen, behind, caught, gain, is_direct=is_direct, out=out)
-        is_transparent, num = shown.background.kind == "transparent", width * height
-        self._hides = resolve(hides, seen.owner, num).reshape(height, width) if is_transparent else None
-        return resolve(out, seen.owner, num).reshape(height, width, 3)
-
-    def _caught(self, shown: Look, seen: Seen) -> Caught:
-        """What would arrive at catchers if nothing were in the way."""
-        transfer, light = self._transfer, self._now()
-        is_catcher = np.array([shown.materials[name].catcher for name in transfer.material_names])
-        if not is_catcher.any():
-            return Caught(is_catcher, np.empty((0, 3), np.float32))
-        of_points = np.zeros((transfer.surface.points.num_points, 3), np.float32)
-        for material in np.flatnonzero(is_catcher):
-            of_points += transfer.unhidden(light, int(material), is_preview=self._is_rough)
-        return Caught(is_catcher, at_vertices(transfer.surface, seen.is_seen, of_points))
-
-    def _towards_light(self, light: Arriving, seen: Seen) -> F32:
-        """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
-        surface = self._transfer.surface
-        if not len(surface.tangents):
-            return np.empty((0, 3), np.float32)
-        return at_vertices(surface, seen.is_seen, towards_light(surface, light.total, seen.is_needed))
+    def _evaluate(self, shown: Look) -> Frame:
+        seen, gain = self._look_around(), np.array(gain_of(shown, self._solo), np.float32)
+        materials, vectors = self._materials_of(shown), self._vectors_now(seen)
+        wanted = Wanted(shown, materials, self._now(), gain, vectors, self._is_rough)
+        return frame_of(self._transfer, wanted, seen, self._camera, self._size)
 
     def _now(self) -> Light:
         assert self._light is not None
@@ -215,18 +155,11 @@ class MovingPicture:
             self._seen = self._num_eyes, found
         return self._seen[1]
 
-    def _materials_of(self, shown: Look) -> _Materials:
+    def _materials_of(self, shown: Look) -> Materials:
         terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
         if self._materials is None or self._materials[0] != terms:
-            self._materials = terms, _Materials(tables_of(terms), lobes_of(terms))
+            self._materials = terms, Materials.of(terms)
         return self._materials[1]
-
-    def _sky_now(self) -> tuple[Sky, np.float32, F32]:
-        """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
-        light = self._now()
-        is_seen = light.paths.direct and light.is_environment_lit
-        gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
-        return self._transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain
 
     def _vectors_now(self, seen: Seen) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
@@ -243,7 +176,7 @@ class MovingPicture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame: the tiles one after another, row-major."""
-        parts = [self._image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
+        parts = [self._frame.image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
         return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
@@ -255,11 +188,12 @@ class MovingPicture:
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
-        return None if self._hides is None else alpha_of(self._hides, for_display=for_display)
+        hides = self._frame.hides
+        return None if hides is None else alpha_of(hides, for_display=for_display)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""
-        return self._image
+        return self._frame.image
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
         """What a pixel shows, and where its surface is.
@@ -267,11 +201,11 @@ class MovingPicture:
         Raises:
             ParameterError: it lies outside the picture.
         """
-        height, width, _ = self._image.shape
+        height, width, _ = self._frame.image.shape
         if not (0 <= x < width and 0 <= y < height):
             raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
         found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
-        found["radiance"] = self._image[y, x]
+        found["radiance"] = self._frame.image[y, x]
         if self._seen is None or self._seen[1].hits.face[y * width + x] < 0:
             return found
         seen, pixel, surface = self._seen[1], y * width + x, self._transfer.surface

@@ -20,13 +20,19 @@ from server.routes.bakes import ready_bake
 from server.services import Shared
 from server.wire.body import MAX_NAME, Id
 from server.wire.protocol import MAX_EYE_PIXELS
-from server.wire.renders import MAX_FRAMES, Keyframes, LooksBody, RenderBody, RenderRequest
+from server.wire.renders import (
+    MAX_FRAMES,
+    MAX_TOLD,
+    MAX_TOLD_BYTES,
+    Keyframes,
+    LooksBody,
+    RenderBody,
+    RenderRequest,
+)
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
 MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
-MAX_PLAYED = 600  # frames whose looks are told at once
-MAX_PLAYED_BYTES = 16 << 20
 
 
 @router.post("", status_code=202)
@@ -46,8 +52,8 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
 @router.post("/looks")
 async def frame_looks(request: Keyframes, services: Shared) -> LooksBody:
     """What each frame of a batch with these keyframes shows: an editor plays them as they will be rendered."""
-    if request.num_frames > MAX_PLAYED:
-        raise ParameterError("frames", request.num_frames, f"at most {MAX_PLAYED} to be looked at")
+    if request.num_frames > MAX_TOLD:
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_TOLD} to be looked at")
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
         return await run_in_threadpool(_frame_looks, request, transfer)
@@ -59,7 +65,7 @@ def _frame_looks(request: Keyframes, transfer: Opened) -> LooksBody:
     for index in range(request.num_frames):
         found.append(dict(document_of(request, transfer.default_look, index)))
         size += len(json.dumps(found[-1]))
-        if size > MAX_PLAYED_BYTES:
+        if size > MAX_TOLD_BYTES:
             raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
     return LooksBody(looks=found)
 

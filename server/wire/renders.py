@@ -14,6 +14,8 @@ Side = Annotated[int, Field(ge=1, le=16384)]
 ImageFormat = Literal["exr", "png", "webp"]
 MAX_LOOKS = 1000
 MAX_FRAMES = 3600
+MAX_TOLD = 600  # frames whose looks are told at once
+MAX_TOLD_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
 
 

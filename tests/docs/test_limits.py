@@ -58,6 +58,7 @@ ROWS = {
         f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"
     ),
     "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
+    "frames whose looks are told at once; all together": f"{renders.MAX_TOLD}; {renders.MAX_TOLD_BYTES // MIB} MiB",
     "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {MAX_QUEUED}",
     "pixels of a view whose eye moves": f"{protocol.MAX_EYE_PIXELS:,}",
 }

@@ -35,7 +35,13 @@ export function seek(share: number): void {
   show();
 }
 
-let before = 0;
+let [before, loop] = [0, 0];
+
+/** One loop at most: a pause and a play within one frame begin no second. */
+function goOn(): void {
+  cancelAnimationFrame(loop);
+  loop = requestAnimationFrame(tick);
+}
 
 function tick(now: number): void {
   if (!playing.peek()) return;
@@ -46,7 +52,7 @@ function tick(now: number): void {
   if (ends) playing.value = false;
   seek(ends ? 1 : next % 1);
   if (turns.peek()) eyeOf(viewName.peek())?.change((orbit) => turned(orbit, 2 * Math.PI * step, 0));
-  requestAnimationFrame(tick);
+  goOn();
 }
 
 export function play(): void {
@@ -55,7 +61,7 @@ export function play(): void {
   show();
   playing.value = true;
   before = performance.now();
-  requestAnimationFrame(tick);
+  goOn();
 }
 
 export function togglePlay(): void {
