@@ -41,7 +41,7 @@ test:  ## everything that must hold before a commit
 	$(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
 
 test-slow: setup  ## the long tests
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m slow --timeout=3600
 
 bench: setup  ## the project's own figures
 	$(BIN)/relume bench $(ARGS)
