@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
-from relume.imageio.files import to_bytes
 from relume.look import Look
 from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.behind import alpha_of
@@ -23,7 +22,7 @@ from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
 from relume.scene.model import Camera
-from relume.views.resolve import encode_pixels
+from relume.views.resolve import encode_coverage, encode_pixels
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
@@ -182,9 +181,7 @@ class MovingPicture:
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """How much each pixel of tiles hides of display values behind it; see `Picture.encode_alpha`."""
         alpha = self.alpha(for_display=True)
-        if alpha is None:
-            return None
-        return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
+        return None if alpha is None else encode_coverage(alpha, tiles)
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
-from relume.imageio.files import to_bytes
 from relume.look import Look
 from relume.memory import Memory
 from relume.operators.shade import shaded_bytes
@@ -25,7 +24,7 @@ from relume.picture.probe import brush, probe
 from relume.picture.transfer import Transfer
 from relume.picture.transition import Transition
 from relume.picture.view_images import ViewImages, documents_of
-from relume.views.resolve import encode, resolve
+from relume.views.resolve import encode, encode_coverage, resolve
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
@@ -173,7 +172,7 @@ class Picture:
         if not self._backdrop.is_transparent:
             return None
         alpha = self._backdrop.alpha(for_display=True)
-        return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
+        return encode_coverage(alpha, tiles)
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relume.errors import ParameterError
+from relume.imageio.files import to_bytes
 from relume.parallel import for_shares
 from relume.views.view import Tile, View
 
@@ -94,6 +95,11 @@ def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: Ar
         ParameterError: another format.
     """
     return encode_pixels(resolve(view, radiance, tiles, gain), form)
+
+
+def encode_coverage(alpha: F32, tiles: Sequence[Tile]) -> bytes:
+    """Encode how much each pixel of tiles hides, a byte each, one tile after another. alpha: (height, width) float32"""
+    return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
 
 
 def encode_pixels(pixels: F32, form: str) -> bytes:

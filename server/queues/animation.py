@@ -66,4 +66,5 @@ def document_of(request: Keyframes, default: Mapping[str, Any], index: int) -> M
         return looks.complete(request.looks[index], default)
     share = index / max(1, request.num_frames - 1)
     first, second, part = neighbours(len(request.looks), share)
-    return morph([looks.complete(request.looks[k], default) for k in (first, second)], part, request.between)
+    keys = dict.fromkeys((first, second))  # one of them where the frame is a keyframe
+    return morph([looks.complete(request.looks[k], default) for k in keys], part, request.between)

@@ -117,7 +117,7 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
 /** What can be put onto the time line, by the value of its option. */
 function choices(): Map<string, { name: string; look: Partial<Look> }> {
   const variants = (scene.value?.variants ?? []).map(({ name, look: of }) => ({ name, look: of as Partial<Look> }));
-  return new Map([...shelf.value, ...variants].map((of, k) => [`${k}`, { name: of.name, look: completed(of.look) }]));
+  return new Map([...shelf.value, ...variants].map((of, k) => [`${k}`, of]));
 }
 
 function AddKeyframe() {
@@ -126,7 +126,7 @@ function AddKeyframe() {
     const live = look.peek();
     if (chosen === "live" && live !== null) addKeyframe({ name: freeKeyframeName(), look: live });
     const saved = known.get(chosen);
-    if (saved !== undefined) addKeyframe(saved);
+    if (saved !== undefined) addKeyframe({ name: saved.name, look: completed(saved.look) });
   };
   return (
     <select
@@ -172,6 +172,15 @@ function Render() {
   );
 }
 
+/** By itself: what is shown in passing changes with every frame. */
+function Keep() {
+  return (
+    <button disabled={passing.value === null} title="Go on with the look that is shown, as one step" onClick={keepShown}>
+      Keep this look
+    </button>
+  );
+}
+
 export function Timeline() {
   const said = hint();
   return (
@@ -189,13 +198,7 @@ export function Timeline() {
         </span>
         <RadioRow label="Between looks" choices={WAYS} chosen={between.value} onChoose={(way) => (between.value = way)} />
         <Render />
-        <button
-          disabled={passing.value === null}
-          title="Go on with the look that is shown, as one step"
-          onClick={keepShown}
-        >
-          Keep this look
-        </button>
+        <Keep />
         <IconButton icon="close" label="Close the time line; the look is as it was" onClick={() => (timelineOpen.value = false)} />
       </div>
     </section>

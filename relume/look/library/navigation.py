@@ -50,8 +50,7 @@ class NavigationMap:
         points = weights @ self._corners[corners]
         rows = np.array([_numbers(self.presets[k]) for k in corners])
         colors = weights @ rows[:, :6]
-        root = math.sqrt(float(points[0]))
-        return terms_of("cook_torrance", [*map(float, colors), math.exp(points[1]), (1 + root) / (1 - root), 0.0])
+        return terms_of("cook_torrance", [*map(float, colors), math.exp(points[1]), ior_of(float(points[0])), 0.0])
 
     def _barycentric(self, point: F64) -> tuple[NDArray[np.int64], F64]:
         """Corners and weights of the triangle that holds a point, or of the one nearest to it."""
@@ -75,6 +74,17 @@ class NavigationMap:
         return pairs[best], np.array([1.0 - share[best], share[best]])
 
 
+def reflectance_of(ior: float) -> float:
+    """F0, seen head-on, of a refractive index of at least 1."""
+    return float(((ior - 1) / (ior + 1)) ** 2)
+
+
+def ior_of(f0: float) -> float:
+    """The refractive index of a reflectance below 1."""
+    root = math.sqrt(f0)
+    return (1 + root) / (1 - root)
+
+
 def _numbers(preset: Preset) -> list[float]:
     diffuse, highlight = preset.terms
     return [*diffuse["color"], *highlight["color"], *highlight["params"].values()]
@@ -85,7 +95,7 @@ def navigation_map() -> NavigationMap:
     """The map of the library's Cook–Torrance materials."""
     found = tuple(preset for preset in presets() if preset.id.startswith(_TABLE + "/"))
     params = [preset.terms[1]["params"] for preset in found]
-    f0 = np.array([((p["ior"] - 1) / (p["ior"] + 1)) ** 2 for p in params])
+    f0 = np.array([reflectance_of(p["ior"]) for p in params])
     sigma = np.array([p["sigma"] for p in params])
     corners = np.column_stack([f0, np.log(sigma)])
     # triangles as round as they can be where both axes are as long

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.look.library.navigation import navigation_map
+from relume.look.library.navigation import ior_of, navigation_map, reflectance_of
 
 F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
@@ -35,8 +35,7 @@ def across_map(one: Terms, other: Terms, between: Terms, share: float) -> Terms:
     here = (1 - share) * ends[0] + share * ends[1]
     beside = [_colors(terms) - _map_colors(place) for terms, place in zip((one, other), ends, strict=True)]
     colors = np.maximum(_map_colors(here) + (1 - share) * beside[0] + share * beside[1], 0)
-    root = math.sqrt(here[0])
-    params = {**between[1]["params"], "sigma": math.exp(here[1]), "ior": (1 + root) / (1 - root)}
+    params = {**between[1]["params"], "sigma": math.exp(here[1]), "ior": ior_of(float(here[0]))}
     return [
         {**between[0], "color": colors[0].tolist()},
         {**between[1], "color": colors[1].tolist(), "params": params},
@@ -54,7 +53,7 @@ def _is_of_map(terms: Terms) -> bool:
 def _place(terms: Terms) -> F64:
     """Where a material lies on the map: (F0, log σ)."""
     params = terms[1]["params"]
-    return np.array([((params["ior"] - 1) / (params["ior"] + 1)) ** 2, math.log(params["sigma"])])
+    return np.array([reflectance_of(params["ior"]), math.log(params["sigma"])])
 
 
 def _colors(terms: Terms) -> F64:

@@ -89,7 +89,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     )
 
 
-@lru_cache(maxsize=_MOST_KNOWN)
+@lru_cache(maxsize=2)
 def _about_mirror(num_spokes: int) -> tuple[F64, F64]:
     """Spread directions about a pole, over the half where y > 0 for what is the same on the other.
 

@@ -11,13 +11,11 @@ import numpy as np
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
-    """Wrap a texel's index into an image."""
+    """Fold a texel's index into an image that is mirrored outside, or clamp it."""
     if wrap == 2:
         return min(max(index, 0), size - 1)
-    if wrap == 1:
-        folded = index % (2 * size)
-        return min(folded, 2 * size - 1 - folded)
-    return index % size
+    folded = index % (2 * size)
+    return min(folded, 2 * size - 1 - folded)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
