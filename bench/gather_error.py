@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.gather import bake, recipe_of
-from bench.indirect import PASSES, reflected, reflected_by_mitsuba
+from bench.indirect import PASSES, highlights_send_nothing, reflected, reflected_by_mitsuba
 from bench.mitsuba import bsdf, missing
 from bench.standard_error import over_passes
 from relume.memory import Memory
@@ -39,7 +39,8 @@ def measure(tiny: bool) -> list[Figure]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
-        plain, both = (reflected(transfer, terms) for terms in ({"Floor": (diffuse,)}, {}))
+        with highlights_send_nothing():
+            plain, both = (reflected(transfer, terms) for terms in ({"Floor": (diffuse,)}, {}))
         theirs = {
             "diffuse": reflected_by_mitsuba(scene, recipe.size, beyond, beyond, spp["diffuse"], folder),
             "glossy": reflected_by_mitsuba(scene, recipe.size, [highlight, *beyond[1:]], beyond, spp["glossy"], folder),

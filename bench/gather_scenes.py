@@ -1,15 +1,17 @@
 """gather.rmse_SCENE: reflected light of the scenes made by code, each a whole picture.
 
-As gather.rmse_diffuse, but with the highlights that the camera sees. We have twice the width and height,
-averaged over 2 × 2 pixels as Mitsuba's box filter averages over one of its own. Mitsuba's side has no textures, and of
-highlights those of peer_mitsuba_plugins.py: in the still life both renderers have the mean colour of the tray's wood,
-and Cook and Torrance's highlights on teapot, handles and bowl. The other scenes are as they are.
+As gather.rmse_diffuse, but with the highlights that the camera sees; surfaces on the way reflect by their diffuse terms
+on both sides, so that what is left is cells, rays and grain (bench/gather_full.py has whole materials). We have twice
+the width and height, averaged over 2 × 2 pixels as Mitsuba's box filter averages over one of its own. Mitsuba's side
+has no textures, and of highlights those of peer_mitsuba_plugins.py: in the still life both renderers have the mean
+colour of the tray's wood, and Cook and Torrance's highlights on teapot, handles and bowl. The others are as they are.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.gather import bake
-from bench.indirect import PASSES, reflected, reflected_by_mitsuba
+from bench.indirect import PASSES, highlights_send_nothing, reflected, reflected_by_mitsuba
 from bench.mitsuba import bsdf, missing
 from bench.standard_error import over_passes
 from relume.bake import Recipe
@@ -57,15 +59,20 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped(names, _UNIT, why)
     figures = []
     for figure, name in zip(names, SIZES, strict=True):
-        pair = rendered(name, tiny)
+        pair = rendered(name, 2 if tiny else _SPP, tiny)
         found = over_passes(*pair)
         about = {**found.context, "size": list(pair.ours.shape[1::-1]), "spp": PASSES * (2 if tiny else _SPP)}
         figures.append(Figure(figure, found.error.value, _UNIT, about, found.error.standard_error))
     return figures
 
 
-def rendered(name: str, tiny: bool = False) -> Pair:
-    """Bake and render one of `SIZES` by both renderers."""
+def rendered(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool = False) -> Pair:
+    """Bake and render one of `SIZES` by both renderers.
+
+    Args:
+        name: of the scene. spp: of each of Mitsuba's passes. tiny: sizes that mean nothing.
+        is_full: surfaces on the way reflect by all their terms; else by diffuse ones.
+    """
     scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)
     size = (40, 30) if tiny else SIZES[name]
     terms: dict[str, Terms] = {material.name: material.terms for material in scene.materials}
@@ -73,13 +80,13 @@ def rendered(name: str, tiny: bool = False) -> Pair:
         terms |= _in_place_of(scene)
     of_meshes = [terms[scene.materials[mesh.material].name] for mesh in scene.meshes]
     seen = [bsdf(of_mesh) for of_mesh in of_meshes]
-    beyond = [bsdf([term for term in of_mesh if is_diffuse(term)]) for of_mesh in of_meshes]
+    beyond = seen if is_full else [bsdf([term for term in of_mesh if is_diffuse(term)]) for of_mesh in of_meshes]
     finer = (_FINER * size[0], _FINER * size[1])
     recipe = Recipe("gather", (scene.cameras[0].name,), finer, 60 if tiny else 2000)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, nullcontext() if is_full else highlights_send_nothing():
         transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Memory(4 << 30))
         fine = reflected(transfer, terms).reshape(size[1], _FINER, size[0], _FINER, 3)
-        theirs = reflected_by_mitsuba(scene, size, seen, beyond, 2 if tiny else _SPP, Path(folder))
+        theirs = reflected_by_mitsuba(scene, size, seen, beyond, spp, Path(folder))
         return Pair(fine.mean(axis=(1, 3)), theirs)
 
 

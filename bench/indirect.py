@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.mitsuba import render
+from relume.brdf.albedo import is_diffuse, reflectances_of
 from relume.look import validate
 from relume.look.document import MAX_BOUNCES
 from relume.picture.transfer import Transfer
@@ -38,6 +41,13 @@ def reflected(transfer: Transfer, terms: Mapping[str, Sequence[Mapping[str, Any]
         look = validate(document, transfer.default_look)
         pictures.append(render_image(transfer, "front", look).astype(np.float64))
     return np.asarray(pictures[0] - pictures[1])
+
+
+@contextmanager
+def highlights_send_nothing() -> Iterator[None]:
+    """Restrict our light between surfaces to what diffuse terms send, for peers that are restricted alike."""
+    with patch("relume.picture.light.reflectances_of", lambda terms: reflectances_of(list(filter(is_diffuse, terms)))):
+        yield
 
 
 def mitsuba_job(seen: Sequence[Any], beyond: Sequence[Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ import numpy as np
 from bench import cycles, mitsuba
 from bench.figure import Figure, skipped
 from bench.gather import FLOOR, bake, edit_frames_s, opened, recipe_of, settle
-from bench.indirect import mitsuba_job, reflected, reflected_by_mitsuba
+from bench.indirect import highlights_send_nothing, mitsuba_job, reflected, reflected_by_mitsuba
 from bench.standard_error import Estimated, over_passes
 from relume.look.document import MAX_BOUNCES
 from relume.memory import Memory
@@ -50,7 +50,8 @@ def measure(tiny: bool) -> list[Figure]:
         folder = Path(name)
         transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
         edit_s = _edit_s(transfer, 5 if tiny else 60)
-        light = reflected(transfer, {})
+        with highlights_send_nothing():
+            light = reflected(transfer, {})
         bsdfs = _bsdfs(scene)
         theirs = reflected_by_mitsuba(scene, recipe.size, *bsdfs, 2 if tiny else 128, folder)
         scale = float(np.sqrt(np.mean(light**2)))

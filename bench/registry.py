@@ -112,6 +112,14 @@ GROUPS = (
         ("gather.rmse_cornell_box", "gather.rmse_tableau", "gather.rmse_still_life", "gather.rmse_interior"),
     ),
     Group(
+        "bench.gather_full",
+        tuple(
+            f"gather.full_{kind}_{scene}"
+            for scene in ("cornell_box", "tableau", "still_life", "interior")
+            for kind in ("rmse", "bias")
+        ),
+    ),
+    Group(
         "bench.estimators",
         (
             "estimators.final_gather",

@@ -56,6 +56,14 @@ TARGETS = {
     "gather.light_scale_fps": "≥ 60",
     "gather.rmse_diffuse": "≤ 2 %",
     "gather.rmse_glossy": "≤ 5 %",
+    "gather.full_rmse_cornell_box": "≤ 8 %",
+    "gather.full_rmse_tableau": "≤ 8 %",
+    "gather.full_rmse_still_life": "≤ 12 %",
+    "gather.full_rmse_interior": "≤ 4 %",
+    "gather.full_bias_cornell_box": "± 2 %",
+    "gather.full_bias_tableau": "± 2 %",
+    "gather.full_bias_still_life": "± 2 %",
+    "gather.full_bias_interior": "± 2 %",
     "lights.rmse_point": "≤ 2 %",
     "lights.rmse_rectangle": "≤ 2 %",
     "lights.gain_fps": "≥ 60",
@@ -68,7 +76,7 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "lights.rmse"))
+        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "gather.full", "lights.rmse"))
         or name == "frame.incremental_rmse"
         else "performance.md"
     )

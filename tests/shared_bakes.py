@@ -30,7 +30,7 @@ def transfer(baked):
 @pytest.fixture(scope="session")
 def corner():
     """A white floor between a red wall and a glossy one, which throw light onto it."""
-    glossy = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 30.0}}
+    glossy = {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "texture": None, "params": {"exponent": 30.0}}
     materials = [
         Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]}, glossy)),
         Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),

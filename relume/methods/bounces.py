@@ -2,8 +2,9 @@
 
     L_0 = ρ/π E,   L_{b+1}(g) = ρ(g) · mean over the gather rays r of g of L_b(link(g, r)),   L = Σ_b L_b
 
-with ρ the diffuse reflectance of a cell and E its irradiance from the environment. Rays of density cos θ / π make the
-mean an estimate of ∫ L cos θ dω / π; a ray that leaves the scene finds nothing, since what it would find is in E.
+with ρ the reflectance of a cell, of all its terms over all directions, and E its irradiance from the environment. Rays
+of density cos θ / π make the mean an estimate of ∫ L cos θ dω / π; a ray that leaves the scene finds nothing, since
+what it would find is in E.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
 
     Args:
         links: cell that each ray of a cell hits. (C, rays) uint16
-        reflectance: diffuse, in [0, 1]. (C, 3) float32. radiance: L_b. (C, 3) float32
+        reflectance: in [0, 1]. (C, 3) float32. radiance: L_b. (C, 3) float32
     Returns:
         L_{b+1}. (C, 3) float32
     Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.

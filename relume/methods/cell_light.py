@@ -48,7 +48,7 @@ class CellLight:
         return len(self.material)
 
     def reflectance(self, reflectances: Reflectances) -> F32:
-        """Diffuse reflectance of every cell, never above one. (C, 3) float32"""
+        """Reflectance of every cell, never above one. (C, 3) float32"""
         plain, *textured = np.array(reflectances).reshape(-1, 3, 3)[self.material].transpose(1, 0, 2)
         for of_texture, multiplier in zip(textured, self.textures, strict=True):
             plain += of_texture * multiplier

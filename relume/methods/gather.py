@@ -1,4 +1,4 @@
-"""Method `gather`: environment light with any number of diffuse bounces, fixed views (after Nguyen 2010).
+"""Method `gather`: environment light with any number of bounces, fixed views (after Nguyen 2010).
 
 What `relume.methods.sampled_views` bakes, and beside it gather cells on the surfaces, the lights that these see, and
 gather rays from cells and view samples, of which only the cell that each hits is kept: their directions are made again

@@ -1,9 +1,9 @@
 """Light that reaches points by reflection, by path tracing: the truth that gathered light is compared with.
 
-    R(x) = E[ π f(ωi, ωo) L(y, −ωi) ],   L(y, ω) = L_direct(y, ω) + E[ π f_d(ωi', ω) L(y', −ωi') ] …
+    R(x) = E[ f(ωi, ωo) cos θi / p(ωi) L(y, −ωi) ],   L(y, ω) = L_direct(y, ω) + R(y, ω)
 
-with ωi drawn by the cosine, y what it hits, and f_d the diffuse terms: any number of diffuse bounces, one of any kind
-to the eye. It shares neither cells nor links with what it checks.
+with y what ωi hits, and p the mean density of the lobes of its material: by the cosine, and by each of its highlights.
+Every surface reflects by all its terms. It shares neither cells nor links with what it checks.
 """
 
 from __future__ import annotations
@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import is_diffuse
 from relume.brdf.evaluate import eval_brdf
 from relume.look import Look
+from relume.reference.lobes import Lobe
 from relume.reference.local import lamps_of
-from relume.reference.radiance import Points, reference_radiance
+from relume.reference.radiance import Points, lobes_of, reference_radiance
 from relume.reference.texels import Texels
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
-from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, trace_from
 from relume.trace.surface import surface_at
 
@@ -32,6 +31,7 @@ Terms = Sequence[Mapping[str, Any]]
 
 _TEXTURE_ANGLE = 1e-3
 _LEAST_CHANCE = 0.05
+_LEAST_DENSITY = 1e-12
 _MOST_BOUNCES = 64
 
 
@@ -63,26 +63,25 @@ def reference_indirect(
     Cost: O(n · num_paths · num_bounces · spp) shadow rays.
     """
     terms: list[Terms] = [look.materials[m.name].terms for m in scene.materials]
-    diffuse: list[Terms] = [list(filter(is_diffuse, of_material)) for of_material in terms]
-    lamps = lamps_of(scene, look)
+    lobes, lamps = [lobes_of(of_material) for of_material in terms], lamps_of(scene, look)
     total, squares = np.zeros((2, points.num_points, 3))
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
-        here, of, f_terms = points, np.asarray(material), terms
+        here, of = points, np.asarray(material)
         rows, weight = np.arange(points.num_points), np.ones((points.num_points, 3))
         found = np.zeros((points.num_points, 3))
         for bounce in range(num_bounces):
-            directions = lobe_directions(here.normal, 1.0, rng)
-            weight = weight * np.pi * _brdf(f_terms, here, of, directions)
+            directions, share = _scattered(terms, lobes, here, of, rng)
+            weight = weight * share
             hits = trace_from(geometry.embree, here.position, directions)
             hit = np.nonzero(hits.face >= 0)[0]
             here, of = _places(scene, geometry, hits, directions, hit)
-            rows, weight, f_terms = rows[hit], weight[hit], diffuse
+            rows, weight = rows[hit], weight[hit]
             here, of, rows, weight = _survivors(here, of, rows, weight, rng)
             if bounce + 1 < first_bounce:
                 continue
             arriving = np.zeros((len(rows), 3))
-            for index, of_material in enumerate(diffuse):
+            for index, of_material in enumerate(terms):
                 at = np.nonzero(of == index)[0]
                 drawn = (seed * num_paths + path) * _MOST_BOUNCES + bounce
                 arriving[at] = reference_radiance(
@@ -115,15 +114,28 @@ def _places(
     return points, geometry.face_material[some.face]
 
 
-def _brdf(terms: Sequence[Terms], points: Points, material: NDArray[np.integer], directions: F32) -> F64:
-    """f(ωi, ωo) of each point. directions: world space. (n, 3)"""
-    normal, tangent = points.normal.astype(np.float64), points.tangent.astype(np.float64)
-    frames = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
-    wi, wo = (np.einsum("nij,nj->ni", frames, v.astype(np.float64)) for v in (directions, points.wo))
-    value = np.zeros((points.num_points, 3))
-    for index, of_material in enumerate(terms):
+def _scattered(
+    terms: Sequence[Terms], lobes: Sequence[Sequence[Lobe]], points: Points, material: NDArray[np.integer],
+    rng: np.random.Generator,
+) -> tuple[F32, F64]:  # fmt: skip
+    """Draw a direction for each point by one of its material's lobes.
+
+    Returns:
+        World space, unit (n, 3), and f cos θi over the density of all lobes together (n, 3), nothing below the horizon.
+    """
+    frames = points.frames()
+    wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
+    wi, share = np.zeros((points.num_points, 3)), np.zeros((points.num_points, 3))
+    for index, (of_material, of_lobes) in enumerate(zip(terms, lobes, strict=True)):
         at = np.nonzero(material == index)[0]
+        chosen = rng.integers(len(of_lobes), size=len(at))
+        for k, lobe in enumerate(of_lobes):
+            some = at[chosen == k]
+            wi[some] = lobe.draw(wo[some], 1, rng)[:, 0]
+        density = np.mean([lobe.density_of(wi[at, None], wo[at])[:, 0] for lobe in of_lobes], axis=0)
+        cosine = np.where((wi[at, 2] > 0) & (wo[at, 2] > 0), wi[at, 2], 0.0)
         for term in of_material:
             texture = points.textures[term["texture"]][at] if term["texture"] is not None else 1.0
-            value[at] += texture * eval_brdf(term, wi[at], wo[at])
-    return value
+            value = eval_brdf(term, wi[at], wo[at])
+            share[at] += texture * value * (cosine / np.maximum(density, _LEAST_DENSITY))[:, None]
+    return np.einsum("nji,nj->ni", frames, wi).astype(np.float32), share

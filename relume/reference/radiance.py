@@ -163,14 +163,27 @@ def _add_texels(
 
 def _lobes_of(tables: Sequence[Sequence[_Tables]], spp: int) -> list[tuple[Lobe, int]]:
     """What reflects much of the materials, and how many directions are drawn of each."""
-    narrow = []
-    for table in (table for terms in tables for table in terms):
-        curves = [curve for curve in table.term.curves if not curve.outgoing]
-        for curve, values in zip(curves, table.values, strict=True):
-            if (lobe := lobe_of(curve.angle, curve.axes, values.mean(axis=0))) is not None:
-                narrow.append(lobe)
+    narrow = [lobe for terms in tables for table in terms for lobe in _narrow(table)]
     each = max(1, round(_LOBES_SHARE * spp / max(1, len(narrow))))
     return [(cosine_lobe(), max(1, round(_COSINE_SHARE * spp))), *((lobe, each) for lobe in narrow)]
+
+
+def _narrow(table: _Tables) -> list[Lobe]:
+    curves = [curve for curve in table.term.curves if not curve.outgoing]
+    found = (
+        lobe_of(curve.angle, curve.axes, values.mean(axis=0))
+        for curve, values in zip(curves, table.values, strict=True)
+    )
+    return [lobe for lobe in found if lobe is not None]
+
+
+def lobes_of(terms: Sequence[Document]) -> list[Lobe]:
+    """Find what reflects much of a material: all about the normal, then each lobe of its terms.
+
+    Args:
+        terms: as they stand in a complete look.
+    """
+    return [cosine_lobe(), *(lobe for document in terms for lobe in _narrow(_tabulate(document)))]
 
 
 def _add_drawn(

@@ -27,12 +27,22 @@ IN_PROCESS = [
 ]  # fmt: skip
 LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
-    "bench.gather_error", "bench.gather_scenes", "bench.peer_gather", "bench.lights", "bench.memory",
-    "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather", "bench.gather_follow",
-    "bench.surface", "bench.surface_truth",
+    "bench.gather_error", "bench.gather_full", "bench.gather_scenes", "bench.peer_gather", "bench.lights",
+    "bench.memory", "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather",
+    "bench.gather_follow", "bench.surface", "bench.surface_truth",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
-ESTIMATES = ("accuracy.", "paper.", "truth.", "gather.rmse_", "lights.rmse_", "estimators.", "peer.", "surface.rmse_")
+ESTIMATES = (
+    "accuracy.",
+    "paper.",
+    "truth.",
+    "gather.rmse_",
+    "gather.full_",
+    "lights.rmse_",
+    "estimators.",
+    "peer.",
+    "surface.rmse_",
+)
 
 
 def group_of(module: str) -> registry.Group:

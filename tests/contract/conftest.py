@@ -33,7 +33,7 @@ def scene() -> Scene:
     """A floor and a wall that shadows it, a name that is hard on file names, two views, light from one side."""
     floor = _quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     wall = _quad("wall", [[-0.5, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]], 1)
-    glossy = {"model": "blinn_phong", "color": [0.4, 0.4, 0.4], "params": {"exponent": 20.0}}
+    glossy = {"model": "blinn_phong", "color": [0.2, 0.2, 0.2], "params": {"exponent": 20.0}}
     materials = [
         Material("Floor", ({"model": "lambert", "color": [0.6, 0.5, 0.4]},)),
         Material("Wall", ({"model": "lambert", "color": [0.2, 0.3, 0.5]}, glossy)),

@@ -36,6 +36,10 @@ def painted(document):
     document["materials"]["Floor"]["terms"][0]["color"] = [0.1, 0.7, 0.3]
 
 
+def matt(document):
+    del document["materials"]["Wall"]["terms"][1]
+
+
 def replaced(document):
     document["materials"]["Wall"]["terms"] = [{"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3}}]
 

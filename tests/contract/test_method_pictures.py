@@ -16,6 +16,7 @@ from looks_of_pictures import (
     exponent,
     light,
     lit,
+    matt,
     painted,
     transport,
 )
@@ -192,18 +193,39 @@ def test_straight_light_is_that_of_brute_force(scene, transfer, recipe):
     assert relative_rmse(exact_image(transfer, look), truth) < 0.03
 
 
-@pytest.mark.parametrize("off", [environment(scale=0.0), light("Lamp", on=False)], ids=["of a lamp", "of the map"])
-def test_light_between_surfaces_is_that_of_brute_force(scene, transfer, recipe, off):
+OFF = pytest.mark.parametrize("off", [environment(scale=0.0), light("Lamp", on=False)], ids=["of a lamp", "of the map"])
+
+
+def followed(scene, look, recipe, reflects):
+    """The mean of a picture by brute force, and its standard error. (3,) each"""
+    passes = [reference_image(scene, "front", look, recipe.size, 64, pass_index=k, reflects=reflects) for k in range(8)]
+    means = np.mean(passes, axis=(1, 2))
+    return means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(means))
+
+
+@OFF
+def test_light_between_matt_surfaces_is_that_of_brute_force(scene, transfer, recipe, off):
     """The mean of the picture by a percent and the noise of paths; none where the method has none."""
     brute_force_knows(transfer)
-    look = look_of(transfer, lit(light("Panel", on=False), off, transport(show="first_bounce")))
+    look = look_of(transfer, lit(light("Panel", on=False), off, matt, transport(show="first_bounce")))
     found = exact_image(transfer, look).mean(axis=(0, 1))
     assert np.all((found > 0) == reflects(transfer))
-    passes = [
-        reference_image(scene, "front", look, recipe.size, 64, pass_index=k, reflects=reflects(transfer))
-        for k in range(8)
-    ]
-    means = np.mean(passes, axis=(1, 2))
-    expected, deviation = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(means))
+    expected, deviation = followed(scene, look, recipe, reflects(transfer))
     assert np.all(deviation <= 0.05 * expected)
     assert np.all(np.abs(found - expected) <= 4 * deviation + 0.01 * expected)
+
+
+@OFF
+def test_light_that_highlights_send_is_about_as_much_as_by_brute_force(scene, transfer, recipe, off):
+    """It is spread evenly, so that a seventh may go elsewhere; a third would be missing if they sent none."""
+    brute_force_knows(transfer)
+    if not reflects(transfer):
+        pytest.skip(f"{transfer.method} has no light between surfaces")
+    lights = light("Panel", on=False), off, transport(show="first_bounce")
+    look = look_of(transfer, lit(*lights))
+    (expected, deviation), (sent_by_matt, _) = (
+        followed(scene, each, recipe, True) for each in (look, look_of(transfer, lit(*lights, matt)))
+    )
+    found = exact_image(transfer, look).mean(axis=(0, 1))
+    assert np.all(sent_by_matt < 0.67 * expected)
+    assert np.all(np.abs(found - expected) <= 4 * deviation + 0.15 * expected)

@@ -14,8 +14,9 @@ from oracle import rendered_afresh
 from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
 from tiny_scenes import scene_of
 
-from relume.brdf.albedo import diffuse_reflectance, reflectances_of
+from relume.brdf.albedo import reflectance, reflectances_of
 from relume.brdf.curves import curve_bands
+from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
 from relume.light.triangles import subdivide
@@ -31,6 +32,7 @@ from relume.project.projector import Projector
 from relume.project.receivers import GatherRays, Receivers
 from relume.reference import Points, texels_of
 from relume.reference.indirect import reference_indirect
+from relume.reference.radiance import lobes_of
 from relume.render.image import render_image
 from relume.scene.model import Material
 from relume.trace.cell_tree import NO_CELL
@@ -174,11 +176,33 @@ def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
 
 def test_reflectance_of_diffuse_terms():
     lambert = {"model": "lambert", "color": [0.2, 0.5, 0.9], "texture": None, "params": {}, "curves": {}}
-    np.testing.assert_allclose(diffuse_reflectance(lambert), [0.2, 0.5, 0.9], rtol=1e-6)
+    np.testing.assert_allclose(reflectance(lambert), [0.2, 0.5, 0.9], rtol=1e-6)
     rough = {**lambert, "model": "oren_nayar", "params": {"sigma": 0.5}}
-    assert 0.5 < diffuse_reflectance(rough)[1] / 0.5 < 1.0
-    glossy = {**lambert, "model": "blinn_phong", "params": {"exponent": 20.0}}
-    assert reflectances_of([lambert, glossy]) == reflectances_of([lambert])
+    assert 0.5 < reflectance(rough)[1] / 0.5 < 1.0
+
+
+def test_reflectance_of_highlights():
+    """Of a cosine lobe cos^s in θh it is known; a mirror of any width reflects all where its Fresnel curve does."""
+    plain = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
+    for exponent in (5.0, 400.0, 20_000.0):
+        blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
+        np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
+    lambert = {**plain, "model": "lambert", "params": {}}
+    both = np.reshape(reflectances_of([lambert, {**blinn, "texture": "specular"}]), (3, 3))
+    np.testing.assert_allclose(both[0], [1.0, 0.5, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(both[2], reflectance(blinn), atol=0.5 / 128)
+
+
+def _by_drawing(document):
+    """The same by Monte Carlo: ωi drawn by the term's own lobe."""
+    rng = np.random.default_rng(3)
+    r, phi = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    wo = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
+    lobe = lobes_of([document])[1]
+    wi = lobe.draw(wo, 64, rng)
+    weight = np.where(wi[..., 2] > 0, wi[..., 2] / np.maximum(lobe.density_of(wi, wo), 1e-12), 0.0)
+    wi[wi[..., 2] <= 0] = [0.0, 0.0, 1.0]
+    return (eval_brdf(document, wi, wo[:, None]) * weight[..., None]).mean(axis=(0, 1))
 
 
 def default_look(transfer):

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.symmetry import is_mirrored
 from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors
-from relume.moving.basis.symmetry import is_mirrored
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

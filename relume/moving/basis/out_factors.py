@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.basis.symmetry import all_around, is_isotropic, is_mirrored
+from relume.brdf.symmetry import is_isotropic, is_mirrored
+from relume.moving.basis.symmetry import all_around
 from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 
 F32 = NDArray[np.float32]

@@ -1,0 +1,33 @@
+"""gather.full_rmse_SCENE and gather.full_bias_SCENE: reflected light against Mitsuba's whole path tracer.
+
+The pictures of bench/gather_scenes.py, every surface on the way with its whole BSDF on Mitsuba's side: highlights light
+other surfaces there by their own shape, with us evenly (docs/adr/0045-highlights-send-light-evenly.md).
+"""
+
+from __future__ import annotations
+
+from bench.figure import Figure, skipped
+from bench.gather_scenes import SIZES, rendered
+from bench.indirect import PASSES
+from bench.mitsuba import missing
+from bench.standard_error import over_passes
+
+_SPP = 16  # of each pass: errors of some per cent are told from the noise
+_UNIT = "%"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake and a render of each."""
+    if (why := missing()) is not None:
+        return skipped(tuple(f"gather.full_{kind}_{name}" for name in SIZES for kind in ("rmse", "bias")), _UNIT, why)
+    return [figure for name in SIZES for figure in _figures(name, 2 if tiny else _SPP, tiny)]
+
+
+def _figures(name: str, spp: int, tiny: bool) -> list[Figure]:
+    pair = rendered(name, spp, tiny, is_full=True)
+    found = over_passes(*pair)
+    about = {"size": list(pair.ours.shape[1::-1]), "spp": PASSES * spp, "noise": found.noise, "limit": found.limit}
+    return [
+        Figure(f"gather.full_{kind}_{name}", 100 * of.value, _UNIT, about, 100 * of.standard_error)
+        for kind, of in (("rmse", found.error), ("bias", found.bias))
+    ]
