@@ -22,7 +22,7 @@ Reflectances = tuple[tuple[float, ...], ...]
 """Of each material, from `reflectances_of`."""
 
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
-_NUM_OUT, _NUM_RADII = 12, 32
+_NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128
 
 
@@ -70,7 +70,7 @@ def _of_lobe(term_text: str) -> F64:
     document = json.loads(term_text)
     cos_o, weight_o = _gauss(_NUM_OUT)
     u, weight_u = _gauss(_NUM_RADII)
-    theta, phi = np.pi * u**3, np.pi * (np.arange(_NUM_AZIMUTHS) + 0.5) / _NUM_AZIMUTHS
+    theta, phi = np.pi * u**3, np.pi * (np.arange(_NUM_AROUND) + 0.5) / _NUM_AROUND
     solid = np.repeat(weight_u * 3 * np.pi * u**2 * np.sin(theta), len(phi)) * (2 * np.pi / len(phi))
     x, y = (np.outer(np.sin(theta), turn(phi)).ravel() for turn in (np.cos, np.sin))
     z = np.repeat(np.cos(theta), len(phi))

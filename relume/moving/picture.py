@@ -17,7 +17,7 @@ from relume.moving.frame import Frame, Materials, Wanted, frame_of
 from relume.moving.look_up import Seen, look
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
-from relume.picture.light import Light, Solo, gain_of, light_of, vector_of
+from relume.picture.light import Light, Solo, gain_of, is_about, light_of, vector_of
 from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
@@ -163,6 +163,8 @@ class MovingPicture:
     def _vectors_now(self, seen: Seen) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
         light, transfer = self._now(), self._transfer
+        if self._is_rough and self._vectors is not None and is_about(self._vectors[0], light):
+            return self._vectors[1]  # nearer than what is found quickly, and the hand is on something else than light
         if self._is_rough:
             return roughly(transfer, light, np.flatnonzero(seen.is_needed))
         if self._vectors is None or self._vectors[0] != light:

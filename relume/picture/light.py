@@ -17,6 +17,7 @@ Solo = frozenset[str] | None
 
 _ONE: Rgb = (1.0, 1.0, 1.0)
 _NOTHING: Rgb = (0.0, 0.0, 0.0)
+_LITTLE = 0.05  # of all light that a surface receives
 _MOST_KNOWN = 64  # lights whose vectors are kept: every route asks for those of a frame, for every term
 
 
@@ -166,6 +167,14 @@ def is_same_environment(before: Light, after: Light) -> bool:
     """Whether the environment's own light is as before: only local lights differ, and light between surfaces."""
     alike = before._replace(reflectances=after.reflectances, paths=after.paths, local=after.local) == after
     return alike and before.paths.direct == after.paths.direct
+
+
+def is_about(before: Light, after: Light) -> bool:
+    """Whether lights differ in what surfaces reflect onto each other alone, and in that by little."""
+    if before._replace(reflectances=after.reflectances) != after or len(before.reflectances) != len(after.reflectances):
+        return False
+    pairs = zip(before.reflectances, after.reflectances, strict=True)
+    return all(abs(a - b) <= _LITTLE for one, other in pairs for a, b in zip(one, other, strict=True))
 
 
 def light_of(look: Look, material_names: Sequence[str], *, has_bounces: bool, solo: Solo = None) -> Light:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, environment, light, lit, painted, transport
+from looks_of_pictures import EDITS, LOBE, environment, exponent, light, lit, painted, transport
 from sessions import look_of, relative_rmse
 
 from relume.errors import CancelledError, NotFoundError, ParameterError
@@ -87,6 +87,28 @@ def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched
     exact = seen(moving, change, other).image()
     np.testing.assert_array_equal(picture.image(), exact)
     assert relative_rmse(rough, exact) < 0.3
+
+
+def test_a_hand_on_a_highlight_waits_for_no_light_between_surfaces(moving, monkeypatch):
+    """Light that surfaces send is kept while a highlight changes by little, and made anew at rest."""
+    turned = environment(rotation=137.0)  # nobody else asks for its light
+    picture = MovingPicture(moving, "front", is_watched=True)
+    picture.set_look(look_of(moving, lit(turned)))
+    picture.advance(None)
+    job = picture.next_job()
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    picture.advance(None)
+    with monkeypatch.context() as nothing_quick:
+        nothing_quick.setattr("relume.moving.picture.roughly", None)
+        picture.set_look(look_of(moving, lit(turned, exponent(8.0))))
+        assert picture.advance(None).fidelity == "preview"
+    shown = picture.image()
+    job = picture.next_job()
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    assert picture.advance(None).fidelity == "approximate"
+    exact = seen(moving, turned, exponent(8.0)).image()
+    np.testing.assert_array_equal(picture.image(), exact)
+    assert relative_rmse(shown, exact) < 0.02
 
 
 def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):
