@@ -21,7 +21,7 @@ Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # 
 
 
 def material(index: int, colours: dict[str, Any]) -> Any:
-    """Diffuse and glossy together where the camera sees it, diffuse further along paths, as gather cells reflect."""
+    """Diffuse and glossy together."""
     made = bpy.data.materials.new(f"material {index}")
     tree = made.node_tree
     tree.nodes.clear()
@@ -29,18 +29,13 @@ def material(index: int, colours: dict[str, Any]) -> Any:
     diffuse.inputs["Color"].default_value = (*colours["diffuse"], 1)
     surface = diffuse.outputs[0]
     if any(colours["glossy"]):
-        glossy, total, path, chosen = (
-            tree.nodes.new(f"ShaderNode{name}") for name in ("BsdfAnisotropic", "AddShader", "LightPath", "MixShader")
-        )
+        glossy, total = (tree.nodes.new(f"ShaderNode{name}") for name in ("BsdfAnisotropic", "AddShader"))
         glossy.distribution = "BECKMANN"
         glossy.inputs["Color"].default_value = (*colours["glossy"], 1)
         glossy.inputs["Roughness"].default_value = colours["roughness"]
         tree.links.new(surface, total.inputs[0])
         tree.links.new(glossy.outputs[0], total.inputs[1])
-        tree.links.new(path.outputs["Is Camera Ray"], chosen.inputs[0])
-        tree.links.new(surface, chosen.inputs[1])
-        tree.links.new(total.outputs[0], chosen.inputs[2])
-        surface = chosen.outputs[0]
+        surface = total.outputs[0]
     tree.links.new(surface, output.inputs["Surface"])
     return made
 

@@ -5,10 +5,10 @@ The bake and the edit of bench/gather.py: the exponent of the floor's highlight.
 whole picture against Mitsuba's path tracer, its noise taken off, or what it is very likely below where it cannot be
 told from the noise. Mitsuba renders reflected light alone, as bench/indirect.py has it, which is less work than a
 picture. Cycles renders whole pictures, a Beckmann highlight as wide as ours in place of Blinn and Phong's; its noise
-is compared with our error in the same units. Both stop where we do: one bounce of any kind to the eye, diffuse ones
-before it. Noise is the difference of two seeds over √2; where our error is not reached at the largest count, the time
-is extrapolated by noise ∝ 1/√spp, time ∝ spp, and the context says so. Scene loading and compiling are not counted;
-nor is our bake.
+is compared with our error in the same units. Every surface has its whole material with both of them: what we leave out
+of the light that highlights send is among our error. Noise is the difference of two seeds over √2; where our error is
+not reached at the largest count, the time is extrapolated by noise ∝ 1/√spp, time ∝ spp, and the context says so. Scene
+loading and compiling are not counted; nor is our bake.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from bench import cycles, mitsuba
 from bench.figure import Figure, skipped
 from bench.gather import FLOOR, bake, edit_frames_s, opened, recipe_of, settle
-from bench.indirect import highlights_send_nothing, mitsuba_job, reflected, reflected_by_mitsuba
+from bench.indirect import mitsuba_job, reflected, reflected_by_mitsuba
 from bench.standard_error import Estimated, over_passes
 from relume.look.document import MAX_BOUNCES
 from relume.memory import Memory
@@ -50,15 +50,14 @@ def measure(tiny: bool) -> list[Figure]:
         folder = Path(name)
         transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
         edit_s = _edit_s(transfer, 5 if tiny else 60)
-        with highlights_send_nothing():
-            light = reflected(transfer, {})
-        bsdfs = _bsdfs(scene)
-        theirs = reflected_by_mitsuba(scene, recipe.size, *bsdfs, 2 if tiny else 128, folder)
+        light = reflected(transfer, {})
+        bsdfs = [mitsuba.bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
+        theirs = reflected_by_mitsuba(scene, recipe.size, bsdfs, bsdfs, 2 if tiny else 128, folder)
         scale = float(np.sqrt(np.mean(light**2)))
         found = over_passes(light, theirs)
         error = found.error.value if found.is_told else found.limit
         ours = _Ours(Estimated(error * scale, found.error.standard_error * scale), edit_s)
-        job = {"spp": [1, 2] if tiny else [8, 64], **mitsuba_job(*bsdfs)}
+        job = {"spp": [1, 2] if tiny else [8, 64], **mitsuba_job(bsdfs, bsdfs)}
         steps = mitsuba.render(scene, recipe.size, job, folder)
         of_mitsuba = [{**step, "noise": step["error"] * scale} for step in steps["steps"]]
         about = {"mitsuba": steps["version"], "error": found.error.value, **found.context}
@@ -72,7 +71,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 def _ratio(name: str, steps: list[dict[str, Any]], ours: _Ours, about: dict[str, Any]) -> Figure:
     last = steps[-1]
-    theirs_s = last["seconds"] * max(1.0, (last["noise"] / ours.error.value) ** 2)
+    theirs_s = last["seconds"] * max(1 / last["spp"], (last["noise"] / ours.error.value) ** 2)
     ratio = theirs_s / ours.edit_s  # ∝ 1/error²
     context = {
         "our_error": ours.error.value, "our_edit_ms": 1e3 * ours.edit_s, "their_seconds": theirs_s,
@@ -87,12 +86,6 @@ def _edit_s(transfer: Transfer, num_frames: int) -> float:
     picture.touch(f"{FLOOR}/params/exponent")
     settle(picture)
     return float(np.median(edit_frames_s(transfer, picture, num_frames)))
-
-
-def _bsdfs(scene: Scene) -> tuple[list[Any], list[Any]]:
-    """BSDFs of the meshes as the camera sees them, and as paths meet them further on."""
-    beyond = [mitsuba.bsdf(scene.materials[mesh.material].terms[:1]) for mesh in scene.meshes]
-    return [mitsuba.bsdf(GLOSSY_FLOOR), *beyond[1:]], beyond
 
 
 def _materials(scene: Scene) -> list[dict[str, Any]]:

@@ -165,8 +165,7 @@ def test_a_moved_lamp_is_followed_with_its_shadows_and_what_it_reflects(gathered
     looks = [lamp_at(gathered, x) for x in (-0.5, -0.2, 0.1, 0.4)]
     picture = follow_lamp(gathered, *looks)
     exact, start = (exact_image(gathered, look) for look in (looks[-1], looks[0]))
-    assert relative_rmse(start, exact) > 0.3
-    assert relative_rmse(picture.image(), exact) < 0.03
+    assert relative_rmse(picture.image(), exact) < 0.1 * relative_rmse(start, exact)
     np.testing.assert_array_equal(settle(picture).image(), exact)
 
 
