@@ -3,8 +3,10 @@ f the sum of a look's terms."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -80,6 +82,13 @@ class _Tables:
 
 
 def _tabulate(document: Document) -> _Tables:
+    return _tables_of(json.dumps(document, sort_keys=True))
+
+
+@lru_cache(maxsize=16)
+def _tables_of(term_text: str) -> _Tables:
+    """Paths ask for the terms of a scene at every bounce; some megabytes each."""
+    document = json.loads(term_text)
     term = TERMS[document["model"]].settled(document)
     curves = [curve for curve in term.curves if not curve.outgoing]
     gamma = np.linspace(0.0, MAX_ANGLE, _STEPS + 1)

@@ -156,6 +156,7 @@ BOUNDED = {
     "moving/bumps.py",
     "operators/nodes.py",
     "picture/light.py",
+    "reference/radiance.py",
     "scene/cornell.py",
     "scene/demo/__init__.py",
     "scene/gltf/sheen.py",
