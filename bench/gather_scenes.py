@@ -57,11 +57,11 @@ def measure(tiny: bool) -> list[Figure]:
     names = tuple(f"gather.rmse_{name}" for name in SIZES)
     if (why := missing()) is not None:
         return skipped(names, _UNIT, why)
-    figures = []
+    figures, spp = [], 2 if tiny else _SPP
     for figure, name in zip(names, SIZES, strict=True):
-        pair = rendered(name, 2 if tiny else _SPP, tiny)
+        pair = rendered(name, spp, tiny)
         found = over_passes(*pair)
-        about = {**found.context, "size": list(pair.ours.shape[1::-1]), "spp": PASSES * (2 if tiny else _SPP)}
+        about = {**found.context, "size": list(pair.ours.shape[1::-1]), "spp": PASSES * spp}
         figures.append(Figure(figure, found.error.value, _UNIT, about, found.error.standard_error))
     return figures
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
-from relume.brdf.symmetry import is_isotropic
+from relume.brdf.symmetry import about_normal, is_isotropic
 
 F64 = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ Reflectances = tuple[tuple[float, ...], ...]
 
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
-_STEPS = 128
+_STEPS = 128  # of a highlight's reflectance, from none to all
 
 
 def is_diffuse(term_document: Mapping[str, Any]) -> bool:
@@ -80,7 +80,7 @@ def _of_lobe(term_text: str) -> F64:
     wo = np.stack([sine, 0 * sine, cos_o], axis=-1)[:, None]
     weight = (weight_o * cos_o)[:, None] * solid * np.maximum(above, 0)
     turns = _TURNS[:1] if is_isotropic(document) else _TURNS
-    value = np.mean([eval_brdf(document, wi @ turn, wo @ turn) for turn in turns], axis=0)
+    value = np.mean([eval_brdf(document, wi @ turn.T, wo @ turn.T) for turn in turns], axis=0)
     return np.asarray(2 * np.einsum("on,onc->c", weight, value))
 
 
@@ -90,12 +90,7 @@ def _gauss(num: int) -> tuple[F64, F64]:
     return (nodes + 1) / 2, weights / 2
 
 
-def _about_normal(phi: float) -> F64:
-    c, s = np.cos(phi), np.sin(phi)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-_TURNS = [_about_normal(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term that looks different from there
+_TURNS = [about_normal(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term that looks different from there
 
 
 @lru_cache(maxsize=1024)

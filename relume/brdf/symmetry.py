@@ -16,11 +16,15 @@ _SAME = 1e-6  # relative difference that rounding may make
 _MIRRORED = {"x": np.diag([-1.0, 1.0, 1.0]), "y": np.diag([1.0, -1.0, 1.0])}
 
 
+def about_normal(phi: float) -> F64:
+    """Find the matrix that turns local directions about their normal, radians. (3, 3)"""
+    cosine, sine = np.cos(phi), np.sin(phi)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
 def is_isotropic(term_document: Mapping[str, Any]) -> bool:
     """Tell whether a term looks the same when both directions turn about the normal, or are mirrored."""
-    cosine, sine = np.cos(1.2345), np.sin(1.2345)  # an angle that no other symmetry has
-    turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-    return _stays(term_document, (turned, _MIRRORED["y"]))
+    return _stays(term_document, (about_normal(1.2345), _MIRRORED["y"]))  # an angle that no other symmetry has
 
 
 def is_mirrored(term_document: Mapping[str, Any]) -> bool:

@@ -163,9 +163,9 @@ class MovingPicture:
     def _vectors_now(self, seen: Seen) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
         light, transfer = self._now(), self._transfer
-        if self._is_rough and self._vectors is not None and is_about(self._vectors[0], light):
-            return self._vectors[1]  # nearer than what is found quickly, and the hand is on something else than light
         if self._is_rough:
+            if self._vectors is not None and is_about(self._vectors[0], light):
+                return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
             return roughly(transfer, light, np.flatnonzero(seen.is_needed))
         if self._vectors is None or self._vectors[0] != light:
             self._vectors = light, arriving(transfer, light, transfer.vectors)

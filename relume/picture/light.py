@@ -171,7 +171,7 @@ def is_same_environment(before: Light, after: Light) -> bool:
 
 def is_about(before: Light, after: Light) -> bool:
     """Whether lights differ in what surfaces reflect onto each other alone, and in that by little."""
-    if before._replace(reflectances=after.reflectances) != after or len(before.reflectances) != len(after.reflectances):
+    if before._replace(reflectances=after.reflectances) != after:
         return False
     pairs = zip(before.reflectances, after.reflectances, strict=True)
     return all(abs(a - b) <= _LITTLE for one, other in pairs for a, b in zip(one, other, strict=True))
