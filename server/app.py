@@ -33,6 +33,7 @@ from server.routes import (
     scenes,
     session,
     shares,
+    surface,
 )
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
@@ -49,6 +50,7 @@ ROUTE_GROUPS = (
     library,
     environments,
     bakes,
+    surface,
     renders,
     comparisons,
     looks,

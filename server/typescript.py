@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, cameras, protocol, renders
+from server.wire import bodies, cameras, protocol, renders, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -36,6 +36,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.BrushMessage,
     protocol.TouchMessage,
     protocol.EyeMessage,
+    protocol.EvaluateMessage,
 )
 SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,
@@ -59,6 +60,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
     *SERVER_MESSAGES,
     protocol.FrameHeader,
+    surface.SurfaceBody,
     bodies.SceneBody,
     cameras.CameraEntry,
     cameras.FinderBody,

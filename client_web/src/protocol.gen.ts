@@ -60,6 +60,12 @@ export interface EditMessage {
   solo?: string[] | null;
 }
 
+/** client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where it has changed; no frame comes for an eye alone. Exact pictures come as ever. */
+export interface EvaluateMessage {
+  type: "evaluate";
+  by: "browser" | "server";
+}
+
 /** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and edits go on in it; "stay", none does. */
 export interface EyeMessage {
   type: "eye";
@@ -187,6 +193,13 @@ export interface ViewsMessage {
   names: string[];
 }
 
+/** An array of a payload or of GET /api/bakes/{id}/surface: so many texels of 1, 2 or 4 numbers. */
+export interface ArrayInfo {
+  name: string;
+  dtype: "float32" | "float16" | "uint32" | "int32";
+  shape: [number, number];
+}
+
 /** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. */
 export interface BakeBody {
   id: string;
@@ -284,7 +297,7 @@ export interface FinderBody {
   framing: CameraFrame;
 }
 
-/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. */
+/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -292,14 +305,15 @@ export interface FrameHeader {
   width: number;
   height: number;
   tiles: [number, number, number, number][];
-  format: "rgb9e5" | "jpeg" | "f32" | "r8";
+  format: "rgb9e5" | "jpeg" | "f32" | "r8" | "arrays";
   exact: boolean;
   fidelity: "preview" | "approximate" | "followed" | "near" | "exact";
   complete: boolean;
-  kind: "picture" | "brush";
+  kind: "picture" | "brush" | "tables";
   alpha: boolean;
   eye: number | null;
   was_off: number | null;
+  tables: TablesInfo | null;
   ms: FrameTimes;
 }
 
@@ -335,6 +349,17 @@ export interface InOutBody {
   missed: number;
   needed: number | null;
   is_mirror: boolean;
+}
+
+/** How the functions of the in-basis follow from each other; see `relume.moving.basis.zernike.Ladder`. */
+export interface LadderBody {
+  order: number[];
+  norm: number[];
+  cosine: number[];
+  sine: number[];
+  a: number[];
+  b: number[];
+  c: number[];
 }
 
 /** A saved look in the list of them. */
@@ -552,6 +577,30 @@ export interface StatusMessage {
   progress: number;
 }
 
+/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. */
+export interface SurfaceBody {
+  functions: number;
+  rows: number;
+  columns: number;
+  ladder: LadderBody;
+  expansions: number[][];
+  arrays: string[];
+}
+
+/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
+export interface TablesInfo {
+  gain: [number, number, number];
+  sky_gain: [number, number, number];
+  background_gain: [number, number, number];
+  sky_turn: number;
+  sky_levels: [number, number, number][];
+  background: "map" | "blurred" | "color" | "transparent";
+  background_color: [number, number, number];
+  background_size: [number, number];
+  is_direct: boolean;
+  arrays: ArrayInfo[];
+}
+
 /** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. */
 export interface TruthBody {
   id: string;
@@ -601,7 +650,8 @@ export type ClientMessage =
   | ProbeMessage
   | BrushMessage
   | TouchMessage
-  | EyeMessage;
+  | EyeMessage
+  | EvaluateMessage;
 
 export type ServerMessage =
   | HelloMessage

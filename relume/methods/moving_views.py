@@ -107,6 +107,11 @@ class MovingViews:
         """The triangles' search tree."""
         return self.lit.local.embree
 
+    @property
+    def positions(self) -> F32:
+        """Of the triangles' corners, metres. (corners, 3) float32"""
+        return self.lit.local.positions
+
     @cached_property
     def _visible(self) -> NDArray[np.uint8]:
         return np.asarray(self.lit.store.read("points/visibility"), np.uint8)

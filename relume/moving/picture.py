@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +16,7 @@ from relume.moving.arriving import Arriving, LightJob, arriving, roughly
 from relume.moving.behind import alpha_of
 from relume.moving.frame import Frame, Materials, Wanted, frame_of
 from relume.moving.look_up import Seen, look
+from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, gain_of, is_about, light_of, vector_of
@@ -33,6 +35,10 @@ class MovingPicture:
 
     Args:
         is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long.
+
+    Attributes:
+        draws: its pixels are wanted at every step; else a shader elsewhere finds them from `parts`, and they are drawn
+            when somebody asks.
     """
 
     def __init__(self, transfer: MovingTransfer, view_name: str, *, is_watched: bool = False) -> None:
@@ -49,6 +55,10 @@ class MovingPicture:
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
         self._vectors: tuple[Light, Arriving] | None = None
+        self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
+        self.draws = True
+        self._told: tuple[Light, Arriving, bool] | None = None
+        self._num_told = 0
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
@@ -123,8 +133,9 @@ class MovingPicture:
         if self._look is None or (wanted == self._shown and self._is_rough == self._has_to_be_rough()):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)
         self._is_rough = self._has_to_be_rough()
-        self._frame = self._evaluate(self._look)
-        self._shown = wanted
+        self._is_stale, self._shown = True, wanted
+        if self.draws:
+            self._draw()
         return Advance(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
 
     @property
@@ -137,11 +148,30 @@ class MovingPicture:
         has_them = self._vectors is not None and self._vectors[0] == light
         return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
 
-    def _evaluate(self, shown: Look) -> Frame:
-        seen, gain = self._look_around(), np.array(gain_of(shown, self._solo), np.float32)
-        materials, vectors = self._materials_of(shown), self._vectors_now(seen)
-        wanted = Wanted(shown, materials, self._now(), gain, vectors, self._is_rough)
-        return frame_of(self._transfer, wanted, seen, self._camera, self._size)
+    def _draw(self) -> Frame:
+        """The frame of what is shown, evaluated where that has not been done."""
+        if self._is_stale and self._look is not None:
+            seen = self._look_around()
+            wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
+            self._frame, self._is_stale = frame_of(self._transfer, wanted, seen, self._camera, self._size), False
+        return self._frame
+
+    def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
+        gain = np.array(gain_of(shown, self._solo), np.float32)
+        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, self._is_rough)
+
+    def parts(self) -> tuple[dict[str, Part], Numbers]:
+        """What a shader needs to draw what is shown, from anywhere; after a step."""
+        assert self._look is not None
+        if self._told is None or self._told[::2] != (self._now(), self._is_rough):
+            everywhere = np.ones(self._transfer.vectors_shape[0], np.uint8)
+            vectors, before = self._vectors_now(everywhere), self._told
+            self._told = self._now(), vectors, self._is_rough
+            self._num_told += before is None or before[1] is not vectors
+        wanted = self._wanted(self._look, self._told[1])
+        assert self._materials is not None
+        versions = json.dumps(self._materials[0], sort_keys=True), self._num_told
+        return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
 
     def _now(self) -> Light:
         assert self._light is not None
@@ -160,13 +190,13 @@ class MovingPicture:
             self._materials = terms, Materials.of(terms)
         return self._materials[1]
 
-    def _vectors_now(self, seen: Seen) -> Arriving:
-        """Light vectors in the light of the look; where they may be rough, of what is seen alone."""
+    def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
+        """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
         light, transfer = self._now(), self._transfer
         if self._is_rough:
             if self._vectors is not None and is_about(self._vectors[0], light):
                 return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
-            return roughly(transfer, light, np.flatnonzero(seen.is_needed))
+            return roughly(transfer, light, np.flatnonzero(is_needed))
         if self._vectors is None or self._vectors[0] != light:
             self._vectors = light, arriving(transfer, light, transfer.vectors)
         return self._vectors[1]
@@ -177,7 +207,8 @@ class MovingPicture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame: the tiles one after another, row-major."""
-        parts = [self._frame.image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
+        image = self._draw().image
+        parts = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
         return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
@@ -187,12 +218,12 @@ class MovingPicture:
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
-        hides = self._frame.hides
+        hides = self._draw().hides
         return None if hides is None else alpha_of(hides, for_display=for_display)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""
-        return self._frame.image
+        return self._draw().image
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
         """What a pixel shows, and where its surface is.
@@ -200,11 +231,12 @@ class MovingPicture:
         Raises:
             ParameterError: it lies outside the picture.
         """
-        height, width, _ = self._frame.image.shape
+        image = self._draw().image
+        height, width, _ = image.shape
         if not (0 <= x < width and 0 <= y < height):
             raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
         found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
-        found["radiance"] = self._frame.image[y, x]
+        found["radiance"] = image[y, x]
         if self._seen is None or self._seen[1].hits.face[y * width + x] < 0:
             return found
         seen, pixel, surface = self._seen[1], y * width + x, self._transfer.surface

@@ -15,6 +15,7 @@ from relume.look import Look
 from relume.memory import Memory
 from relume.moving.arriving import LightJob
 from relume.moving.picture import MovingPicture
+from relume.moving.shader.tables import Numbers, Part
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.light import Solo
@@ -148,6 +149,19 @@ class RestingPicture:
         self._moving.set_eye(camera, size)
         self._number += 1
         self._still, self._is_still = None, False
+
+    @property
+    def draws(self) -> bool:
+        """Whether the pixels of the moving picture are wanted at every step; see `MovingPicture`."""
+        return self._moving.draws
+
+    @draws.setter
+    def draws(self, draws: bool) -> None:
+        self._moving.draws = draws
+
+    def parts(self) -> tuple[dict[str, Part], Numbers] | None:
+        """What a shader needs to draw the moving picture; None while the still is shown."""
+        return None if self._shown is self._still else self._moving.parts()
 
     def touch(self, pointer: str) -> None:
         """Prepare what a hand takes hold of; see `Picture.touch`."""

@@ -25,6 +25,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.methods.stills import Stills
     from relume.moving.picture import MovingPicture
     from relume.moving.resting import RestingPicture
+    from relume.moving.shader.geometry import arrays_of, constants
     from relume.picture.picture import Picture
     from relume.picture.transfer import Eyes
     from relume.reference import reference_image
@@ -66,6 +67,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         render_small=render_small,
         reference=reference,
         finder=finder,
+        shader_arrays=lambda transfer: (constants(), arrays_of(transfer)),
         held_bytes=memory.held,
         cache_used_bytes=lambda: memory.used_bytes,
         shrink_cache=lambda stores: memory.shrink(floor_bytes, {str(store.resolve()) for store in stores}),

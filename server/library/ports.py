@@ -15,6 +15,7 @@ from relume.picture.fidelity import Word
 from relume.picture.transfer import Opened
 
 if TYPE_CHECKING:
+    from relume.moving.shader.tables import Numbers, Part
     from relume.picture.jobs import Job
     from relume.scene.model import Camera
 
@@ -64,7 +65,12 @@ class Picture(Protocol):
 class MovingPicture(Picture, Protocol):
     """One whose eye moves."""
 
+    draws: bool
+
     def set_eye(self, camera: Camera, size: tuple[int, int], *, rests: bool) -> None: ...
+    def parts(self) -> tuple[Mapping[str, Part], Numbers] | None:
+        """What a shader needs to draw it, None where it is a fixed picture now."""
+        ...
 
 
 class Finder(Protocol):
@@ -96,6 +102,7 @@ class Library:
         reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,
             reflects=whether surfaces light each other) -> the same by brute force; heavy.
         finder: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
+        shader_arrays: transfer of a moving view -> what its shaders are written from, and the arrays that they keep.
         held_bytes: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
         cache_used_bytes: all of it, and what is being made.
         shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
@@ -108,6 +115,7 @@ class Library:
     render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., F32]
     finder: Callable[[Path], Finder]
+    shader_arrays: Callable[[Any], tuple[Mapping[str, Any], Mapping[str, Callable[[], NDArray[Any]]]]]
     held_bytes: Callable[[], Mapping[Holder, int]]
     cache_used_bytes: Callable[[], int]
     shrink_cache: Callable[[Collection[Path]], None]

@@ -88,6 +88,8 @@ class Reception:
                 self._touch(message)
             case protocol.EyeMessage():
                 self._see_from(message, received_s)
+            case protocol.EvaluateMessage():
+                self._pending.evaluator = message.by
 
     def _touch(self, message: protocol.TouchMessage) -> None:
         if message.curve is not None:

@@ -5,7 +5,8 @@ JSON header (`FrameHeader`), payload. The payload holds the header's tiles one a
 "rgb9e5" 4 bytes a pixel, "f32" 12 bytes a pixel, "jpeg" one image of the whole picture, perhaps of fewer pixels, "r8"
 one byte a pixel (frames of kind "brush": 0…255 stands for 0…1). Where the header says `alpha`, a byte for each pixel of
 the same tiles follows all that: how much it hides of what is put behind it, which its light has been multiplied by
-already.
+already. A frame of kind "tables" has no tiles: its payload is the arrays that `tables` names, little-endian, one after
+another.
 """
 
 from __future__ import annotations
@@ -163,6 +164,15 @@ class EyeMessage(Message):
     rest: Literal["exact", "stay"] = "exact"
 
 
+class EvaluateMessage(Message):
+    """client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames
+    of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where
+    it has changed; no frame comes for an eye alone. Exact pictures come as ever."""
+
+    type: Literal["evaluate"]
+    by: Literal["browser", "server"]
+
+
 ClientMessage = Annotated[
     EditMessage
     | ViewMessage
@@ -173,7 +183,8 @@ ClientMessage = Annotated[
     | ProbeMessage
     | BrushMessage
     | TouchMessage
-    | EyeMessage,
+    | EyeMessage
+    | EvaluateMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -304,9 +315,36 @@ class FrameTimes(Message):
     encode: float
 
 
+class ArrayInfo(Message):
+    """An array of a payload or of GET /api/bakes/{id}/surface: so many texels of 1, 2 or 4 numbers."""
+
+    name: str
+    dtype: Literal["float32", "float16", "uint32", "int32"]
+    shape: tuple[int, int]
+
+
+class TablesInfo(Message):
+    """What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what
+    lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height
+    and width of each. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those
+    of the payload; those that are not named are as they were."""
+
+    gain: tuple[float, float, float]
+    sky_gain: tuple[float, float, float]
+    background_gain: tuple[float, float, float]
+    sky_turn: float
+    sky_levels: list[tuple[int, int, int]]
+    background: Literal["map", "blurred", "color", "transparent"]
+    background_color: tuple[float, float, float]
+    background_size: tuple[int, int]
+    is_direct: bool
+    arrays: list[ArrayInfo]
+
+
 class FrameHeader(Message):
     """Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views.
-    `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS."""
+    `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS.
+    `tables`: of kind "tables" alone."""
 
     frame: int
     revision: int
@@ -314,12 +352,13 @@ class FrameHeader(Message):
     width: int
     height: int
     tiles: list[tuple[int, int, int, int]]
-    format: Literal["rgb9e5", "jpeg", "f32", "r8"]
+    format: Literal["rgb9e5", "jpeg", "f32", "r8", "arrays"]
     exact: bool
     fidelity: Word
     complete: bool
-    kind: Literal["picture", "brush"]
+    kind: Literal["picture", "brush", "tables"]
     alpha: bool = False
     eye: int | None = None
     was_off: float | None = None
+    tables: TablesInfo | None = None
     ms: FrameTimes

@@ -253,3 +253,37 @@ def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
     assert np.linalg.norm(answer["position"]) == pytest.approx(1.0, abs=0.02)
     session.send(type="brush", curve=f"/materials/{answer['material']}/terms/0/curves/theta_h", **{"from": 0, "to": 9})
     assert session.text("problem")["problem"]["detail"]
+
+
+def arrays_in(frame: Frame) -> dict[str, np.ndarray]:
+    """The arrays of a frame of kind "tables"."""
+    found, at = {}, 0
+    for info in frame.header["tables"]["arrays"]:
+        dtype, size = np.dtype(info["dtype"]), math.prod(info["shape"])
+        found[info["name"]] = np.frombuffer(frame.payload, dtype, size, at).reshape(info["shape"])
+        at += size * dtype.itemsize
+    assert at == len(frame.payload)
+    return found
+
+
+def tables_of(session: Session) -> Frame:
+    while (frame := session.frame()).header["kind"] != "tables":
+        pass
+    return frame
+
+
+def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_eye(session: Session) -> None:
+    found = hello(session)
+    (view,), material = found["views"], found["materials"][0]
+    session.frame()
+    session.send(**eye(view, 1, 0.2), rest="stay")
+    of_eye(session, 1)
+    session.send(type="evaluate", by="browser")
+    first = arrays_in(tables_of(session))
+    assert {"even", "materials", "vectors", "sky"} <= set(first)
+    session.send(**eye(view, 2, 0.4), rest="stay")
+    assert arrays_in(tables_of(session)) == {}
+    session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
+    recoloured = tables_of(session)
+    assert recoloured.header["revision"] == 1
+    assert not np.array_equal(arrays_in(recoloured)["even"], first["even"])

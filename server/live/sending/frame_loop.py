@@ -104,7 +104,8 @@ class FrameLoop:
 
     def _due_s(self, viewport: Viewport) -> float:
         """When a view is to be painted: at once with a new look, refined when the hand rests."""
-        if viewport.is_behind(self._pending.target) or viewport.has_to_move(self._pending):
+        pending = self._pending
+        if viewport.is_behind(pending.target) or viewport.has_to_move(pending) or viewport.has_other_evaluator(pending):
             return 0.0
         return float("inf") if viewport.is_settled else max(self._rest_until_s, viewport.not_before_s)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import struct
 import time
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from numpy.typing import NDArray
@@ -17,12 +17,14 @@ from relume.imageio.shrink import shrink
 from relume.imageio.tonemap import tone_map
 from server.library.ports import Advance, MovingPicture, Picture, Tile
 from server.live.state.target import Eye, Target
-from server.wire.protocol import FrameHeader, FrameTimes
+from server.wire.protocol import ArrayInfo, FrameHeader, FrameTimes, TablesInfo
 
 if TYPE_CHECKING:
+    from relume.moving.shader.tables import Numbers, Part
     from relume.picture.jobs import Job
 
 Format = Literal["rgb9e5", "jpeg"]
+_NOTHING = object()
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class FrameRequest:
         received_s: when the edit or the eye came in that no frame has answered yet, if there is one.
         eye: that the picture is given before; None where it has its eye, or has none that moves.
         shown_eye: number of the eye that the frame shows.
+        known: keys of the parts that the client's shader has, where it draws what moves; else None.
     """
 
     target: Target
@@ -54,6 +57,7 @@ class FrameRequest:
     received_s: float | None
     eye: Eye | None
     shown_eye: int | None
+    known: Mapping[str, Hashable] | None
     frame: int
     view: str
     size: tuple[int, int]
@@ -68,6 +72,7 @@ class Painted:
         job: what must be made before the picture can go on to where it should, or None.
         advance: what the step changed, and what the picture shows since.
         message: the packed frame, or None where none is to be sent.
+        known: keys of the parts that the client's shader has when it has got the message.
     """
 
     job: Job | None
@@ -75,6 +80,7 @@ class Painted:
     message: bytes | None
     update_ms: float
     encode_ms: float = 0.0
+    known: Mapping[str, Hashable] | None = None
 
 
 def accept(pictures: Iterable[Picture], target: Target) -> None:
@@ -111,6 +117,8 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     job = picture.next_job()
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
+    if request.known is not None and (found := cast("MovingPicture", picture).parts()) is not None:
+        return _tables(request, advance, job, found, start_s)
     has_news = bool(advance.tiles) or request.is_due
     is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not request.only_exact)
     if not is_sent:
@@ -118,24 +126,50 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     tiles, payload, alpha = _payload(picture, request, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
     wait_ms = 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
-    header = FrameHeader(
+    of_picture = {"tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None}
+    header = _header(request, advance, times(wait_ms, update_ms, encode_ms), of_picture)
+    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
+
+
+def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mapping[str, Any]) -> FrameHeader:
+    return FrameHeader(
         frame=request.frame,
         revision=request.target.revision,
         view=request.view,
         width=request.size[0],
         height=request.size[1],
-        tiles=tiles,
-        format=request.form,
         exact=advance.exact,
         fidelity=advance.fidelity,
         complete=advance.complete,
-        kind="picture",
-        alpha=alpha is not None,
         eye=request.shown_eye,
         was_off=advance.was_off,
-        ms=times(wait_ms, update_ms, encode_ms),
+        ms=ms,
+        **rest,
     )
-    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
+
+
+def _tables(
+    request: FrameRequest, advance: Advance, job: Job | None, found: tuple[Mapping[str, Part], Numbers], start_s: float
+) -> Painted:
+    """Pack what the client's shader lacks; nothing where it has all, and has been told that the look is shown."""
+    parts, numbers = found
+    known: Mapping[str, Hashable] = request.known or {}
+    advance = replace(cast("Any", advance), tiles=[])
+    updated_s = time.perf_counter()
+    update_ms = (updated_s - start_s) * 1e3
+    lacking = [part for name, part in parts.items() if known.get(name, _NOTHING) != part.key]
+    if not lacking and request.received_s is None and known:
+        return Painted(job, advance, None, update_ms, known=known)
+    arrays = {name: array for part in lacking for name, array in part.make().items()}
+    infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]
+    tables = TablesInfo(**numbers._asdict(), arrays=infos)
+    payload = b"".join(array.tobytes() for array in arrays.values())
+    encode_ms = (time.perf_counter() - updated_s) * 1e3
+    wait_ms = 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
+    of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables}
+    header = _header(request, advance, times(wait_ms, update_ms, encode_ms), of_tables)
+    now_known = {**known, **{name: part.key for name, part in parts.items()}}
+    return Painted(job, advance, pack(header, payload), update_ms, encode_ms, now_known)
 
 
 def _payload(

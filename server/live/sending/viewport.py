@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, cast
 
-from server.library.ports import Advance, Picture
+from server.library.ports import Advance, MovingPicture, Picture
 from server.live.sending.coefficient_budget import CoefficientBudget
 from server.live.sending.painter import Format, FrameRequest, Painted
 from server.live.state.frame_window import FrameWindow
@@ -57,6 +57,8 @@ class Viewport:
         self.served_s = 0.0
         self._all_tiles = self._lacking = frozenset(picture.all_tiles())
         self.eye: Eye | None = None
+        self._moves, self._evaluator = moves, "server"
+        self._known: Mapping[str, Hashable] = {}  # parts that the client's shader has
         self._is_blank = not moves  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False
         self._answered: Target | None = None
@@ -67,6 +69,10 @@ class Viewport:
     def has_to_move(self, pending: PendingRequests) -> bool:
         """Whether it has not been painted with its newest eye."""
         return pending.eyes.get(self.name) is not self.eye
+
+    def has_other_evaluator(self, pending: PendingRequests) -> bool:
+        """Whether its pixels are to be found elsewhere than they were."""
+        return self._moves and pending.evaluator != self._evaluator
 
     def is_behind(self, newest: Target) -> bool:
         """Whether it has not been painted with this look."""
@@ -89,6 +95,8 @@ class Viewport:
         """The next frame: of a new look whatever can be shown, else what refines it."""
         eye = pending.eyes.get(self.name)
         has_moved = self.has_to_move(pending)
+        if self.has_other_evaluator(pending):
+            self._evaluator, self._known, self._lacking = pending.evaluator, {}, self._all_tiles
         is_new = self.is_behind(newest) or has_moved
         size = self.size if eye is None else eye.size
         received_s = eye.received_s if eye is not None and has_moved else newest.received_s
@@ -97,6 +105,9 @@ class Viewport:
         form: Format = "jpeg" if pending.form == "jpeg" or is_moving_slowly else "rgb9e5"
         is_early = is_slow or time.perf_counter() - self._sent_s < REFINE_SEND_S
         is_answered = self._answered is newest
+        is_drawn_there = self._moves and self._evaluator == "browser" and form != "jpeg"
+        if self._moves:
+            cast("MovingPicture", self.picture).draws = not is_drawn_there
         return FrameRequest(
             target=newest,
             accepting=accepting,
@@ -110,6 +121,7 @@ class Viewport:
             received_s=None if is_answered and not has_moved else received_s,
             eye=eye if has_moved else None,
             shown_eye=None if eye is None else eye.number,
+            known=self._known if is_drawn_there else None,
             frame=window.next_frame,
             view=self.name,
             size=size,
@@ -134,6 +146,7 @@ class Viewport:
         if self.is_behind(request.target) and tiles and request.received_s is not None:
             self._moving_bytes = 4 * sum(w * h for _, _, w, h in tiles)
         self.target, self.job, self.advance = request.target, painted.job, painted.advance
+        self._known = self._known if painted.known is None else painted.known
         is_done = exact or not tiles
         if painted.message is None:
             self._lacking = self._lacking.union(tiles)

@@ -1,0 +1,29 @@
+"""The body of /api/bakes/{id}/surface: what the shaders of a moving view are written from."""
+
+from __future__ import annotations
+
+from server.wire.body import Body
+
+
+class LadderBody(Body):
+    """How the functions of the in-basis follow from each other; see `relume.moving.basis.zernike.Ladder`."""
+
+    order: list[int]
+    norm: list[float]
+    cosine: list[int]
+    sine: list[int]
+    a: list[float]
+    b: list[float]
+    c: list[float]
+
+
+class SurfaceBody(Body):
+    """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
+    `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives."""
+
+    functions: int
+    rows: int
+    columns: int
+    ladder: LadderBody
+    expansions: list[list[float]]
+    arrays: list[str]
