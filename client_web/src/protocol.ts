@@ -36,6 +36,7 @@ export type {
   ShareEntry,
   ShareRequest,
   StatusMessage,
+  SurfaceBody,
   TruthBody,
   TruthPlanBody,
   TruthRequest,

@@ -18,6 +18,7 @@ export function onePixel(view: string, complete: boolean, at = 0, width = 1): Fr
       alpha: false,
       eye: null,
       was_off: null,
+      tables: null,
       ms: { wait: 0, update: 0, encode: 0 },
     },
     payload: new Uint8Array(new Uint32Array([at]).buffer),

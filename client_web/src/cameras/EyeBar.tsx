@@ -1,5 +1,6 @@
 /** Over a picture whose eye moves: what hands can do, as buttons, and keeping the camera. */
 import { useState } from "preact/hooks";
+import { chooseDrawnBy, drawnBy, drawsHere, type Draws } from "../live/drawing";
 import { scene } from "../state/scene";
 import { viewName, views } from "../state/views";
 import { attempt, note } from "../ui/toasts";
@@ -17,6 +18,27 @@ async function keep(eye: Eye): Promise<void> {
     await keepCamera(of.id, name, eye.isFirst ? eye.first : frameOf(eye.orbit));
     note(`The camera is kept as “${name}”. Choose it under Bake to have its exact picture.`);
   });
+}
+
+const CHOICES: Record<Draws, string> = { auto: "automatic", browser: "this browser", server: "the server" };
+
+/** Who draws while the eye moves. */
+function DrawnBy() {
+  const title = drawsHere.value
+    ? "This browser draws while the eye moves: nothing goes over the network for it"
+    : "The server draws while the eye moves, and sends each picture";
+  return (
+    <label class="drawn-by" title={title}>
+      Drawn by
+      <select value={drawnBy.value} onChange={(event) => chooseDrawnBy(event.currentTarget.value as Draws)}>
+        {Object.entries(CHOICES).map(([value, words]) => (
+          <option key={value} value={value}>
+            {words}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
 }
 
 export function EyeBar() {
@@ -40,6 +62,7 @@ export function EyeBar() {
           <button title="Back to where the eye began (Home)" onClick={() => eye.restart()}>
             Back
           </button>
+          <DrawnBy />
           <button title="Keep this camera with the scene" onClick={() => void keep(eye)}>
             Keep camera
           </button>

@@ -1,8 +1,9 @@
 /** The eyes of views that move: where hands have put them, told to the server, kept over a reload. */
 import { effect } from "@preact/signals";
 import { send } from "../live/connections";
+import { drawHere, eyeSize, leave, told } from "../live/drawing";
 import { askProbe } from "../live/probing";
-import { MAX_EYE_PIXELS, type HelloMessage, type Triple } from "../protocol";
+import type { HelloMessage, Triple } from "../protocol";
 import { bake } from "../state/bakes";
 import { connection } from "../state/connection";
 import { shownViews, views } from "../state/views";
@@ -21,6 +22,8 @@ export class Eye {
   private motion: Motion;
   private number = 0;
   private hasMoved = false;
+  /** This browser draws where it goes, and the server knows where it began alone. */
+  private isAway = false;
 
   constructor(
     readonly bake: string,
@@ -84,18 +87,27 @@ export class Eye {
   }
 
   private from(orbit: Orbit): Motion {
-    return new Motion(orbit, (shown) => this.tell(frameOf(shown)));
+    return new Motion(orbit, (shown, isLast) => this.tell(frameOf(shown), isLast));
   }
 
-  private tell({ to_world, yfov }: Frame): void {
-    const { name, width, height } = this.view;
-    const scale = Math.min(1, Math.sqrt(MAX_EYE_PIXELS / (width * height)));
-    const size: [number, number] = [Math.floor(width * scale), Math.floor(height * scale)];
-    this.number = Math.max(this.number + 1, Date.now());
+  private tell({ to_world, yfov }: Frame, isLast = true): void {
+    const { name } = this.view;
     const camera = { to_world, yfov: yfov / DEGREES };
-    send({ type: "eye", view: name, eye: this.number, ...camera, size, hand: null, rest: "exact" });
     // what is laid over the picture, as the handles of lights are, follows
     views.value = views.peek().map((other) => (other.name === name ? { ...other, camera } : other));
+    const isHere = !isLast && drawHere(name);
+    if (!isHere) this.say(camera, "exact");
+    else if (!this.isAway) this.say(camera, "stay"); // nothing is to be traced of where it is passing
+    this.isAway = isHere;
+    leave(name, isHere);
+    if (isLast) drawHere(name);
+  }
+
+  private say(camera: View["camera"], rest: "exact" | "stay"): void {
+    const { name, width, height } = this.view;
+    this.number = Math.max(this.number + 1, Date.now());
+    told(name, this.number);
+    send({ type: "eye", view: name, eye: this.number, ...camera, size: eyeSize(width, height), hand: null, rest });
   }
 
   private get key(): string {

@@ -12,6 +12,8 @@ export class BakeConnection {
   arrivals = new Arrivals();
   /** The views that the server was asked to show, as text. */
   toldViews: string | null = null;
+  /** The server was told that this browser draws moving views. */
+  toldEvaluator = false;
 
   constructor(
     readonly bake: string,
@@ -25,6 +27,7 @@ export class BakeConnection {
     this.hello = hello;
     this.arrivals = new Arrivals();
     this.toldViews = null;
+    this.toldEvaluator = false;
   }
 }
 

@@ -16,8 +16,9 @@ import { curvePath } from "../state/selection";
 import { focusedView } from "../state/views";
 import { showError } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
+import { take } from "./drawing";
 import { answered } from "./probing";
-import { showBake, takeFrame } from "./swap";
+import { showBake } from "./swap";
 import { shownOf, tellViews } from "./tellViews";
 import { want } from "./want";
 
@@ -68,7 +69,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       retryInMs.value = retryIn;
     },
     hello: (message) => welcome(self, message),
-    frame: (frame) => takeFrame(self, frame),
+    frame: (frame) => take(self, frame),
     status({ state, view, what, progress }) {
       if (isShown()) freezing.value = state === "ready" ? null : { state, view, what, progress };
     },

@@ -3,6 +3,8 @@ import type { FrameHeader, Tile } from "../protocol";
 
 const MAX_HEADER_BYTES = 1 << 20;
 const MAX_SIDE = 16_384;
+const MAX_TEXELS = 2 ** 28;
+const NUMBER_BYTES: Record<string, number> = { float32: 4, float16: 2, uint32: 4, int32: 4 };
 const PIXEL_BYTES: Record<string, number> = { rgb9e5: 4, f32: 12, r8: 1 };
 
 export interface Frame {
@@ -33,6 +35,21 @@ function checkTiles(tiles: unknown, width: number, height: number): asserts tile
   }
 }
 
+function checkArrays(tables: FrameHeader["tables"] | undefined, size: number): void {
+  if (typeof tables !== "object" || tables === null || !Array.isArray(tables.arrays)) {
+    throw new FrameError("a frame came without its list of arrays");
+  }
+  let bytes = 0;
+  for (const { dtype, shape } of tables.arrays) {
+    const each = NUMBER_BYTES[dtype];
+    if (each === undefined || !isCount(shape?.[0], MAX_TEXELS) || ![1, 2, 4].includes(shape[1])) {
+      throw new FrameError("a frame came with an array of an unknown form");
+    }
+    bytes += each * shape[0] * shape[1];
+  }
+  if (bytes !== size) throw new FrameError("a frame's arrays and its bytes do not agree");
+}
+
 function readHeader(text: string): FrameHeader {
   let header: unknown;
   try {
@@ -60,6 +77,10 @@ export function parseFrame(buffer: ArrayBuffer): Frame {
   }
   const header = readHeader(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes)));
   const all = new Uint8Array(buffer, 4 + headerBytes);
+  if (header.kind === "tables") {
+    checkArrays(header.tables, all.byteLength);
+    return { header, payload: all, alpha: null };
+  }
   if (header.format === "jpeg") return { header, payload: all, alpha: null };
   const perPixel = PIXEL_BYTES[header.format];
   if (perPixel === undefined) throw new FrameError(`a frame has the unknown format ${String(header.format)}`);

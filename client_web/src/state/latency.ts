@@ -19,10 +19,15 @@ const latencies: Latency[] = [];
 
 declare global {
   interface Window {
-    relumeStats: { latencies: Latency[] };
+    relumeStats: { latencies: Latency[]; drawnHere: number };
   }
 }
-window.relumeStats = { latencies };
+window.relumeStats = { latencies, drawnHere: 0 };
+
+/** This browser has drawn a picture itself. */
+export function noteDrawnHere(): void {
+  window.relumeStats.drawnHere += 1;
+}
 
 export function editSent(revision: number, inputTime: number): void {
   waiting.push({ revision, inputTime });

@@ -35,8 +35,9 @@ def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
         of rows (the second times 256), 0. facing: normals of faces, `uv_scale`. positions: of corners. nodes: vertices
         of the lattice. normals, points, weights: of vertices. places, point_normals, tangents: of points, the first
         with their materials. sky_share: K numbers of each point in texels of four.
-        Of scenes with textures besides: uvs, corner_tangents, texels, levels (first, height, width, 0), textures
-        (first level, how many, both wraps), of_material.
+        Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
+        then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
+        and its tangent.
     """
     surface, points = transfer.surface, transfer.surface.points
     found: dict[str, Callable[[], Texels]] = {
@@ -66,16 +67,22 @@ def _of_textures(surface: Surface, textures: Textures) -> dict[str, Callable[[],
         parts = [textures.texels[s : s + h * w] for s, h, w in textures.levels[kept]]
         return _four(np.concatenate(parts), 0).astype(np.float16)
 
-    sizes = np.column_stack([begins[:-1], textures.levels[kept, 1:], np.zeros(len(kept), np.int64)])
-    found: dict[str, Callable[[], Texels]] = {
-        "uvs": lambda: surface.uvs.astype(np.float32),
+    num = len(textures.wraps)
+    of_textures = np.column_stack([first[:-1] + num, np.diff(first), textures.wraps])
+    of_levels = np.column_stack([begins[:-1], textures.levels[kept, 1:], np.zeros(len(kept), np.int64)])
+    return {
+        "uvs": lambda: _corner_frames(surface),
         "texels": texels,
-        "levels": lambda: sizes.astype(np.uint32),
-        "textures": lambda: np.column_stack([first[:-1], np.diff(first), textures.wraps]).astype(np.uint32),
+        "levels": lambda: np.concatenate([of_textures, of_levels]).astype(np.uint32),
     }
+
+
+def _corner_frames(surface: Surface) -> Texels:
+    out = np.zeros((len(surface.uvs), 2, 4), np.float32)
+    out[:, 0, :2] = surface.uvs
     if len(surface.tangents):
-        found["corner_tangents"] = lambda: surface.tangents.astype(np.float32)
-    return found
+        out[:, 0, 2], out[:, 1, :3] = surface.tangents[:, 3], surface.tangents[:, :3]
+    return out.reshape(-1, 4)
 
 
 def _kept_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
 from relume.moving.arriving import Arriving
-from relume.moving.basis.lobes import NUM_GROUPS
-from relume.moving.basis.zernike import NUM_FUNCTIONS, num_functions
+from relume.moving.basis.lobes import NUM_GROUPS, Lobes
+from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder, num_functions
 from relume.moving.frame import Materials, Wanted
 from relume.moving.points.surface import NORMAL_MAP
 from relume.moving.sky import turn_of
@@ -23,6 +23,7 @@ F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
 _ROUGH = -(-num_functions(3) // 4)  # texels of four functions that are not nothing in what is found quickly
+_MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
 
@@ -103,32 +104,54 @@ def numbers_of(transfer: MovingTransfer, wanted: Wanted) -> Numbers:
 
 def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
     tables, lobes, _ = wanted.materials
-    shape = np.stack([lobes.mean, lobes.sigma], axis=-1)
-    albedo = np.concatenate([lobes.albedo, np.zeros((*lobes.albedo.shape[:3], 1), np.float32)], axis=-1)
-    emission = np.array([(*emission_of(wanted.light, name), 0) for name in transfer.material_names], np.float32)
     return {
         "even": tables.even.reshape(-1, 4),
         "uneven": tables.uneven.reshape(-1, 4),
-        "lobe_albedo": albedo.reshape(-1, 4),
-        "lobe_shape": shape.reshape(-1, 2).astype(np.float32),
+        "lobes": _lobes(lobes),
         "materials": _rows(transfer, wanted, wanted.materials),
-        "emission": emission,
     }
+
+
+def _lobes(lobes: Lobes) -> F32:
+    """Of each row of each lobe the albedos by groups, then its mean and σ. (lobes · rows · (groups + 1), 4)"""
+    num, rows = lobes.mean.shape
+    out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
+    out[:, :, :NUM_GROUPS, :3] = lobes.albedo
+    out[:, :, NUM_GROUPS, 0], out[:, :, NUM_GROUPS, 1] = lobes.mean, lobes.sigma
+    return out.reshape(-1, 4)
 
 
 def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDArray[np.int32]:
     """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
-    lobe, its normal map, whether it is a catcher, 0. (materials · (groups + 1), 4) int32, −1 for none"""
+    lobe, its normal map, whether it is a catcher, how many texels of its light vectors it needs; then the bits of its
+    emission. (materials · (groups + 2), 4) int32, −1 for none"""
     tables, lobes, sends = materials
     of_material = transfer.surface.textures.of_material
-    out = np.full((len(sends), NUM_GROUPS + 1, 4), -1, np.int32)
+    out = np.full((len(sends), NUM_GROUPS + 2, 4), -1, np.int32)
     out[:, :NUM_GROUPS, :2] = tables.of
     out[:, :NUM_GROUPS, 2] = sends
     out[:, 1:NUM_GROUPS, 3] = of_material[:, : len(TEXTURES)]
     out[:, NUM_GROUPS, 0] = lobes.of
     out[:, NUM_GROUPS, 1] = of_material[:, NORMAL_MAP]
     out[:, NUM_GROUPS, 2] = [wanted.look.materials[name].catcher for name in transfer.material_names]
+    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
+    of_even, of_uneven = _degrees(tables.even, of_function[ladder().cosine]), _degrees(tables.uneven, of_function)
+    for k, (of, normal_map) in enumerate(zip(tables.of, of_material[:, NORMAL_MAP], strict=True)):
+        degrees = [*of_even[of[:, 0][of[:, 0] >= 0]], *of_uneven[of[:, 1][of[:, 1] >= 0]]]
+        degree = DEGREE if normal_map >= 0 else max(degrees, default=0)
+        out[k, NUM_GROUPS, 3] = -(-num_functions(int(degree)) // 4)
+    emission = [(*emission_of(wanted.light, name), 0) for name in transfer.material_names]
+    out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
     return out.reshape(-1, 4)
+
+
+def _degrees(tables: F32, degree_of: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The degree up to which functions matter, of each table (tables, …, functions), whose degrees are given."""
+    size = np.square(tables, dtype=np.float64).sum(axis=tuple(range(1, tables.ndim - 1)))
+    of_degree = np.stack([size[:, degree_of == degree].sum(axis=1) for degree in range(DEGREE + 1)], axis=1)
+    beyond = of_degree[:, ::-1].cumsum(axis=1)[:, ::-1]  # from a degree on
+    matters = beyond > _MISSED**2 * np.maximum(beyond[:, :1], 1e-30)
+    return np.asarray(matters.sum(axis=1) - 1, np.int64).clip(0)
 
 
 def _light(arriving: Arriving, *, has_lobes: bool, is_rough: bool) -> dict[str, Texels]:

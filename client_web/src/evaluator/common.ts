@@ -1,0 +1,67 @@
+/** What all shaders of a moving view share: how texels are addressed, the rows of tables, the sky. */
+
+/** Texels are numbered through rows of this many. */
+export const WIDTH = 2048;
+/** Groups of terms: untextured, then those that a diffuse and a specular texture multiply. */
+export const GROUPS = 3;
+/** Texels of one material: its groups, its lobe and its normal map, its emission. */
+export const MATERIAL = GROUPS + 2;
+
+export const HEAD = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+precision highp usampler2D;
+precision highp isampler2D;
+ivec2 at(int texel) { return ivec2(texel & ${WIDTH - 1}, texel >> ${Math.log2(WIDTH)}); }
+`;
+
+/** Covers everything with one triangle, behind all others. */
+export const COVER = `#version 300 es
+void main() {
+  gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 1.0, 1.0);
+}
+`;
+
+/** Where cos θo lies in tables of so many rows: a row, and the share of the next. */
+export const rowOf = (rows: number) => `
+int rowOf(float cosine, out float share) {
+  float place = sqrt(max(1.0 - cosine, 0.0)) * ${(rows - 1).toFixed(1)};
+  int row = min(int(place), ${rows - 2});
+  share = place - float(row);
+  return row;
+}
+`;
+
+/** Where a direction lies in equirectangular maps. */
+export const PLACE = `
+uniform float uTurn;
+const float PI = 3.14159265358979;
+vec2 placeOf(vec3 d) { return vec2(atan(d.z, d.x) * 0.5 / PI + uTurn, 0.5 - asin(clamp(d.y, -1.0, 1.0)) / PI); }
+`;
+
+/** The light of a level of a map: bilinear, round about in u. A level is first texel, height, width. */
+export const SKY = `
+uniform sampler2D uSky;
+vec3 skyTexel(ivec3 level, int row, int column) { return texelFetch(uSky, at(level.x + row * level.z + column), 0).rgb; }
+vec3 skyAt(ivec3 level, vec2 place) {
+  float x = place.x * float(level.z) - 0.5;
+  float y = clamp(place.y * float(level.y) - 0.5, 0.0, float(level.y - 1));
+  float left = floor(x), upper = floor(y), fx = x - left, fy = y - upper;
+  int column = int(left) - level.z * int(floor(left / float(level.z)));
+  int beside = (column + 1) % level.z, row = int(upper), below = min(row + 1, level.y - 1);
+  vec3 top = mix(skyTexel(level, row, column), skyTexel(level, row, beside), fx);
+  return mix(top, mix(skyTexel(level, below, column), skyTexel(level, below, beside), fx), fy);
+}
+`;
+
+/** What lies behind surfaces: a map, or one colour where its gain is nothing. */
+export const BEHIND = `
+uniform sampler2D uBackground;
+uniform vec3 uBackgroundGain;
+uniform vec3 uBackgroundColor;
+vec3 behind(vec3 d) {
+  return uBackgroundColor + uBackgroundGain * textureLod(uBackground, placeOf(d), 0.0).rgb;
+}
+`;

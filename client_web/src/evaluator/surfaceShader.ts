@@ -1,0 +1,283 @@
+/** Surfaces as an eye sees them: the places of `relume.moving.look_up`, the sum of `relume.moving.pixels`, catchers of
+ * `relume.moving.behind`. Triangles are drawn as they are; what vertices of the lattice send is found in each pixel. */
+import type { SurfaceBody } from "../protocol";
+import { BEHIND, GROUPS, HEAD, MATERIAL, PLACE, rowOf, SKY } from "./common";
+
+/** No attributes: the number of a corner says all. \`uRotation\` has the eye's axes as its columns. */
+export const CORNERS = `${HEAD}
+uniform usampler2D uCorners;
+uniform sampler2D uPositions;
+uniform vec3 uEye;
+uniform mat3 uRotation;
+uniform vec4 uFrustum;
+flat out int vFace;
+centroid out vec2 vBary;
+centroid out vec3 vAway;
+void main() {
+  vFace = gl_VertexID / 3;
+  int corner = gl_VertexID % 3;
+  int position = int(texelFetch(uCorners, at(vFace), 0)[corner]);
+  vBary = vec2(corner == 1, corner == 2);
+  vAway = texelFetch(uPositions, at(position), 0).xyz - uEye;
+  vec3 seen = vAway * uRotation;
+  gl_Position = vec4(seen.xy * uFrustum.xy, uFrustum.z * seen.z + uFrustum.w, -seen.z);
+}
+`;
+
+/** Pixels as words of RGB9_E5, and how much each hides of display values (sRGB), as other frames have it. */
+const DIRECT = `
+layout(location = 0) out vec4 outWord;
+layout(location = 1) out vec4 outHides;
+float powerOfTwo(int power) { return intBitsToFloat((power + 127) << 23); }
+float encoded(float x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055; }
+void finish(vec4 pixel) {
+  vec3 color = clamp(pixel.rgb, 0.0, 65408.0);
+  float largest = max(max(color.r, color.g), color.b);
+  int exponent = max(-16, int((floatBitsToUint(largest) >> 23) & 255u) - 127) + 16;
+  if (floor(largest * powerOfTwo(24 - exponent) + 0.5) == 512.0) exponent += 1;
+  uvec3 m = uvec3(floor(color * powerOfTwo(24 - exponent) + 0.5));
+  uint word = m.r | (m.g << 9) | (m.b << 18) | (uint(exponent) << 27);
+  outWord = vec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 255u) / 255.0;
+  outHides = vec4(1.0 - encoded(1.0 - min(pixel.a, 1.0)));
+}
+`;
+/** Linear radiance, of which a pixel takes the mean of its samples. */
+const SAMPLED = `
+out vec4 outColor;
+void finish(vec4 pixel) { outColor = vec4(min(pixel.rgb, 65000.0), pixel.a); }
+`;
+
+/** Trilinear, as \`relume.moving.points.texels\`. */
+const TEXTURES = `
+uniform sampler2D uTexels, uUvs;
+uniform usampler2D uLevels;
+int fold(uint wrap, int index, int size) {
+  if (wrap == 2u) return clamp(index, 0, size - 1);
+  int period = wrap == 0u ? size : 2 * size;
+  int folded = index - period * int(floor(float(index) / float(period)));
+  return wrap == 0u ? folded : min(folded, 2 * size - 1 - folded);
+}
+vec3 textureLevel(uvec4 texture, int level, vec2 place) {
+  ivec3 size = ivec3(texelFetch(uLevels, at(int(texture.x) + level), 0).xyz);
+  if (texture.z == 0u) place.x = fract(place.x);
+  if (texture.w == 0u) place.y = fract(place.y);
+  vec2 where = place * vec2(size.z, size.y) - 0.5, below = floor(where), share = where - below;
+  int left = fold(texture.z, int(below.x), size.z), right = fold(texture.z, int(below.x) + 1, size.z);
+  int upper = size.x + size.z * fold(texture.w, int(below.y), size.y);
+  int lower = size.x + size.z * fold(texture.w, int(below.y) + 1, size.y);
+  vec3 top = mix(texelFetch(uTexels, at(upper + left), 0).rgb, texelFetch(uTexels, at(upper + right), 0).rgb, share.x);
+  return mix(top, mix(texelFetch(uTexels, at(lower + left), 0).rgb, texelFetch(uTexels, at(lower + right), 0).rgb, share.x), share.y);
+}
+vec3 textureAt(int number, vec2 place, float footprint) {
+  uvec4 texture = texelFetch(uLevels, at(number), 0);
+  uvec2 finest = texelFetch(uLevels, at(int(texture.x)), 0).yz;
+  float level = min(log2(max(footprint * float(max(finest.x, finest.y)), 1.0)), float(texture.y) - 1.0);
+  int lower = int(level);
+  float share = level - float(lower);
+  vec3 found = textureLevel(texture, lower, place);
+  return share > 0.0 ? mix(found, textureLevel(texture, lower + 1, place), share) : found;
+}
+`;
+
+const NO_TEXTURES = "vec3 textureAt(int number, vec2 place, float footprint) { return vec3(1.0); }";
+
+/** A normal map's lean, and how the light of what is broad changes by it; as \`relume.moving.bumps\`. */
+const LEAN = `
+vec3 leaning(int map, vec2 place, float footprint, vec3 n, vec4 tangent, vec3 outward) {
+  vec3 found = textureAt(map, place, footprint);
+  vec3 t = tangent.xyz - dot(tangent.xyz, n) * n;
+  t *= inversesqrt(max(dot(t, t), 1e-12));
+  vec3 b = cross(n, t);
+  float side = tangent.w < 0.0 ? -1.0 : 1.0;
+  vec3 leant = found.x * t + side * found.y * b + found.z * n;
+  leant *= inversesqrt(max(dot(leant, leant), 1e-12));
+  return dot(leant, outward) <= 0.0 ? n : leant;
+}
+`;
+
+/** No loops: software rasterisers index vectors through memory. */
+const blended = (value: (k: string) => string) => ["x", "y", "z"].map((k) => `weights.${k} * ${value(k)}`).join(" + ");
+const fetched = (name: string, layer: number) =>
+  `vec4 ${name} = ${blended((k) => `texelFetch(uValues, ivec3(at(vertices.${k}), ${layer}), 0)`)};`;
+
+/** Adds what a group of terms sends. */
+function group(number: number, sent: string, { lobes, textures }: SurfaceFeatures, rows: number): string {
+  const table = `(kind.x * ${rows} + row) * ${GROUPS + 1} + ${number}`;
+  const albedo = `mix(texelFetch(uLobes, at(${table}), 0).rgb, texelFetch(uLobes, at(${table} + ${GROUPS + 1}), 0).rgb, share)`;
+  return `{
+    ivec4 of = texelFetch(uMaterials, at(material + ${number}), 0);
+    if (of.z > 0) {
+      vec3 total = ratio * max(${sent}, 0.0);
+      ${lobes ? `if (kind.x >= 0) total += light * ${albedo};` : ""}
+      ${textures ? "if (of.w >= 0) total *= textureAt(of.w, place, footprint);" : ""}
+      color += total;
+    }
+  }`;
+}
+
+const CAUGHT = `if (kind.z == 1) {
+    bvec3 isLit;
+    vec3 arrives = uGain * unhidden(vertices, weights, isLit);
+    vec3 shown = vec3(uFree);
+    for (int channel = 0; channel < 3; channel++) {
+      if (isLit[channel] && uGain[channel] > 0.0) shown[channel] = min(color[channel] / arrives[channel], 8.0);
+    }
+    color = shown * behind(d);
+    hides -= dot(vec3(0.2126, 0.7152, 0.0722), min(shown, 1.0));
+  }`;
+
+/** What a look makes use of: the rest is not compiled in. */
+export interface SurfaceFeatures {
+  /** Terms that textures multiply. */
+  groups: boolean;
+  textures: boolean;
+  lobes: boolean;
+  catchers: boolean;
+  /** One sample a pixel, written as words. */
+  direct: boolean;
+}
+
+export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures): string {
+  const { groups, textures: hasTextures, lobes, catchers } = features;
+  return `${HEAD}${rowOf(rows)}${PLACE}${SKY}${catchers ? BEHIND : ""}${features.direct ? DIRECT : SAMPLED}${hasTextures ? TEXTURES : NO_TEXTURES}${LEAN}
+uniform usampler2D uCorners, uLattice, uNodes, uPoints;
+uniform sampler2D uFacing, uNormals, uWeights, uUnhidden, uLobes;
+uniform sampler2DArray uValues;
+uniform isampler2D uMaterials;
+uniform float uPixelAngle, uFree;
+uniform vec3 uGain, uSkyGain;
+uniform ivec3 uSkyLevels[8];
+uniform int uNumSkyLevels;
+flat in int vFace;
+centroid in vec2 vBary;
+centroid in vec3 vAway;
+int nodeOf(int rows, int i, int j) { return i * (rows + 1) - i * (i - 1) / 2 + j; }
+
+float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
+
+vec3 skyAbout(vec3 direction, float sigma) {
+  float place = clamp(log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0, float(uNumSkyLevels - 1));
+  int lower = int(place);
+  float share = place - float(lower);
+  vec2 where = placeOf(direction);
+  vec3 found = skyAt(uSkyLevels[lower], where);
+  return share > 0.0 ? mix(found, skyAt(uSkyLevels[lower + 1], where), share) : found;
+}
+
+/** The light that a lobe sees, and where its albedo lies in tables. */
+vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, out float share) {
+  float facing = -dot(n, d);
+  row = rowOf(clamp(facing, 0.01, 1.0), share);
+  int of = (lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS};
+  vec2 shape = mix(texelFetch(uLobes, at(of), 0).xy, texelFetch(uLobes, at(of + ${GROUPS + 1}), 0).xy, share);
+  vec3 aside = d + facing * n;
+  float sine = sqrt(max(1.0 - shape.x * shape.x, 0.0)) * inversesqrt(max(dot(aside, aside), 1e-20));
+  vec3 r = sine * aside + shape.x * n;
+  float along = dot(d, outward), away = dot(r, outward) * (along > 0.0 ? -1.0 : 1.0);
+  float above = min(shareAbove(away / shape.y) / shareAbove(abs(along) / shape.y), 1.0);
+  return above * (glance.x * uSkyGain * skyAbout(r, shape.y) + glance.yzw);
+}
+
+/** What catchers would receive if nothing were in the way. */
+vec3 unhidden(ivec3 vertices, vec3 weights, out bvec3 isLit) {
+  vec3 sum = vec3(0.0);
+  isLit = bvec3(true);
+  for (int k = 0; k < 3; k++) {
+    uvec4 points = texelFetch(uPoints, at(vertices[k]), 0);
+    vec4 shares = texelFetch(uWeights, at(vertices[k]), 0);
+    vec3 here = vec3(0.0);
+    for (int q = 0; q < 4; q++) if (shares[q] > 0.0) here += shares[q] * texelFetch(uUnhidden, at(int(points[q])), 0).rgb;
+    sum += weights[k] * here;
+    isLit = bvec3(isLit.x && here.x > 0.0, isLit.y && here.y > 0.0, isLit.z && here.z > 0.0);
+  }
+  return sum;
+}
+
+void main() {
+  vec3 d = normalize(vAway);
+  uvec4 corners = texelFetch(uCorners, at(vFace), 0);
+  vec4 facing = texelFetch(uFacing, at(vFace), 0);
+  float along = dot(facing.xyz, d);
+  int material = int(corners.w) * ${MATERIAL};
+  ivec4 kind = texelFetch(uMaterials, at(material + ${GROUPS}), 0);
+  vec3 color = intBitsToFloat(texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0)).rgb;
+
+  uvec4 lattice = texelFetch(uLattice, at(vFace), 0);
+  int front = int(lattice.z & 255u), behindIt = int(lattice.z >> 8);
+  bool isBehind = along > 0.0 ? behindIt > 0 : front == 0;
+  int rows = isBehind ? behindIt : front;
+  vec2 bary = clamp(vBary, 0.0, 1.0);
+  ivec3 vertices = ivec3(0);
+  vec3 weights = vec3(0.0);
+  if (rows > 0) {
+    vec2 where = bary * float(rows);
+    int i = clamp(int(where.x), 0, rows - 1), j = clamp(int(where.y), 0, rows - 1 - i);
+    vec2 f = where - vec2(i, j);
+    bool isFirst = f.x + f.y <= 1.0 || i + j == rows - 1;
+    int first = int(isBehind ? lattice.y : lattice.x);
+    int a = first + (isFirst ? nodeOf(rows, i, j) : nodeOf(rows, i + 1, j + 1));
+    int b = first + nodeOf(rows, i + 1, j), c = first + nodeOf(rows, i, j + 1);
+    weights = isFirst ? vec3(1.0 - f.x - f.y, f) : vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x);
+    vertices = ivec3(texelFetch(uNodes, at(a), 0).r, texelFetch(uNodes, at(b), 0).r, texelFetch(uNodes, at(c), 0).r);
+  }
+  ${fetched("v0", 0)}
+  ${groups ? fetched("v1", 1) : "vec4 v1 = vec4(0.0);"}
+  ${groups || hasTextures ? fetched("v2", 2) : "vec4 v2 = vec4(0.0);"}
+  ${lobes ? `vec4 glance = vec4(0.0);\n  if (kind.x >= 0) { ${fetched("found", 3)} glance = found; }` : ""}
+  vec3 n = vec3(0.0);
+  ${lobes || hasTextures ? `if (kind.x >= 0 || kind.y >= 0) n = ${blended((k) => `texelFetch(uNormals, at(vertices.${k}), 0).xyz`)};` : ""}
+  n *= inversesqrt(max(dot(n, n), 1e-12));
+
+  vec2 place = vec2(0.0);
+  float footprint = length(vAway) * uPixelAngle * facing.w * inversesqrt(max(abs(along), 0.05)), ratio = 1.0;
+  ${
+    hasTextures
+      ? `vec3 w = vec3(1.0 - bary.x - bary.y, bary);
+  vec4 tangent = vec4(0.0);
+  place = w.x * texelFetch(uUvs, at(2 * int(corners.x)), 0).xy + w.y * texelFetch(uUvs, at(2 * int(corners.y)), 0).xy +
+    w.z * texelFetch(uUvs, at(2 * int(corners.z)), 0).xy;
+  if (kind.y >= 0) {
+    tangent.w = texelFetch(uUvs, at(2 * int(corners.x)), 0).z;
+    tangent.xyz = w.x * texelFetch(uUvs, at(2 * int(corners.x) + 1), 0).xyz +
+      w.y * texelFetch(uUvs, at(2 * int(corners.y) + 1), 0).xyz + w.z * texelFetch(uUvs, at(2 * int(corners.z) + 1), 0).xyz;
+    vec3 leant = leaning(kind.y, place, footprint, n, tangent, along > 0.0 ? -facing.xyz : facing.xyz);
+    ratio = min(max(dot(v2.yzw, leant), 0.0) / max(dot(v2.yzw, n), 1e-12), 4.0);
+    n = leant;
+  }`
+      : ""
+  }
+  int row = 0;
+  float share = 0.0;
+  vec3 light = vec3(0.0);
+  ${lobes ? "if (kind.x >= 0) light = mirrored(kind.x, n, d, facing.xyz, glance, row, share);" : ""}
+
+  ${group(0, "v0.rgb", features, rows)}
+  ${groups ? group(1, "vec3(v0.a, v1.rg)", features, rows) : ""}
+  ${groups ? group(2, "vec3(v1.ba, v2.r)", features, rows) : ""}
+  color *= uGain;
+  float hides = 1.0;
+  ${catchers ? CAUGHT : ""}
+  finish(vec4(color, hides));
+}
+`;
+}
+
+/** The background, where no surface is. `uRays` takes a place in the picture, −1…1, to a direction. */
+export const backgroundShader = (direct: boolean) => `${HEAD}${PLACE}${BEHIND}${direct ? DIRECT : SAMPLED}
+uniform mat3 uRays;
+uniform vec2 uSize;
+uniform float uFree;
+void main() {
+  vec3 d = normalize(uRays * vec3(gl_FragCoord.xy / uSize * 2.0 - 1.0, 1.0));
+  finish(vec4(uFree * behind(d), 0.0));
+}
+`;
+
+/** The finished picture, of several samples a pixel, as words: top row first. */
+export const WORDS = `${HEAD}${DIRECT}
+uniform sampler2D uImage;
+void main() {
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  finish(max(texelFetch(uImage, ivec2(here.x, textureSize(uImage, 0).y - 1 - here.y), 0), 0.0));
+}
+`;

@@ -1,0 +1,114 @@
+/** What the passes of a moving view are drawn into. */
+import { WIDTH } from "./common";
+
+type Gl = WebGL2RenderingContext;
+
+const LAYERS = 4;
+
+function attach(gl: Gl, make: () => number[]): WebGLFramebuffer {
+  const buffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+  gl.drawBuffers(make());
+  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) {
+    throw new Error("this browser cannot draw into floating-point images");
+  }
+  return buffer;
+}
+
+/** Sixteen numbers for each of many points or vertices: four layers of texels. */
+export class Values {
+  readonly texture: WebGLTexture;
+  readonly buffer: WebGLFramebuffer;
+  readonly rows: number;
+
+  constructor(gl: Gl, count: number) {
+    this.rows = Math.max(1, Math.ceil(count / WIDTH));
+    this.texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture);
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA32F, WIDTH, this.rows, LAYERS);
+    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+      gl.texParameteri(gl.TEXTURE_2D_ARRAY, filter, gl.NEAREST);
+    }
+    this.buffer = attach(gl, () =>
+      Array.from({ length: LAYERS }, (_, layer) => {
+        gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + layer, this.texture, 0, layer);
+        return gl.COLOR_ATTACHMENT0 + layer;
+      }),
+    );
+  }
+}
+
+function image(gl: Gl, format: number, width: number, height: number): WebGLTexture {
+  const made = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, made);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+  return made;
+}
+
+/** A picture of one size, drawn as words that are read; with several samples a pixel it is drawn as radiance before. */
+export class Images {
+  /** What surfaces are drawn into: with depth. */
+  readonly drawn: WebGLFramebuffer;
+  readonly words: WebGLFramebuffer;
+  /** Radiance, one sample a pixel, where there were several. */
+  readonly radiance: WebGLTexture | null = null;
+  private readonly whole: WebGLFramebuffer | null = null;
+  private readonly made: { renderbuffers: WebGLRenderbuffer[]; textures: WebGLTexture[] } = { renderbuffers: [], textures: [] };
+
+  constructor(
+    private readonly gl: Gl,
+    readonly width: number,
+    readonly height: number,
+    private readonly samples: number,
+  ) {
+    const words = () => this.textures(image(gl, gl.RGBA8, width, height), image(gl, gl.RGBA8, width, height));
+    if (samples === 0) {
+      this.drawn = this.words = attach(gl, () => {
+        this.renderbuffer(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24);
+        return words();
+      });
+      return;
+    }
+    this.drawn = attach(gl, () => {
+      this.renderbuffer(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24);
+      this.renderbuffer(gl.COLOR_ATTACHMENT0, gl.RGBA16F);
+      return [gl.COLOR_ATTACHMENT0];
+    });
+    const radiance = (this.radiance = image(gl, gl.RGBA16F, width, height));
+    this.whole = attach(gl, () => this.textures(radiance));
+    this.words = attach(gl, words);
+  }
+
+  private renderbuffer(attachment: number, format: number): void {
+    const { gl } = this;
+    const buffer = gl.createRenderbuffer();
+    gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, this.samples, format, this.width, this.height);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, attachment, gl.RENDERBUFFER, buffer);
+    this.made.renderbuffers.push(buffer);
+  }
+
+  private textures(...textures: WebGLTexture[]): number[] {
+    const { gl } = this;
+    this.made.textures.push(...textures);
+    return textures.map((texture, index) => {
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + index, gl.TEXTURE_2D, texture, 0);
+      return gl.COLOR_ATTACHMENT0 + index;
+    });
+  }
+
+  /** One sample a pixel from several. */
+  resolve(): void {
+    const { gl, width, height } = this;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.drawn);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, this.whole);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+  }
+
+  dispose(): void {
+    for (const buffer of [this.drawn, this.whole, this.words]) this.gl.deleteFramebuffer(buffer);
+    for (const buffer of this.made.renderbuffers) this.gl.deleteRenderbuffer(buffer);
+    for (const texture of this.made.textures) this.gl.deleteTexture(texture);
+  }
+}

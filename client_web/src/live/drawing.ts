@@ -1,0 +1,210 @@
+/** Moving views that this browser draws itself: nothing goes over the network for an eye that moves. The server says
+ * what a look makes (frames of kind "tables"), and sends exact pictures as ever; where it has not caught up, or the
+ * browser cannot draw, it sends all pictures. */
+import { effect, signal } from "@preact/signals";
+import { Evaluator } from "../evaluator/evaluator";
+import { isSoftware } from "../evaluator/software";
+import { getJson, request } from "../net/api";
+import type { Frame } from "../net/binaryFrame";
+import { MAX_EYE_PIXELS, type FrameHeader, type SurfaceBody } from "../protocol";
+import { noteDrawnHere } from "../state/latency";
+import { views } from "../state/views";
+import { note } from "../ui/toasts";
+import { connections, type BakeConnection } from "./connections";
+import { takeFrame } from "./swap";
+
+export type Draws = "auto" | "browser" | "server";
+
+const KEY = "relume.drawnBy";
+const SLOW_MS = 80;
+const TRIALS = 8;
+
+/** Who draws moving views, as the user wants it. */
+export const drawnBy = signal<Draws>(readChoice());
+/** Whether this browser does. */
+export const drawsHere = signal(false);
+
+interface Here {
+  of: BakeConnection;
+  evaluator: Evaluator;
+  /** The last tables of each view. */
+  headers: Map<string, FrameHeader>;
+}
+
+let here: Here | null = null;
+let loading: BakeConnection | null = null;
+/** Bakes that this browser has failed to draw. */
+const refused = new WeakSet<BakeConnection>();
+const eyes = new Map<string, number>();
+const away = new Set<string>();
+const dirty = new Set<string>();
+let running: Promise<void> | null = null;
+let durations: number[] = [];
+
+function readChoice(): Draws {
+  const kept = localStorage.getItem(KEY);
+  return kept === "browser" || kept === "server" ? kept : "auto";
+}
+
+export function chooseDrawnBy(choice: Draws): void {
+  localStorage.setItem(KEY, choice);
+  drawnBy.value = choice;
+}
+
+/** The size of a moving view's pictures. */
+export function eyeSize(width: number, height: number): [number, number] {
+  const scale = Math.min(1, Math.sqrt(MAX_EYE_PIXELS / (width * height)));
+  return [Math.floor(width * scale), Math.floor(height * scale)];
+}
+
+/** The server was told of this eye: pictures of others are late. */
+export function told(view: string, eye: number): void {
+  eyes.set(view, eye);
+}
+
+/** A view's eye is, or is no longer, on its way without the server. */
+export function leave(view: string, isAway: boolean): void {
+  if (isAway) away.add(view);
+  else away.delete(view);
+}
+
+/** Draw a view from where its eye is now; false where the server has to. */
+export function drawHere(view: string): boolean {
+  const { shown } = connections;
+  if (here === null || here.of !== shown || !here.evaluator.isReady || !drawsHere.peek()) return false;
+  if (shown.session.pending || here.headers.get(view)?.revision !== shown.session.revision) return false;
+  void redraw(view);
+  return true;
+}
+
+/** Take a frame of a server. */
+export async function take(from: BakeConnection, frame: Frame): Promise<void> {
+  const { view, kind, eye } = frame.header;
+  if (kind === "tables") return takeTables(from, frame);
+  const isDrawn = drawsHere.peek() && here?.of === from && kind === "picture";
+  const isLate = isDrawn && (away.has(view) || (eyes.has(view) && frame.header.eye !== null && eyes.get(view) !== eye));
+  if (isLate) return;
+  await takeFrame(from, frame);
+  void offer(from, view);
+}
+
+async function takeTables(from: BakeConnection, frame: Frame): Promise<void> {
+  const { header, payload } = frame;
+  if (here?.of !== from || header.tables === null) return;
+  here.evaluator.take(header.tables, payload);
+  here.headers.set(header.view, header);
+  return redraw(header.view);
+}
+
+/** One picture at a time, each from the newest eye; resolves when none is left to be drawn. */
+function redraw(view: string): Promise<void> {
+  dirty.add(view);
+  running ??= drawAll().finally(() => (running = null));
+  return running;
+}
+
+async function drawAll(): Promise<void> {
+  for (let view = first(dirty); view !== undefined && here !== null; view = first(dirty)) {
+    dirty.delete(view);
+    const { of } = here;
+    const start = performance.now();
+    try {
+      const frame = await drawn(here, view);
+      if (frame !== null && here?.of === of) await takeFrame(of, frame);
+    } catch (error) {
+      return giveUp(`${(error as Error).message}; the server draws instead.`);
+    }
+    judge(performance.now() - start);
+  }
+}
+
+const first = (of: Set<string>): string | undefined => of.values().next().value;
+
+/** A frame as the server would have sent it. */
+async function drawn({ evaluator, headers }: Here, name: string): Promise<Frame | null> {
+  const [view, header] = [views.peek().find((other) => other.name === name), headers.get(name)];
+  if (view === undefined || header === undefined) return null;
+  const { width, height, words, hides } = await evaluator.draw(view.camera, ...eyeSize(view.width, view.height));
+  noteDrawnHere();
+  const whole = { tiles: [[0, 0, width, height]] as FrameHeader["tiles"], format: "rgb9e5" as const, kind: "picture" as const };
+  return { header: { ...header, ...whole, width, height, alpha: hides !== null, tables: null }, payload: words, alpha: hides };
+}
+
+/** Where it was not asked for, drawing here goes on only as long as it is quick. */
+function judge(ms: number): void {
+  durations = [...durations.slice(1 - TRIALS), ms];
+  const middle = [...durations].sort((a, b) => a - b)[TRIALS >> 1];
+  if (drawnBy.peek() === "auto" && durations.length === TRIALS && (middle ?? 0) > SLOW_MS) giveUp(null);
+}
+
+/** The server draws from now on, until somebody wishes otherwise. */
+function giveUp(reason: string | null): void {
+  if (here === null) return;
+  const { of, evaluator } = here;
+  refused.add(of);
+  here = null;
+  drawsHere.value = false;
+  dirty.clear();
+  away.clear();
+  evaluator.release();
+  of.session.send({ type: "evaluate", by: "server" });
+  if (reason !== null) note(reason);
+}
+
+/** A picture of a view is shown: from now on this browser may draw it. */
+async function offer(of: BakeConnection, view: string): Promise<void> {
+  const isFree = of.hello?.views.find(({ name }) => name === view)?.eye === "free";
+  if (!isFree || of !== connections.shown || drawnBy.peek() === "server" || refused.has(of)) return;
+  if (here?.of === of) return tellWhereNeeded(here);
+  if (loading === of) return;
+  loading = of;
+  try {
+    const made = await load(of);
+    if (made === null || of !== connections.shown) return;
+    here?.evaluator.release();
+    here = made;
+    durations = [];
+    tellWhereNeeded(made);
+  } catch (error) {
+    refused.add(of);
+    if (drawnBy.peek() === "browser") note(`${(error as Error).message}; the server draws instead.`);
+  } finally {
+    loading = null;
+  }
+}
+
+/** The server that greets knows nothing of who draws. */
+function tellWhereNeeded({ of, headers }: Here): void {
+  if (of.toldEvaluator) return;
+  headers.clear();
+  of.toldEvaluator = of.session.send({ type: "evaluate", by: "browser" });
+  drawsHere.value = of.toldEvaluator;
+}
+
+/** Everything of a bake that never changes; null where this browser would draw with its processor. */
+async function load(of: BakeConnection): Promise<Here | null> {
+  const gl = new OffscreenCanvas(1, 1).getContext("webgl2", { antialias: false });
+  if (gl === null) throw new Error("This browser offers no WebGL2");
+  if (drawnBy.peek() === "auto" && isSoftware(gl)) {
+    refused.add(of);
+    return null;
+  }
+  const path = `/api/bakes/${encodeURIComponent(of.bake)}/surface`;
+  const surface = await getJson<SurfaceBody>(path);
+  const arrays = await Promise.all(
+    surface.arrays.map(async (name) => {
+      const bytes = new Uint8Array(await (await request(`${path}/${encodeURIComponent(name)}`)).arrayBuffer());
+      return [name, bytes] as const;
+    }),
+  );
+  return { of, evaluator: new Evaluator(gl, surface, new Map(arrays)), headers: new Map() };
+}
+
+effect(() => {
+  const choice = drawnBy.value;
+  const { shown } = connections;
+  if (choice === "server") giveUp(null);
+  if (shown === null) return;
+  if (choice !== "server") refused.delete(shown);
+  for (const view of shown.hello?.views ?? []) if (shown.arrivals.isShown(view.name)) void offer(shown, view.name);
+});
