@@ -23,9 +23,9 @@ from relume.scene.demo import demo_scene
 from server.settings import Settings
 
 _NAMES = ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # Chromium as it is on a machine without a GPU: its own compositor, WebGL by SwiftShader where it is allowed to
-_ARGUMENTS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+ARGUMENTS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 _READY_S = 90.0
 _AT_ONCE_MS, _QUIET_MS = 500, 100
 _QUIET_LOOKS = 20
@@ -34,7 +34,7 @@ _SLIDER, _COUNT = "Exponent along", "window.relumeStats.latencies.length"
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, open the editor, drag."""
-    browser = next((path for name in _BROWSERS if (path := shutil.which(name))), None)
+    browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if browser is None:
         return skipped(_NAMES, "ms", "there is no Chromium on this machine")
     if not (Settings().client / "index.html").is_file():
@@ -64,7 +64,7 @@ def _drag(browser: str, url: str, num_moves: int) -> list[float]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=browser, args=_ARGUMENTS)
+        chromium = playwright.chromium.launch(executable_path=browser, args=ARGUMENTS)
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
         page.goto(url)
         slider = page.get_by_role("slider", name=_SLIDER)

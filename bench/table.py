@@ -40,6 +40,7 @@ TARGETS = {
     "surface.bake_s": "≤ 60 s",
     "surface.bytes_per_point": "≤ 1000",
     "surface.view_fps": "≥ 15",
+    "surface.canvas_fps": "≥ 15",
     "surface.rmse_diffuse": "≤ 3 %",
     "surface.rmse_glossy_0.5": "≤ 6 %",
     "surface.rmse_glossy_0.3": "≤ 12 %",

@@ -71,6 +71,22 @@ describe("parseFrame", () => {
   });
 });
 
+describe("tables", () => {
+  const array = { name: "even", dtype: "float32", shape: [2, 4] };
+  const tables = (arrays: unknown) => ({ ...HEADER, tiles: [], format: "arrays", kind: "tables", tables: { arrays } });
+
+  test("keep their payload whole", () => {
+    const frame = parseFrame(pack(tables([array, { name: "vectors", dtype: "float16", shape: [1, 4] }]), new Uint8Array(40)));
+    expect(frame.payload.byteLength).toBe(40);
+  });
+
+  test("are refused where arrays and bytes do not agree, or a form is unknown", () => {
+    const bad = [[], [{ ...array, dtype: "float64" }], [{ ...array, shape: [2, 3] }], [{ ...array, shape: [-2, 4] }], undefined];
+    for (const arrays of bad) expect(() => parseFrame(pack(tables(arrays), new Uint8Array(32)))).toThrow(FrameError);
+    expect(() => parseFrame(pack({ ...tables([array]), tables: null }, new Uint8Array(32)))).toThrow(FrameError);
+  });
+});
+
 describe("rgb9e5", () => {
   test("known words decode to known values", () => {
     // exponent 16: mantissas count 2^(16-15-9) = 1/256

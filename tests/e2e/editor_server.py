@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 SIZE = (320, 240)
-START_S = 240.0
+START_S, BAKE_S = 240.0, 120.0
 
 
 class Server:
@@ -51,6 +51,18 @@ class Server:
     def delete(self, path: str) -> None:
         """DELETE."""
         urllib.request.urlopen(urllib.request.Request(self.url + path, method="DELETE"), timeout=30).close()
+
+    def moving_scene(self) -> str:
+        """A scene of its own with one bake, whose view moves; it is to be deleted."""
+        identity = str(self.call("/api/built-ins/cornell_box", {})["id"])
+        recipe = {"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000}
+        bake = self.call("/api/bakes", recipe)
+        deadline = time.monotonic() + BAKE_S
+        while bake["state"] in ("queued", "running") and time.monotonic() < deadline:
+            time.sleep(0.1)
+            bake = self.call(f"/api/bakes/{bake['id']}")
+        assert bake["state"] == "ready", bake["problem"]
+        return identity
 
     def call(self, path: str, body: dict[str, Any] | None = None) -> Any:
         """GET, or POST where there is a body."""

@@ -287,3 +287,45 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     recoloured = tables_of(session)
     assert recoloured.header["revision"] == 1
     assert not np.array_equal(arrays_in(recoloured)["even"], first["even"])
+
+
+def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str) -> None:
+    answer = client.get(f"/api/bakes/{bake}/surface")
+    assert "immutable" in answer.headers["cache-control"]
+    found = answer.json()
+    assert found["functions"] == len(found["ladder"]["order"]) + sum(m > 0 for m in found["ladder"]["order"])
+    arrays = {name: client.get(f"/api/bakes/{bake}/surface/{name}") for name in found["arrays"]}
+    assert all("immutable" in each.headers["cache-control"] for each in arrays.values())
+    num_points = len(arrays["places"].content) // 16
+    assert len(arrays["sky_share"].content) == num_points * found["functions"] * 2
+    corners = np.frombuffer(arrays["corners"].content, np.uint32).reshape(-1, 4)
+    assert corners[:, :3].max() < len(arrays["positions"].content) // 16
+    assert np.frombuffer(arrays["nodes"].content, np.uint32).max() < len(arrays["normals"].content) // 16
+
+
+def test_there_are_no_other_arrays_and_none_of_fixed_views(
+    client: TestClient, bake: str, scene: dict[str, Any]
+) -> None:
+    missing = client.get(f"/api/bakes/{bake}/surface/lights")
+    assert (missing.status_code, "there are corners" in missing.json()["detail"]) == (404, True)
+    request = {"scene": scene["id"], "size": SIZE, "lights": 100}
+    fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
+    for path in ("surface", "surface/corners"):
+        refused = client.get(f"/api/bakes/{fixed['id']}/{path}")
+        assert (refused.status_code, "are fixed" in refused.json()["detail"]) == (404, True)
+
+
+def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Session) -> None:
+    (view,) = hello(session)["views"]
+    session.send(**eye(view, 1, 0.2), rest="stay")
+    while (first := of_eye(session, 1)).header["fidelity"] == "preview":
+        pass
+    for _ in range(2):
+        session.send(type="evaluate", by="browser")
+        assert "vectors" in arrays_in(tables_of(session))
+        session.send(type="evaluate", by="server")
+        while (frame := session.frame()).header["kind"] != "picture":
+            pass
+        np.testing.assert_array_equal(shown(frame), shown(first))
+    session.send(type="evaluate", by="nobody")
+    assert "evaluate" in str(session.text("problem"))

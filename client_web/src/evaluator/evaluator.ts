@@ -2,7 +2,7 @@
 import { Program } from "../picture/gl";
 import type { FrameHeader, SurfaceBody } from "../protocol";
 import { COVER, GROUPS, MATERIAL, WIDTH } from "./common";
-import { pointShader, VERTEX_SHADER } from "./pointShader";
+import { pointShader, vertexShader } from "./pointShader";
 import { read } from "./reading";
 import { isSoftware } from "./software";
 import { backgroundShader, CORNERS, surfaceShader, WORDS } from "./surfaceShader";
@@ -54,7 +54,7 @@ const uniform = (name: string) => `u${name.replace(/(^|_)(.)/g, (_, __, letter: 
 export class Evaluator {
   private readonly gl: WebGL2RenderingContext;
   private readonly texels: Texels;
-  private readonly programs: { vertices: Program; background: Program; words: Program };
+  private readonly programs: { background: Program; words: Program };
   private readonly samples: number;
   private readonly compiled = new Map<string, Program>();
   private readonly hasTextures: boolean;
@@ -88,7 +88,6 @@ export class Evaluator {
     this.samples = isSoftware(gl) ? 0 : SAMPLES;
     const count = (name: string) => this.texels.count(name);
     this.programs = {
-      vertices: new Program(gl, COVER, VERTEX_SHADER),
       background: new Program(gl, COVER, backgroundShader(this.samples === 0)),
       words: new Program(gl, COVER, WORDS),
     };
@@ -165,7 +164,9 @@ export class Evaluator {
 
   private drawVertices(): void {
     const { gl } = this;
-    const program = this.use(this.programs.vertices, ["points", "weights"]);
+    const layers = [0, ...(this.hasGroups ? [1] : []), ...(this.hasGroups || this.hasTextures ? [2] : []), ...(this.hasLobes ? [3] : [])];
+    const made = this.program({ layers }, () => new Program(gl, COVER, vertexShader(layers)));
+    const program = this.use(made, ["points", "weights"]);
     this.bindValues(program, this.ofPoints, 2);
     gl.uniform1i(program.at("uNumVertices"), this.texels.count("normals"));
     this.cover(this.ofVertices.buffer, WIDTH, this.ofVertices.rows);

@@ -170,8 +170,11 @@ void main() {
   int needed = texelFetch(uMaterials, at(material + ${GROUPS}), 0).w, texels = min(uStride, needed);
   ${range(3 * vectors).map((k) => `t${k}`).join(" = ")} = vec4(0.0);
   ${range(vectors).map(load).join("\n  ")}
-  ${turns(Math.max(...ladder.order) + 1)}
-  ${turned(surface)}
+  turned0.x = t0.x; turned${rungs}.x = t${vectors}.x; turned${2 * rungs}.x = t${2 * vectors}.x;
+  if (needed > 1) {
+    ${turns(Math.max(...ladder.order) + 1)}
+    ${turned(surface)}
+  }
 
   vec3 sent[${GROUPS}];
   for (int group = 0; group < ${GROUPS}; group++) {
@@ -193,8 +196,13 @@ void main() {
 `;
 }
 
-/** What vertices take from the points about them. */
-export const VERTEX_SHADER = `${HEAD}
+/** What vertices take from the points about them; layers that nothing of a look is in are left at nothing. */
+export function vertexShader(layers: readonly number[]): string {
+  const take = (k: string) => `if (weights.${k} > 0.0) {
+    ivec2 p = at(int(points.${k}));
+    ${layers.map((layer) => `out${layer} += weights.${k} * texelFetch(uValues, ivec3(p, ${layer}), 0);`).join("\n    ")}
+  }`;
+  return `${HEAD}
 uniform usampler2D uPoints;
 uniform sampler2D uWeights;
 uniform sampler2DArray uValues;
@@ -209,13 +217,7 @@ void main() {
   uvec4 points = texelFetch(uPoints, at(v), 0);
   vec4 weights = texelFetch(uWeights, at(v), 0);
   out0 = out1 = out2 = out3 = vec4(0.0);
-  ${["x", "y", "z", "w"]
-    .map(
-      (k) => `if (weights.${k} > 0.0) {
-    ivec2 p = at(int(points.${k}));
-    ${[0, 1, 2, 3].map((layer) => `out${layer} += weights.${k} * texelFetch(uValues, ivec3(p, ${layer}), 0);`).join("\n    ")}
-  }`,
-    )
-    .join("\n  ")}
+  ${["x", "y", "z", "w"].map(take).join("\n  ")}
 }
 `;
+}

@@ -3,6 +3,15 @@
 import type { SurfaceBody } from "../protocol";
 import { BEHIND, GROUPS, HEAD, MATERIAL, PLACE, rowOf, SKY } from "./common";
 
+/** What pixels of a triangle have in common: corners and material, its lattice, normal and scale of textures, lobe,
+ * normal map and whether it catches, what it emits. */
+const FLAT = `
+flat in uvec4 vCorners;
+flat in uvec3 vLattice;
+flat in vec4 vFacing;
+flat in ivec3 vKind;
+flat in vec3 vEmission;`;
+
 /** No attributes: the number of a corner says all. \`uRotation\` has the eye's axes as its columns. */
 export const CORNERS = `${HEAD}
 uniform usampler2D uCorners;
@@ -10,13 +19,22 @@ uniform sampler2D uPositions;
 uniform vec3 uEye;
 uniform mat3 uRotation;
 uniform vec4 uFrustum;
-flat out int vFace;
+uniform usampler2D uLattice;
+uniform sampler2D uFacing;
+uniform isampler2D uMaterials;
+${FLAT.replaceAll("in ", "out ")}
 centroid out vec2 vBary;
 centroid out vec3 vAway;
 void main() {
-  vFace = gl_VertexID / 3;
+  ivec2 face = at(gl_VertexID / 3);
   int corner = gl_VertexID % 3;
-  int position = int(texelFetch(uCorners, at(vFace), 0)[corner]);
+  vCorners = texelFetch(uCorners, face, 0);
+  vLattice = texelFetch(uLattice, face, 0).xyz;
+  vFacing = texelFetch(uFacing, face, 0);
+  int material = int(vCorners.w) * ${MATERIAL};
+  vKind = texelFetch(uMaterials, at(material + ${GROUPS}), 0).xyz;
+  vEmission = intBitsToFloat(texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0)).rgb;
+  int position = int(corner == 0 ? vCorners.x : corner == 1 ? vCorners.y : vCorners.z);
   vBary = vec2(corner == 1, corner == 2);
   vAway = texelFetch(uPositions, at(position), 0).xyz - uEye;
   vec3 seen = vAway * uRotation;
@@ -140,15 +158,15 @@ export interface SurfaceFeatures {
 export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures): string {
   const { groups, textures: hasTextures, lobes, catchers } = features;
   return `${HEAD}${rowOf(rows)}${PLACE}${SKY}${catchers ? BEHIND : ""}${features.direct ? DIRECT : SAMPLED}${hasTextures ? TEXTURES : NO_TEXTURES}${LEAN}
-uniform usampler2D uCorners, uLattice, uNodes, uPoints;
-uniform sampler2D uFacing, uNormals, uWeights, uUnhidden, uLobes;
+uniform usampler2D uNodes, uPoints;
+uniform sampler2D uNormals, uWeights, uUnhidden, uLobes;
 uniform sampler2DArray uValues;
 uniform isampler2D uMaterials;
 uniform float uPixelAngle, uFree;
 uniform vec3 uGain, uSkyGain;
 uniform ivec3 uSkyLevels[8];
 uniform int uNumSkyLevels;
-flat in int vFace;
+${FLAT}
 centroid in vec2 vBary;
 centroid in vec3 vAway;
 int nodeOf(int rows, int i, int j) { return i * (rows + 1) - i * (i - 1) / 2 + j; }
@@ -195,14 +213,13 @@ vec3 unhidden(ivec3 vertices, vec3 weights, out bvec3 isLit) {
 
 void main() {
   vec3 d = normalize(vAway);
-  uvec4 corners = texelFetch(uCorners, at(vFace), 0);
-  vec4 facing = texelFetch(uFacing, at(vFace), 0);
+  uvec4 corners = vCorners;
+  vec4 facing = vFacing;
   float along = dot(facing.xyz, d);
   int material = int(corners.w) * ${MATERIAL};
-  ivec4 kind = texelFetch(uMaterials, at(material + ${GROUPS}), 0);
-  vec3 color = intBitsToFloat(texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0)).rgb;
-
-  uvec4 lattice = texelFetch(uLattice, at(vFace), 0);
+  ivec3 kind = vKind;
+  vec3 color = vEmission;
+  uvec3 lattice = vLattice;
   int front = int(lattice.z & 255u), behindIt = int(lattice.z >> 8);
   bool isBehind = along > 0.0 ? behindIt > 0 : front == 0;
   int rows = isBehind ? behindIt : front;

@@ -42,8 +42,12 @@ let running: Promise<void> | null = null;
 let durations: number[] = [];
 
 function readChoice(): Draws {
-  const kept = localStorage.getItem(KEY);
-  return kept === "browser" || kept === "server" ? kept : "auto";
+  try {
+    const kept = localStorage.getItem(KEY);
+    return kept === "browser" || kept === "server" ? kept : "auto";
+  } catch {
+    return "auto"; // a browser that keeps nothing
+  }
 }
 
 export function chooseDrawnBy(choice: Draws): void {
@@ -67,6 +71,9 @@ export function leave(view: string, isAway: boolean): void {
   if (isAway) away.add(view);
   else away.delete(view);
 }
+
+/** Whether a view's eye is on its way without the server. */
+export const isAway = (view: string): boolean => away.has(view);
 
 /** Draw a view from where its eye is now; false where the server has to. */
 export function drawHere(view: string): boolean {

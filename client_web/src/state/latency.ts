@@ -22,11 +22,12 @@ declare global {
     relumeStats: { latencies: Latency[]; drawnHere: number };
   }
 }
-window.relumeStats = { latencies, drawnHere: 0 };
+const stats = { latencies, drawnHere: 0 };
+if (typeof window !== "undefined") window.relumeStats = stats;
 
 /** This browser has drawn a picture itself. */
 export function noteDrawnHere(): void {
-  window.relumeStats.drawnHere += 1;
+  stats.drawnHere += 1;
 }
 
 export function editSent(revision: number, inputTime: number): void {

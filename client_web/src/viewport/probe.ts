@@ -1,6 +1,7 @@
 /** Pixel → curve: asks the server what a pixel is made of, one question at a time, the newest pixel first. */
 import { effect } from "@preact/signals";
 import { send } from "../live/connections";
+import { isAway } from "../live/drawing";
 import type { Picture } from "../picture/picture";
 import { drawn } from "../state/display";
 import { probe } from "../state/probe";
@@ -17,7 +18,7 @@ function waiting(): boolean {
 function ask(): void {
   timer = 0;
   const at = probe.peek();
-  if (at === null) return;
+  if (at === null || isAway(at.view)) return; // the server is where the eye was: it is asked when both rest
   asked = performance.now();
   send({ type: "probe", view: at.view, x: at.x, y: at.y });
 }

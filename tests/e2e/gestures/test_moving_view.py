@@ -15,20 +15,13 @@ from editor_server import Server
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
-BAKE_S, MOVED_S = 120.0, 30.0
+MOVED_S = 30.0
 
 
 @pytest.fixture(scope="module")
 def scene(server: Server) -> Iterator[str]:
-    """A scene of its own with one bake, whose view moves; it is gone afterwards."""
-    identity = server.call("/api/built-ins/cornell_box", {})["id"]
-    recipe = {"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000}
-    bake = server.call("/api/bakes", recipe)
-    deadline = time.monotonic() + BAKE_S
-    while bake["state"] in ("queued", "running") and time.monotonic() < deadline:
-        time.sleep(0.1)
-        bake = server.call(f"/api/bakes/{bake['id']}")
-    assert bake["state"] == "ready", bake["problem"]
+    """A scene whose view moves; it is gone afterwards."""
+    identity = server.moving_scene()
     yield identity
     server.delete(f"/api/scenes/{identity}")
 

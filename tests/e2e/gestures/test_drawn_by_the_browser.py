@@ -1,0 +1,169 @@
+"""Moving views that the browser draws itself: as the server does, without a byte for an eye; edits and rest."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from editor_page import WAIT_MS, Editor, changed, opened_page
+from editor_server import Server
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Page, WebSocketRoute, expect
+from scipy.ndimage import maximum_filter, minimum_filter
+
+DRAWN_MS = 60_000
+BAR_PX, WINDOW_PX, SPAN = 60, 25, 16
+Pixels = NDArray[np.int16]
+
+
+@pytest.fixture(scope="module")
+def scene(server: Server) -> Iterator[str]:
+    """A scene whose view moves; it is gone afterwards."""
+    identity = server.moving_scene()
+    yield identity
+    server.delete(f"/api/scenes/{identity}")
+
+
+def never_at_rest(page: Page, sizes: list[int]) -> None:
+    """Ask for no exact picture, and take note of the sizes of all frames."""
+
+    def connect(socket: WebSocketRoute) -> None:
+        server = socket.connect_to_server()
+
+        def down(message: Any) -> None:
+            if isinstance(message, bytes):
+                sizes.append(len(message))
+            socket.send(message)
+
+        socket.on_message(lambda text: server.send(str(text).replace('"rest":"exact"', '"rest":"stay"')))
+        server.on_message(down)
+
+    page.route_web_socket(re.compile(".*"), connect)
+
+
+@pytest.fixture
+def moving(server: Server, browser: Browser, scene: str) -> Iterator[tuple[Editor, list[int]]]:
+    """The editor, its eye a step aside of where it began, drawn by the server; and the sizes of frames so far."""
+    with opened_page(browser) as page:
+        sizes: list[int] = []
+        never_at_rest(page, sizes)
+        page.goto(f"{server.url}/?scene={scene}")
+        page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
+        page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+        editor = Editor(page)
+        editor.canvas.focus()
+        page.keyboard.press("ArrowLeft")
+        settled(editor)
+        yield editor, sizes
+
+
+def settled(editor: Editor) -> Pixels:
+    """The picture once it has stopped changing."""
+    expect(editor.page.locator("footer.status")).to_contain_text("approximate until", timeout=WAIT_MS)
+    before = editor.pixels_now()
+    deadline = time.monotonic() + DRAWN_MS / 1e3
+    while time.monotonic() < deadline:
+        editor.page.wait_for_timeout(700)
+        after = editor.pixels_now()
+        if changed(before, after) == 0:
+            return after
+        before = after
+    raise AssertionError("the picture does not come to rest")
+
+
+def num_drawn(page: Page) -> int:
+    return int(page.evaluate("window.relumeStats.drawnHere"))
+
+
+def choose(page: Page, who: str) -> None:
+    page.get_by_label("Drawn by").select_option(who)
+
+
+def draw_here(page: Page) -> None:
+    before = num_drawn(page)
+    choose(page, "browser")
+    page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=before, timeout=DRAWN_MS)
+
+
+def beside_edges(one: Pixels) -> NDArray[np.bool_]:
+    """Pixels away from edges, which the server antialiases and a processor that draws does not. (height, width)"""
+    window = (WINDOW_PX, WINDOW_PX, 1)  # several pixels of the picture
+    span = maximum_filter(one, window) - minimum_filter(one, window)
+    inside = np.asarray(span.max(axis=2) < SPAN, np.bool_)
+    inside[-BAR_PX:] = False  # under the bar that says who draws
+    return inside
+
+
+def test_it_shows_what_the_server_does(moving: tuple[Editor, list[int]]) -> None:
+    editor, _ = moving
+    by_server = settled(editor)
+    draw_here(editor.page)
+    by_browser = settled(editor)
+    inside = beside_edges(by_server)
+    assert inside.mean() > 0.3
+    off = np.abs(by_server - by_browser).max(axis=2)
+    assert (off[inside] > 2).mean() < 2e-3
+    assert np.abs(by_server - by_browser).mean() < 1
+    choose(editor.page, "server")
+    assert changed(by_server[:-BAR_PX], settled(editor)[:-BAR_PX]) == 0
+
+
+def test_an_eye_costs_no_pictures_on_the_network_twice(moving: tuple[Editor, list[int]]) -> None:
+    editor, sizes = moving
+    page, box = editor.page, editor.canvas.bounding_box()
+    assert box is not None
+    draw_here(page)
+    before = settled(editor)
+    for across in (50, -90):
+        sizes.clear()
+        drawn, x, y = num_drawn(page), box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        for k in range(10):
+            page.mouse.move(x + across * k / 9, y)
+            page.wait_for_timeout(60)
+        page.mouse.up()
+        after = settled(editor)
+        assert num_drawn(page) > drawn + 3
+        assert max(sizes, default=0) < 2000
+        assert changed(before, after) > 0.05
+        before = after
+
+
+def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> None:
+    editor, _ = moving
+    page = editor.page
+    draw_here(page)
+    page.get_by_role("option", name="Red wall").click()
+    for name, key in (("Brightness", "PageDown"), ("Rotation", "PageUp")):
+        for _ in range(2):
+            before, drawn = settled(editor), num_drawn(page)
+            page.get_by_role("slider", name=name).first.focus()
+            for _ in range(4):
+                page.keyboard.press(key)
+            page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
+            here = settled(editor)
+            assert changed(before, here) > 0.003
+    choose(page, "server")
+    there = settled(editor)
+    assert np.abs(here - there).mean() < 1
+
+
+def test_the_exact_picture_takes_over_where_the_eye_rests_twice(server: Server, browser: Browser, scene: str) -> None:
+    with opened_page(browser) as page:
+        page.add_init_script("localStorage.setItem('relume.drawnBy', 'browser')")
+        page.goto(f"{server.url}/?scene={scene}")
+        editor = Editor(page)
+        editor.wait_until_exact()
+        for _ in range(2):
+            page.wait_for_timeout(500)
+            drawn, before = num_drawn(page), editor.pixels()
+            editor.canvas.focus()
+            page.keyboard.press("ArrowLeft")
+            page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
+            editor.page.wait_for_timeout(500)
+            assert changed(before, editor.pixels()) > 0.05
