@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 
-NUM_LIGHTS, BAKE_S = 200, 300.0
+NUM_LIGHTS = 200
 ARGUMENTS = [
     "--no-sandbox",
     "--enable-unsafe-swiftshader",
@@ -43,13 +42,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     server = Server(data)
     server.start()
     try:
-        recipe = {"scene": scene.id, "views": ["front", "left"], "size": SIZE, "lights": NUM_LIGHTS}
-        bake = server.call("/api/bakes", recipe)
-        deadline = time.monotonic() + BAKE_S
-        while bake["state"] in ("queued", "running") and time.monotonic() < deadline:
-            time.sleep(0.1)
-            bake = server.call(f"/api/bakes/{bake['id']}")
-        assert bake["state"] == "ready", bake["problem"]
+        server.bake({"scene": scene.id, "views": ["front", "left"], "size": SIZE, "lights": NUM_LIGHTS})
         yield server
     finally:
         server.kill()
