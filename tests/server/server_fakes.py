@@ -258,6 +258,7 @@ class Control:
         return Library(
             *paint,
             lambda folder: Finder.of(load_scene(folder)),
+            lambda transfer: ({}, {}),
             lambda: {Holder("frozen", "0123"): 100},
             lambda: 123,
             lambda stores: self.stores_kept.append(set(stores)),
