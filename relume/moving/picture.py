@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -58,7 +57,7 @@ class MovingPicture:
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
         self.draws = True
         self._told: tuple[Light, Arriving, bool] | None = None
-        self._num_told = 0
+        self._num_told = self._num_materials = 0
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
@@ -169,8 +168,7 @@ class MovingPicture:
             self._told = self._now(), vectors, self._is_rough
             self._num_told += before is None or before[1] is not vectors
         wanted = self._wanted(self._look, self._told[1])
-        assert self._materials is not None
-        versions = json.dumps(self._materials[0], sort_keys=True), self._num_told
+        versions = self._num_materials, self._num_told
         return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
 
     def _now(self) -> Light:
@@ -188,6 +186,7 @@ class MovingPicture:
         terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
         if self._materials is None or self._materials[0] != terms:
             self._materials = terms, Materials.of(terms)
+            self._num_materials += 1
         return self._materials[1]
 
     def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:

@@ -48,6 +48,14 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         server.kill()
 
 
+@pytest.fixture(scope="module")
+def moving_scene(server: Server) -> Iterator[str]:
+    """A scene of its own with one bake, whose view moves; it is gone afterwards."""
+    identity = server.moving_scene()
+    yield identity
+    server.delete(f"/api/scenes/{identity}")
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     names = ("chromium", "chromium-browser", "google-chrome")

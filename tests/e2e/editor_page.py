@@ -76,6 +76,12 @@ class Editor:
         self.page.mouse.up()
 
 
+def wait_until_drawn(page: Page) -> None:
+    """Until the first picture of a moving view is there."""
+    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
+    page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+
+
 @contextmanager
 def opened_page(browser: Browser) -> Iterator[Page]:
     """A page in a fresh browser profile, at 1280×800; no script on it may fail."""

@@ -1,7 +1,7 @@
 /** The eyes of views that move: where hands have put them, told to the server, kept over a reload. */
 import { effect } from "@preact/signals";
 import { send } from "../live/connections";
-import { drawHere, eyeSize, leave, told } from "../live/drawing";
+import { drawHere, eyeSize, isAway, leave, told } from "../live/drawing";
 import { askProbe } from "../live/probing";
 import type { HelloMessage, Triple } from "../protocol";
 import { bake } from "../state/bakes";
@@ -22,8 +22,6 @@ export class Eye {
   private motion: Motion;
   private number = 0;
   private hasMoved = false;
-  /** This browser draws where it goes, and the server knows where it began alone. */
-  private isAway = false;
 
   constructor(
     readonly bake: string,
@@ -84,6 +82,7 @@ export class Eye {
 
   end(): void {
     this.motion.end();
+    leave(this.view.name, false);
   }
 
   private from(orbit: Orbit): Motion {
@@ -97,8 +96,7 @@ export class Eye {
     views.value = views.peek().map((other) => (other.name === name ? { ...other, camera } : other));
     const isHere = !isLast && drawHere(name);
     if (!isHere) this.say(camera, "exact");
-    else if (!this.isAway) this.say(camera, "stay"); // nothing is to be traced of where it is passing
-    this.isAway = isHere;
+    else if (!isAway(name)) this.say(camera, "stay"); // nothing is to be traced of where it is passing
     leave(name, isHere);
     if (isLast) drawHere(name);
   }

@@ -7,7 +7,7 @@ import { read } from "./reading";
 import { isSoftware } from "./software";
 import { backgroundShader, CORNERS, surfaceShader, WORDS } from "./surfaceShader";
 import { Images, Values } from "./targets";
-import { Texels, type Kind } from "./texels";
+import { BYTES, Texels, type Kind } from "./texels";
 
 type Tables = NonNullable<FrameHeader["tables"]>;
 
@@ -73,7 +73,7 @@ export class Evaluator {
   /** Throws where this browser cannot draw it. */
   constructor(
     gl: WebGL2RenderingContext,
-    private readonly surface: SurfaceBody, 
+    private readonly surface: SurfaceBody,
     arrays: ReadonlyMap<string, Uint8Array>,
   ) {
     this.gl = gl;
@@ -110,7 +110,7 @@ export class Evaluator {
   take(tables: Tables, payload: Uint8Array): void {
     let start = 0;
     for (const { name, dtype, shape } of tables.arrays) {
-      const bytes = payload.subarray(start, (start += shape[0] * shape[1] * (dtype === "float16" ? 2 : 4)));
+      const bytes = payload.subarray(start, (start += shape[0] * shape[1] * BYTES[dtype]));
       if (name === "vectors_scale" || name === "others_scale") {
         this.scales[name === "vectors_scale" ? "vectors" : "others"] = [...new Float32Array(bytes.slice().buffer)];
         continue;

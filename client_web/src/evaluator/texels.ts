@@ -4,7 +4,8 @@ import { WIDTH } from "./common";
 type Gl = WebGL2RenderingContext;
 export type Kind = "float32" | "float16" | "uint32" | "int32" | "rgb9e5";
 
-const BYTES: Record<Kind, number> = { float32: 4, float16: 2, uint32: 4, int32: 4, rgb9e5: 4 };
+/** Of each number. */
+export const BYTES: Record<Kind, number> = { float32: 4, float16: 2, uint32: 4, int32: 4, rgb9e5: 4 };
 
 /** Internal format, format and type of texels of so many numbers. */
 function formatOf(gl: Gl, kind: Kind, numbers: number): [number, number, number] {
@@ -46,7 +47,7 @@ export class Texels {
   put(name: string, kind: Kind, numbers: number, bytes: Uint8Array): void {
     const { gl } = this;
     const [internal, format, type] = formatOf(gl, kind, numbers);
-    const count = bytes.byteLength / (BYTES[kind] * (kind === "rgb9e5" ? 1 : numbers));
+    const count = bytes.byteLength / (BYTES[kind] * numbers);
     const height = Math.max(1, Math.ceil(count / WIDTH));
     if (height > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number)) throw new Error(`“${name}” is too large to draw here`);
     gl.bindTexture(gl.TEXTURE_2D, this.textureOf(name));
@@ -54,8 +55,7 @@ export class Texels {
     const [view, whole] = [viewOf(kind, bytes), Math.floor(count / WIDTH)];
     if (whole > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, whole, format, type, view, 0);
     const rest = count - whole * WIDTH;
-    const start = whole * WIDTH * (kind === "rgb9e5" ? 1 : numbers);
-    if (rest > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, format, type, view, start);
+    if (rest > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, format, type, view, whole * WIDTH * numbers);
     this.counts.set(name, count);
   }
 

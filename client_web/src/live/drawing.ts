@@ -89,7 +89,7 @@ export async function take(from: BakeConnection, frame: Frame): Promise<void> {
   const { view, kind, eye } = frame.header;
   if (kind === "tables") return takeTables(from, frame);
   const isDrawn = drawsHere.peek() && here?.of === from && kind === "picture";
-  const isLate = isDrawn && (away.has(view) || (eyes.has(view) && frame.header.eye !== null && eyes.get(view) !== eye));
+  const isLate = isDrawn && (away.has(view) || (eyes.has(view) && eye !== null && eyes.get(view) !== eye));
   if (isLate) return;
   await takeFrame(from, frame);
   void offer(from, view);
@@ -155,6 +155,7 @@ function giveUp(reason: string | null): void {
   away.clear();
   evaluator.release();
   of.session.send({ type: "evaluate", by: "server" });
+  of.toldEvaluator = false;
   if (reason !== null) note(reason);
 }
 
@@ -167,7 +168,8 @@ async function offer(of: BakeConnection, view: string): Promise<void> {
   loading = of;
   try {
     const made = await load(of);
-    if (made === null || of !== connections.shown) return;
+    if (made === null) return;
+    if (of !== connections.shown || drawnBy.peek() === "server") return made.evaluator.release();
     here?.evaluator.release();
     here = made;
     durations = [];

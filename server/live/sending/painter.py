@@ -125,10 +125,14 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
         return Painted(job, advance, None, update_ms)
     tiles, payload, alpha = _payload(picture, request, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    wait_ms = 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
     of_picture = {"tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None}
-    header = _header(request, advance, times(wait_ms, update_ms, encode_ms), of_picture)
+    header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_picture)
     return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
+
+
+def _waited_ms(request: FrameRequest, start_s: float) -> float:
+    """How long what is answered has waited."""
+    return 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
 
 
 def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mapping[str, Any]) -> FrameHeader:
@@ -158,16 +162,15 @@ def _tables(
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
     lacking = [part for name, part in parts.items() if known.get(name, _NOTHING) != part.key]
-    if not lacking and request.received_s is None and known:
+    if not lacking and request.received_s is None:
         return Painted(job, advance, None, update_ms, known=known)
     arrays = {name: array for part in lacking for name, array in part.make().items()}
     infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]
     tables = TablesInfo(**numbers._asdict(), arrays=infos)
     payload = b"".join(array.tobytes() for array in arrays.values())
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    wait_ms = 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
     of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables}
-    header = _header(request, advance, times(wait_ms, update_ms, encode_ms), of_tables)
+    header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_tables)
     now_known = {**known, **{name: part.key for name, part in parts.items()}}
     return Painted(job, advance, pack(header, payload), update_ms, encode_ms, now_known)
 

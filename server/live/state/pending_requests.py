@@ -18,7 +18,7 @@ class PendingRequests:
         target: the newest look; it stays, each view is painted with it once.
         space: width and height that the client has for the view that it shows alone; None: as much as it is large.
         eyes: newest eye of each view that has been given one; it stays.
-            evaluator: who finds the pixels of views whose eye moves.
+        evaluator: who finds the pixels of views whose eye moves.
         touch, hold: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 

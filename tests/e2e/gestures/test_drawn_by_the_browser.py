@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from editor_page import WAIT_MS, Editor, changed, opened_page
+from editor_page import WAIT_MS, Editor, changed, opened_page, wait_until_drawn
 from editor_server import Server
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
@@ -18,14 +18,6 @@ from scipy.ndimage import maximum_filter, minimum_filter
 DRAWN_MS = 60_000
 BAR_PX, WINDOW_PX, SPAN = 60, 25, 16
 Pixels = NDArray[np.int16]
-
-
-@pytest.fixture(scope="module")
-def scene(server: Server) -> Iterator[str]:
-    """A scene whose view moves; it is gone afterwards."""
-    identity = server.moving_scene()
-    yield identity
-    server.delete(f"/api/scenes/{identity}")
 
 
 def never_at_rest(page: Page, sizes: list[int]) -> None:
@@ -46,14 +38,13 @@ def never_at_rest(page: Page, sizes: list[int]) -> None:
 
 
 @pytest.fixture
-def moving(server: Server, browser: Browser, scene: str) -> Iterator[tuple[Editor, list[int]]]:
+def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tuple[Editor, list[int]]]:
     """The editor, its eye a step aside of where it began, drawn by the server; and the sizes of frames so far."""
     with opened_page(browser) as page:
         sizes: list[int] = []
         never_at_rest(page, sizes)
-        page.goto(f"{server.url}/?scene={scene}")
-        page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
-        page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
+        page.goto(f"{server.url}/?scene={moving_scene}")
+        wait_until_drawn(page)
         editor = Editor(page)
         editor.canvas.focus()
         page.keyboard.press("ArrowLeft")
@@ -110,6 +101,8 @@ def test_it_shows_what_the_server_does(moving: tuple[Editor, list[int]]) -> None
     assert np.abs(by_server - by_browser).mean() < 1
     choose(editor.page, "server")
     assert changed(by_server[:-BAR_PX], settled(editor)[:-BAR_PX]) == 0
+    draw_here(editor.page)
+    assert changed(by_browser[:-BAR_PX], settled(editor)[:-BAR_PX]) == 0
 
 
 def test_an_eye_costs_no_pictures_on_the_network_twice(moving: tuple[Editor, list[int]]) -> None:
@@ -153,10 +146,12 @@ def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> 
     assert np.abs(here - there).mean() < 1
 
 
-def test_the_exact_picture_takes_over_where_the_eye_rests_twice(server: Server, browser: Browser, scene: str) -> None:
+def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
+    server: Server, browser: Browser, moving_scene: str
+) -> None:
     with opened_page(browser) as page:
         page.add_init_script("localStorage.setItem('relume.drawnBy', 'browser')")
-        page.goto(f"{server.url}/?scene={scene}")
+        page.goto(f"{server.url}/?scene={moving_scene}")
         editor = Editor(page)
         editor.wait_until_exact()
         for _ in range(2):

@@ -10,37 +10,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from editor_page import WAIT_MS, Editor, changed, opened_page
+from editor_page import WAIT_MS, Editor, changed, opened_page, wait_until_drawn
 from editor_server import Server
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
 MOVED_S = 30.0
 
 
-@pytest.fixture(scope="module")
-def scene(server: Server) -> Iterator[str]:
-    """A scene whose view moves; it is gone afterwards."""
-    identity = server.moving_scene()
-    yield identity
-    server.delete(f"/api/scenes/{identity}")
-
-
 @pytest.fixture
-def moving(server: Server, browser: Browser, scene: str) -> Iterator[Editor]:
+def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[Editor]:
     """The editor on it, its first picture exact."""
     with opened_page(browser) as page:
-        page.goto(f"{server.url}/?scene={scene}")
+        page.goto(f"{server.url}/?scene={moving_scene}")
         wait_until_drawn(page)
         editor = Editor(page)
         editor.wait_until_exact()
         yield editor
-
-
-def wait_until_drawn(page: Page) -> None:
-    """Until its first picture is there."""
-    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
-    page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
 
 
 def differs(editor: Editor, before: object, least: float = 0.02) -> None:
@@ -126,10 +112,10 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     differs(moving, edited)
 
 
-def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, scene: str) -> None:
+def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, moving_scene: str) -> None:
     moving.page.get_by_role("button", name="Keep camera").click()
     expect(moving.page.get_by_text("The camera is kept as “View 1”")).to_be_visible()
-    kept = server.call(f"/api/scenes/{scene}/cameras")
+    kept = server.call(f"/api/scenes/{moving_scene}/cameras")
     assert [camera["name"] for camera in kept if camera["name"] == "View 1"] == ["View 1"]
 
 
