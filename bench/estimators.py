@@ -53,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
             validate(transfer.default_look, transfer.default_look), transfer.material_names, has_bounces=True
         )
         assert isinstance(transfer, BouncedViews)
-        radiance = transfer.reflected.under(light)
+        radiance = transfer.reflected.under(light).even
         num_rays = store.shape("views/0/links")[1]
         chosen = np.linspace(0, store.shape("views/0/links")[0] - 1, num_samples).astype(np.int64)
         position, normal = (store.read(f"views/0/{name}")[chosen] for name in ("position", "normal"))

@@ -1,7 +1,7 @@
 """gather.full_rmse_SCENE and gather.full_bias_SCENE: reflected light against Mitsuba's whole path tracer.
 
 The pictures of bench/gather_scenes.py, every surface on the way with its whole BSDF on Mitsuba's side: highlights light
-other surfaces there by their own shape, with us evenly (docs/adr/0045-highlights-send-light-evenly.md).
+other surfaces there by their own shape, with us by few functions (docs/adr/0047-cells-send-by-direction.md).
 """
 
 from __future__ import annotations

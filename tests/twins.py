@@ -10,12 +10,15 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions, texel_solid_angles
+from relume.methods.between import sent_between
+from relume.methods.on_cells import LightOnCells
 from relume.picture.light import light_of
 from relume.picture.transfer import Axis
 from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import Receivers
+from relume.project.sent import SIDE
 from relume.views.view import View
 
 
@@ -169,15 +172,25 @@ def arriving(transfer, view: View, index, look):
         return transfer.arriving(view, index, light._replace(environment_gain=look.environment.gain), transfer.memory)
     lights, reflected = transfer.lights_in(look.environment.key), None
     if light.paths.reflect:
-        irradiance = transfer.cells.irradiance(lights) * gain
-        for geometry, of_source in light.local:
-            irradiance += np.array(of_source, np.float32) * transfer.local.irradiance(geometry)[:, None]
-        reflected = transfer.cells.radiance(
-            irradiance, transfer.cells.reflectance(light.reflectances), light.paths.first, light.paths.last
-        )
+        reflecting = transfer.cells.reflecting(light.reflectances)
+        on_cells = LightOnCells(transfer.cells, transfer.local, transfer.lights_in, transfer.memory, transfer.key)
+        every = light._replace(environment_gain=look.environment.gain)
+        arrived = on_cells.arrived(every, reflecting, is_preview=False)
+        reflected = sent_between(transfer.cells, reflecting, arrived, light.paths.first, light.paths.last)
     local = transfer.local.all_rays(light, view.points(index))
     straight = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.none()
     return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)
+
+
+def sent_towards(sent, cell, direction):
+    """What a cell sends in a unit direction, world space. (3,)"""
+    radiance, row = sent.even[cell].astype(float), sent.lobe[cell]
+    if row >= 0:
+        x, y = sent.frame[row].astype(float) @ direction
+        place = np.array([x, y]) / (1 + np.sqrt(max(0.0, 1 - x * x - y * y)))
+        across, along = np.clip(np.floor((place + 1) * SIDE / 2), 0, SIDE - 1).astype(int)
+        radiance += sent.scale[row] * sent.table[row, across * SIDE + along]
+    return radiance
 
 
 def radiance_of(transfer, view: View, look):

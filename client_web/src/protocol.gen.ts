@@ -351,7 +351,7 @@ export interface InOutBody {
   is_mirror: boolean;
 }
 
-/** How the functions of the in-basis follow from each other; see `relume.moving.basis.zernike.Ladder`. */
+/** How the functions of the in-basis follow from each other; see `relume.basis.zernike.Ladder`. */
 export interface LadderBody {
   order: number[];
   norm: number[];

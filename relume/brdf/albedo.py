@@ -1,4 +1,11 @@
-"""Reflectance: what share of light a term sends on, whatever the directions it comes from and goes to."""
+"""What share of light a material sends on, by where it comes from and where it goes.
+
+    L_j = Σ_k F_jk t_k,   F_jk = ∫∫ f(ωi, ωo) h_j(ωo) h_k(ωi) cos θi cos θo dωi dωo
+
+with one basis h for both sides (`relume.basis.zernike`; Mahajan 2008, section 3, whose out-factors it projects again).
+F_00 is the reflectance ρ, whatever the directions. Where a term looks the same from all around, only functions of one
+order m are mixed, their cosine and sine parts alike; of other terms F is the mean over turns about the normal.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +17,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.brdf.symmetry import about_normal, is_isotropic
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 TEXTURES = ("diffuse", "specular")
 
-Reflectances = tuple[tuple[float, ...], ...]
-"""Of each material, from `reflectances_of`."""
+Reflectances = tuple[bytes, ...]
+"""Of each material, from `reflectances_of`; as bytes, which are compared and hashed at every frame."""
+
+
+def _pairs() -> tuple[tuple[int, int], ...]:
+    order = ladder(SENT_DEGREE).order
+    return tuple((j, k) for j in range(len(order)) for k in range(j, len(order)) if order[j] == order[k])
+
+
+PAIRS = _pairs()
+"""Rungs j ≤ k of equal order: F is known by their numbers; the first is F_00."""
 
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
-_STEPS = 128  # of a highlight's reflectance, from none to all
+_STEPS = 128  # of a highlight's numbers, from none to all
 
 
 def is_diffuse(term_document: Mapping[str, Any]) -> bool:
@@ -31,39 +49,49 @@ def is_diffuse(term_document: Mapping[str, Any]) -> bool:
     return TERMS[term_document["model"]].texture == "diffuse"
 
 
-def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> tuple[float, ...]:
-    """Reflectance of a material: R, G, B of its terms without a texture, then of those with each of `TEXTURES`.
+def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
+    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`.
 
     Args:
         terms: of a complete look.
     Returns:
-        Nine numbers, hashable.
+        What `shares_in` reads.
     """
-    total = np.zeros((1 + len(TEXTURES), 3))
+    total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
     for term in terms:
-        found = reflectance(term)
+        found = shares(term)
         if not is_diffuse(term):  # else all light would be made anew with each step of a hand on a highlight
             found = np.round(found * _STEPS) / _STEPS
         total[0 if term["texture"] is None else 1 + TEXTURES.index(term["texture"])] += found
-    return tuple(total.ravel().tolist())
+    return total.astype(np.float32).tobytes()
+
+
+def shares_in(of_material: bytes) -> F32:
+    """F of a material's terms without a texture, then of those with each of `TEXTURES`. (3, channels, pairs) float32"""
+    return np.frombuffer(of_material, np.float32).reshape(1 + len(TEXTURES), 3, len(PAIRS))
 
 
 def reflectance(term_document: Mapping[str, Any]) -> F64:
-    """ρ = 1/π ∫∫ f(ωi, ωo) cos θi cos θo dωi dωo of a term, its colour included, its texture not.
+    """ρ = F_00 of a term, its colour included, its texture not. (3,), not negative"""
+    return shares(term_document)[:, 0]
+
+
+def shares(term_document: Mapping[str, Any]) -> F64:
+    """F of a term, its colour included, its texture not; of a diffuse term F_00 alone.
 
     Args:
         term_document: one term of a complete look.
     Returns:
-        (3,), not negative
+        (channels, pairs)
     """
     white = {**term_document, "color": [1.0, 1.0, 1.0]}
     known = (_of_even if is_diffuse(term_document) else _of_lobe)(json.dumps(white, sort_keys=True))
-    return known * np.asarray(term_document["color"], np.float64)
+    return known * np.asarray(term_document["color"], np.float64)[:, None]
 
 
 @lru_cache(maxsize=1024)
 def _of_lobe(term_text: str) -> F64:
-    """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi then do. (3,)
+    """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi then do.
 
     With θr the angle from there, θr = π u³ and dωi = 3π u² sin θr du dφr; below the horizon there is nothing.
     """
@@ -81,7 +109,11 @@ def _of_lobe(term_text: str) -> F64:
     weight = (weight_o * cos_o)[:, None] * solid * np.maximum(above, 0)
     turns = _TURNS[:1] if is_isotropic(document) else _TURNS
     value = np.mean([eval_brdf(document, wi @ turn.T, wo @ turn.T) for turn in turns], axis=0)
-    return np.asarray(2 * np.einsum("on,onc->c", weight, value))
+    rungs = ladder(SENT_DEGREE)
+    h_i, h_o = in_basis(wi)[..., rungs.cosine], in_basis(wo[:, 0])[:, rungs.cosine]
+    arriving = np.einsum("on,onc,onk->ock", weight, value, h_i)
+    around = np.where(rungs.order > 0, np.pi, 2 * np.pi)  # ∫ cos² mφ dφ
+    return np.stack([around[j] * np.einsum("o,oc->c", h_o[:, j], arriving[..., k]) for j, k in PAIRS], axis=-1)
 
 
 def _gauss(num: int) -> tuple[F64, F64]:
@@ -95,7 +127,7 @@ _TURNS = [about_normal(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term th
 
 @lru_cache(maxsize=1024)
 def _of_even(term_text: str) -> F64:
-    """By Gauss–Legendre quadrature over cosines; diffuse terms are smooth, or steps of hand-drawn bands. (3,)"""
+    """By Gauss–Legendre quadrature over cosines; diffuse terms are smooth, or steps of hand-drawn bands."""
     cosine, weight = _gauss(_NUM_COSINES)
     projected = weight * cosine
     sine = np.sqrt(1 - cosine**2)
@@ -104,5 +136,7 @@ def _of_even(term_text: str) -> F64:
     wi = np.stack(around, axis=-1)[None]
     wo = np.stack([sine, 0 * sine, cosine], axis=-1)[:, None, None]
     over_azimuths = eval_brdf(json.loads(term_text), wi, wo).mean(axis=2)
+    out = np.zeros((3, len(PAIRS)))
     # 2π for the azimuths of each direction, over π
-    return np.asarray(4 * np.pi * np.einsum("o,i,oic->c", projected, projected, over_azimuths))
+    out[:, 0] = 4 * np.pi * np.einsum("o,i,oic->c", projected, projected, over_azimuths)
+    return out

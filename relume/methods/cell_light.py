@@ -1,4 +1,4 @@
-"""Gather cells, and what they send out: the light that gather rays bring back from the surfaces they hit."""
+"""Gather cells, and what arrives at them: the light that gather rays bring back from the surfaces they hit."""
 
 from __future__ import annotations
 
@@ -8,36 +8,46 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import SENT_DEGREE, ladder
 from relume.brdf.albedo import Reflectances
+from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
-from relume.methods.bounces import bounce, bounced, irradiance, preview_bounced
-from relume.trace.cell_tree import NO_CELL
+from relume.methods.bounces import irradiance
+from relume.methods.reflecting import Arrived, Reflecting
+from relume.methods.seen_from import seen_from
+from relume.points import Points
+from relume.project.light_vectors import light_vectors, ray_vectors
+from relume.project.receivers import GatherRays
+from relume.project.sent import NUM_SENT, Sent
+from relume.trace.surface import any_tangent
 
 F32 = NDArray[np.float32]
 
 _FEW = 16  # one ray in so many is enough for a moving hand, but for the first bounce
+_ROOT_PI = np.float32(np.sqrt(np.pi))
 
 
 @dataclass(frozen=True)
 class CellLight:
-    """The gather cells of a bake, and what they send out under any light and look; shared by all its pictures.
+    """The gather cells of a bake, shared by all its pictures.
 
     Attributes:
-        normal: of the points that stand for them. (C, points a cell, 3) float32
+        points: that stand for them, those of a cell one after another. C · points a cell
         visible: lights that those points see. (C, points a cell, bytes) uint8
-        links: of their gather rays. (C, rays) uint16
+        links: of their gather rays. (C, rays) uint16. pattern: the directions of a point's.
         material: index into the scene's materials. (C,) uint16
         textures: multipliers of each of `relume.brdf.albedo.TEXTURES`. (2, C, 3) float32
     """
 
-    normal: F32
+    points: Points
     visible: NDArray[np.uint8]
     links: NDArray[np.uint16]
+    pattern: Pattern
     material: NDArray[np.uint16]
     textures: F32
 
     @cached_property
-    def _few_links(self) -> NDArray[np.uint16]:
+    def few_links(self) -> NDArray[np.uint16]:
         """Other rays for each of the cells beside each other: a stretch of the pattern would see one side alone."""
         cell, num = np.arange(self.num_cells)[:, None], max(1, self.links.shape[1] // _FEW)
         return np.ascontiguousarray(self.links[cell, (cell % _FEW + _FEW * np.arange(num)) % self.links.shape[1]])
@@ -47,35 +57,103 @@ class CellLight:
         """C."""
         return len(self.material)
 
-    def reflectance(self, reflectances: Reflectances) -> F32:
-        """Reflectance of every cell, never above one. (C, 3) float32"""
-        plain, *textured = np.array(reflectances).reshape(-1, 3, 3)[self.material].transpose(1, 0, 2)
-        for of_texture, multiplier in zip(textured, self.textures, strict=True):
-            plain += of_texture * multiplier
-        return np.asarray(np.clip(plain, 0.0, 1.0), np.float32)
+    @property
+    def points_a_cell(self) -> int:
+        """How many stand for each."""
+        return int(self.visible.shape[1])
+
+    @cached_property
+    def frames(self) -> F32:
+        """Tangents and bitangents of cells, across the mean normals of their points. (C, 2, 3) float32"""
+        normal = self.points.normal.reshape(-1, self.points_a_cell, 3)
+        mean = normal.mean(axis=1)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = np.where(length > 0.1, mean / np.maximum(length, 1e-6), normal[:, 0]).astype(np.float32)
+        tangent = any_tangent(mean)
+        return np.stack([tangent, np.cross(mean, tangent)], axis=1).astype(np.float32)
+
+    def reflecting(self, reflectances: Reflectances) -> Reflecting:
+        """What the cells make of light in a look."""
+        return Reflecting.of(reflectances, self.material, self.textures)
 
     def irradiance(self, lights: TriangleLights) -> F32:
         """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32"""
-        points, of_points = self.normal.reshape(-1, 3), self.visible.reshape(-1, self.visible.shape[2])
-        arriving = irradiance(points, of_points, lights).reshape(self.normal.shape)
+        of_points = self.visible.reshape(-1, self.visible.shape[2])
+        arriving = irradiance(self.points.normal, of_points, lights).reshape(*self.visible.shape[:2], 3)
         return np.asarray(arriving.mean(axis=1, dtype=np.float64), np.float32)
 
-    def radiance(self, irradiance: F32, reflectance: F32, first: int, last: int, *, is_preview: bool = False) -> F32:
-        """What every cell sends out of light that surfaces have reflected `first` to `last` times, its own included.
+    def vectors(self, rows: NDArray[np.intp], lights: TriangleLights, degree: int) -> F32:
+        """The same as light vectors, of cells that ask where light comes from; at the first of their points.
 
         Args:
-            irradiance, reflectance: from the methods of these names. (C, 3) float32 each
-            first: at least 1. last: not less.
-            is_preview: a hundredth may be wrong, in a fifth of the time.
+            rows: the cells. (G,). lights: triangles of the environment.
+            degree: at most `SENT_DEGREE`; the numbers of higher functions are left at nothing.
         Returns:
-            Row `NO_CELL` is black. (NO_CELL + 1, 3) float32
+            t. (G, 3, J) float32
         """
-        sent = (reflectance / np.pi * irradiance).astype(np.float32)
-        for _ in range(first - 1):
-            sent = bounce(self.links, reflectance, sent)
-        radiance = np.zeros((NO_CELL + 1, 3), np.float32)
-        if is_preview:
-            radiance[: len(sent)] = preview_bounced(self.links, self._few_links, reflectance, sent, last - first)
-        else:
-            radiance[: len(sent)] = bounced(self.links, reflectance, sent, last - first)
-        return radiance
+        points, visible = self.first_points(rows), np.ascontiguousarray(self.visible[rows, 0])
+        return self.vectors_of(rows, points, light_vectors(points, visible, lights, (), degree))
+
+    def first_points(self, rows: NDArray[np.intp]) -> Points:
+        """The first of the points of each of some cells."""
+        return self.points.rows(rows * self.points_a_cell)
+
+    def points_of(self, rows: NDArray[np.intp]) -> Points:
+        """The points that stand for some cells."""
+        return self.points.rows((rows[:, None] * self.points_a_cell + np.arange(self.points_a_cell)).ravel())
+
+    def vectors_of(self, rows: NDArray[np.intp], points: Points, arriving: F32) -> F32:
+        """Light vectors of cells from those of their points.
+
+        Args:
+            rows: the cells. (G,). points: equally many of each, those of a cell one after another. (n,)
+            arriving: at the points, in their own frames. (n, 3, ≥ J) float32
+        Returns:
+            The mean over a cell's points, in its own frame. (G, 3, J) float32
+        """
+        if len(rows) == 0:
+            return np.zeros((0, 3, NUM_SENT), np.float32)
+        along = np.repeat(self.frames[rows, 0], points.num_points // len(rows), axis=0)
+        bitangent = np.cross(points.normal, points.tangent)
+        angle = np.arctan2(np.einsum("nc,nc->n", along, bitangent), np.einsum("nc,nc->n", along, points.tangent))
+        turned, rungs = np.array(arriving[..., :NUM_SENT]), ladder(SENT_DEGREE)
+        for m, cosine, sine in zip(rungs.order, rungs.cosine, rungs.sine, strict=True):
+            if m:
+                c, s = np.cos(m * angle)[:, None].astype(np.float32), np.sin(m * angle)[:, None].astype(np.float32)
+                turned[..., cosine] = c * arriving[..., cosine] + s * arriving[..., sine]
+                turned[..., sine] = c * arriving[..., sine] - s * arriving[..., cosine]
+        return np.asarray(turned.reshape(len(rows), -1, 3, NUM_SENT).mean(axis=1), np.float32)
+
+    @property
+    def _links_of_points(self) -> NDArray[np.uint16]:
+        return self.links.reshape(self.points.num_points, self.pattern.num_rays)
+
+    def arriving(self, sent: Sent, rows: NDArray[np.intp]) -> Arrived:
+        """What arrives from other cells, whose light differs by direction.
+
+        Args:
+            sent: by all cells. rows: those of which light vectors are wanted. (G,)
+        """
+        links = self._links_of_points
+        of_points = ray_vectors(self.points, [GatherRays(links, self.pattern, sent)], 0)[..., 0]
+        whole = _ROOT_PI * of_points.reshape(-1, self.points_a_cell, 3).mean(axis=1)  # of the first function, 1 / √π
+        points = self.points_of(rows)
+        some = self.links[rows].reshape(points.num_points, self.pattern.num_rays)
+        vectors = ray_vectors(points, [GatherRays(some, self.pattern, sent)], SENT_DEGREE)
+        return Arrived(whole.astype(np.float32), self.vectors_of(rows, points, vectors))
+
+    def seen(self, even: F32, vectors: F32, rows: NDArray[np.intp]) -> F32:
+        """What other cells see of each in the mean. (C, 3) float32
+
+        Args:
+            even: the part that cells send everywhere. (C, 3) float32
+            vectors: L_j of some beside it, (G, 3, J) float32. rows: which those are. (G,)
+        """
+        found = even.copy()
+        found[rows] += np.einsum("gj,gcj->gc", self._seen_from[rows], vectors) if len(rows) else 0
+        return found
+
+    @cached_property
+    def _seen_from(self) -> F32:
+        """The mean of all functions over the directions that others see a cell in. (C, J) float32"""
+        return seen_from(self.points, self._links_of_points, self.pattern, self.frames)

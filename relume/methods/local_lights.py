@@ -27,6 +27,7 @@ F32 = NDArray[np.float32]
 
 SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
 PREVIEW_SAMPLES = 4  # for each of both while a hand moves it
+_ONES = np.ones(3, np.float32)
 
 
 @dataclass(frozen=True)
@@ -130,14 +131,36 @@ class LocalLights:
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
         points, pattern = self._gather_samples, pattern_of(geometry, SAMPLES_OF_CELLS)
-        seen = self._trace(geometry, points, SAMPLES_OF_CELLS)
-        of_points = arriving(self._light(geometry), pattern, points, seen).reshape(-1, POINTS_A_CELL)
-        return np.asarray(of_points.mean(axis=1, dtype=np.float64), np.float32)
+        of_points = arriving(self._light(geometry), pattern, points, self._seen_by_cells(geometry))
+        return np.asarray(of_points.reshape(-1, POINTS_A_CELL).mean(axis=1, dtype=np.float64), np.float32)
+
+    def _seen_by_cells(self, geometry: LightGeometry) -> NDArray[np.uint8]:
+        def traced() -> NDArray[np.uint8]:
+            return self._trace(geometry, self._gather_samples, SAMPLES_OF_CELLS)
+
+        return self._memory.keep((self._key, "shadows on cells", shadow_geometry(geometry)), traced)
+
+    def rays_at_cells(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
+        """What comes to the points of some gather cells from a light of unit emission, as rays.
+
+        Args:
+            geometry: of the light. rows: the cells. (G,)
+        """
+        seen = self._seen_by_cells(geometry)
+        bits = seen.reshape(-1, POINTS_A_CELL, seen.shape[1])[rows].reshape(-1, seen.shape[1])
+        return LocalRays(self._light(geometry), pattern_of(geometry, SAMPLES_OF_CELLS), _ONES, bits)
 
     def preview_irradiance(self, geometry: LightGeometry) -> F32:
         """Preview what comes to every gather cell from a light of unit emission, at one of its points. (C,) float32"""
+        return self._preview_on_cells(geometry).arriving
+
+    def preview_rays_at_cells(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
+        """The same of some cells as rays, at the first of their points. rows: the cells. (G,)"""
+        return self.preview_rays(Source(geometry, (1.0, 1.0, 1.0)), self._preview_on_cells(geometry).visible[rows])
+
+    def _preview_on_cells(self, geometry: LightGeometry) -> PreviewLight:
         key = self._key, "preview light on cells", geometry
-        return self._memory.passing.keep(key, lambda: self.preview(geometry, self._few_gather_samples).arriving)
+        return self._memory.passing.keep(key, lambda: self.preview(geometry, self._few_gather_samples))
 
     def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
         """Whether points of a material that shines are seen from a side that does.

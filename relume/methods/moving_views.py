@@ -11,21 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
+from relume.basis.zernike import NUM_FUNCTIONS
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
 from relume.memory import Memory
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
-from relume.moving.basis.zernike import NUM_FUNCTIONS
-from relume.moving.light_vectors import light_vectors
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
 from relume.moving.sky import Sky, sky_of
 from relume.moving.view import FreeView
 from relume.picture.light import Light
 from relume.picture.transfer import Axis, Eyes
 from relume.points import Points
+from relume.project.light_vectors import light_vectors
 from relume.project.receivers import GatherRays, Rays
+from relume.project.sent import evenly
 from relume.trace.embree import EmbreeScene
 from relume.views.store_io import read_camera
 
@@ -134,9 +135,9 @@ class MovingViews:
     def _vectors(self, element: Light) -> F32:
         points = self.surface.points
         rays: list[Rays] = list(self.lit.local.all_rays(element, points))
-        radiance = self.lit.reflected_in(element)
-        if radiance is not None:
-            rays.append(GatherRays(self._links, self._pattern, radiance))
+        sent = self.lit.reflected_in(element)
+        if sent is not None:
+            rays.append(GatherRays(self._links, self._pattern, sent))
         return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
@@ -147,8 +148,8 @@ class MovingViews:
                 seen = self.lit.local.preview(source.geometry, points).visible
                 rays.append(self.lit.local.preview_rays(source, seen))
         if element.paths.reflect:
-            radiance = self.lit.reflected.preview_under(element)
-            rays.append(GatherRays(self._links[chosen], self._pattern, radiance))
+            sent = evenly(self.lit.reflected.preview_under(element))
+            rays.append(GatherRays(self._links[chosen], self._pattern, sent))
         lights = self.lit.preview_lights_of(element)
         out = np.zeros(self.vectors_shape, np.float32)
         out[chosen] = light_vectors(points, self._visible[chosen], lights, rays, _PREVIEW_DEGREE)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.brdf.albedo import TEXTURES
 from relume.errors import StoreError
+from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
 from relume.methods.cell_light import CellLight
@@ -54,12 +55,15 @@ def read_gather_samples(store: StoreReader, start: int = 0, stop: int | None = N
 
 def read_cells(store: StoreReader) -> CellLight:
     """The gather cells of a store."""
-    normal, visible = store.read("cells/normal"), store.read("cells/visibility")
+    points, visible = read_gather_samples(store), store.read("cells/visibility")
+    links, material = store.read("cells/links"), store.read("cells/material")
+    points_a_cell = store.shape("cells/normal")[1]
     return CellLight(
-        normal,
-        visible.reshape(*normal.shape[:2], visible.shape[1] // normal.shape[1]),
-        store.read("cells/links"),
-        store.read("cells/material"),
+        points,
+        visible.reshape(len(material), points_a_cell, visible.shape[1] // points_a_cell),
+        links,
+        make_pattern(links.shape[1] // points_a_cell, 0, int(store.attributes["gather_seed"])),
+        material,
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
     )
 

@@ -24,6 +24,7 @@ from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, comple
 from relume.memory import Memory
 from relume.methods.cell_light import CellLight
 from relume.methods.local_lights import SAMPLES, LocalLights, Shadows
+from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
 from relume.methods.thinned import ThinnedStore
@@ -32,6 +33,7 @@ from relume.picture.light import Light
 from relume.picture.transfer import Arriving, Axis, Eyes
 from relume.points import Points
 from relume.project.receivers import GatherRays, Rays, Receivers
+from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
 from relume.views.view import View, open_view
 
@@ -143,8 +145,8 @@ class BakedViews:
         """Light between surfaces: none was baked."""
         return None
 
-    def reflected_in(self, light: Light) -> F32 | None:
-        """Radiance of the gather cells; None where they send nothing to the picture."""
+    def reflected_in(self, light: Light) -> Sent | None:
+        """What the gather cells send; None where nothing of it comes to the picture."""
         return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
 
     def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
@@ -238,8 +240,8 @@ class FewSamples:
     def arriving(self, light: Light) -> Arriving:
         """What arrives at them in a light; the environment from a small map, local lights exactly."""
         transfer = self.transfer
-        radiance = transfer.reflected_in(light) if self.gathered is not None else None
-        gathered = () if self.gathered is None or radiance is None else (replace(self.gathered, radiance=radiance),)
+        sent = transfer.reflected_in(light) if self.gathered is not None else None
+        gathered = () if self.gathered is None or sent is None else (replace(self.gathered, sent=sent),)
         local = transfer.local.all_rays(light, self.receivers.points)
         return transfer.preview_lights_of(light), replace(self.receivers, rays=(*gathered, *local))
 
@@ -259,31 +261,17 @@ class BouncedViews(BakedViews):
     @cached_property
     def reflected(self) -> Reflected:
         """Light that gather cells send out."""
-        cells = self.cells
-
-        def of_environment(environment: EnvironmentKey) -> F32:
-            key = self.key, "environment on cells", environment
-            return self.memory.keep(key, lambda: cells.irradiance(self.lights_in(environment)))
-
-        def irradiance(light: Light, is_preview: bool) -> F32:
-            of_local = self.local.preview_irradiance if is_preview else self.local.irradiance
-            arriving = np.zeros((cells.num_cells, 3), np.float32)
-            if light.is_environment_lit:
-                arriving += np.array(light.environment_gain, np.float32) * of_environment(light.environment)
-            for geometry, gain in light.local:
-                arriving += np.array(gain, np.float32) * of_local(geometry)[:, None]
-            return arriving
-
-        return Reflected(cells, irradiance, self.memory, self.key)
+        on_cells = LightOnCells(self.cells, self.local, self.lights_in, self.memory, self.key)
+        return Reflected(self.cells, on_cells, self.memory, self.key)
 
     def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
         """The rays among what arrives: those of gather cells, and of local lights."""
-        local, radiance = super()._rays(view, material, light, memory), self.reflected_in(light)
-        return local if radiance is None else (view.gather_rays(material, radiance), *local)
+        local, sent = super()._rays(view, material, light, memory), self.reflected_in(light)
+        return local if sent is None else (view.gather_rays(material, sent), *local)
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        few, nothing = super().some(view, material, chosen), np.zeros((NO_CELL + 1, 3), np.float32)
+        few, nothing = super().some(view, material, chosen), evenly(np.zeros((NO_CELL + 1, 3), np.float32))
         return replace(few, gathered=view.gather_rays(material, nothing).alone(chosen))
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import CancelledError
-from relume.moving.light_vectors import add_scaled
 from relume.moving.transfer import MovingTransfer
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.light import Light, vector_of
+from relume.project.light_vectors import add_scaled
 
 F32 = NDArray[np.float32]
 

@@ -19,8 +19,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.color import LUMINANCE
-from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.moving.points.surface import Surface
 from relume.moving.points.texels import sample_texture
 from relume.parallel import for_shares

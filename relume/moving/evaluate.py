@@ -10,10 +10,10 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.brdf.albedo import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, is_narrow
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors, turned
-from relume.moving.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.glints import LEAST_COSINE, row_of
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares

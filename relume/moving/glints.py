@@ -14,9 +14,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import add_light, ladder
 from relume.moving.basis.lobes import Lobes
 from relume.moving.basis.out_factors import NUM_ROWS
-from relume.moving.basis.zernike import add_light, ladder
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
 

@@ -32,6 +32,7 @@ from relume.parallel import for_shares, for_steps
 from relume.project.contraction import contract
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import GatherRays, Receivers
+from relume.project.sent import evenly
 
 F32 = NDArray[np.float32]
 
@@ -117,13 +118,13 @@ def freeze_rows(
 
     Args:
         bands: of each curve that depends on wi. (3, J) each
-        points: what arrives at them does not matter. rays: theirs, of any radiance.
+        points: what arrives at them does not matter. rays: theirs, whatever is sent.
         expected: from `expected_light`.
         progress: called with the share done. cancelled: asked now and then.
     Raises:
         CancelledError: `cancelled` said so.
     """
-    lit_by_ones = replace(points, rays=(replace(rays, radiance=np.ones_like(rays.radiance)),))
+    lit_by_ones = replace(points, rays=(replace(rays, sent=evenly(np.ones_like(rays.sent.even))),))
     contraction, num_samples = contract(term, bands, None), len(points.normal)
     blocks = -(-num_samples // BLOCK_SAMPLES)
     rows = IndirectOperator(

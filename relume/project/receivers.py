@@ -13,6 +13,7 @@ from relume.light.gather_rays import Pattern
 from relume.light.local import LocalLight
 from relume.points import Points
 from relume.project.ray_kernel import list_gathered, list_local
+from relume.project.sent import Sent
 
 F32 = NDArray[np.float32]
 
@@ -54,13 +55,13 @@ class GatherRays:
 
     Attributes:
         links: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
-        radiance: of cells, from `CellLight.radiance`. (NO_CELL + 1, 3) float32
+        sent: by cells.
         sharing: weights of the points for each other, from `relume.views.sharing`, (n, n) sparse; None: each alone.
     """
 
     links: NDArray[np.uint16]
     pattern: Pattern
-    radiance: F32
+    sent: Sent
     sharing: Any = None
 
     @property
@@ -70,7 +71,7 @@ class GatherRays:
 
     def times(self, factor: F32) -> GatherRays:
         """Multiply their light in every channel; see `Rays`."""
-        return replace(self, radiance=self.radiance * factor)
+        return replace(self, sent=self.sent.times(factor))
 
     def alone(self, chosen: NDArray[np.integer]) -> GatherRays:
         """Choose those of some points, which do not share them."""
@@ -78,7 +79,7 @@ class GatherRays:
 
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
-        arriving = self.links, self.pattern, self.radiance
+        arriving = self.links, self.pattern, self.sent
         return int(list_gathered(receivers.points, receivers.wo, *arriving, start, stop, *listed))
 
 

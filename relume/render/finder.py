@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import TEXTURES, is_diffuse, reflectances_of
+from relume.brdf.albedo import TEXTURES, is_diffuse, reflectances_of, shares_in
 from relume.color import srgb_encode
 from relume.look import default_look
 from relume.scene.gltf.cameras import framing_camera
@@ -102,7 +102,7 @@ class Finder:
 
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
     """About what a material looks like: its diffuse colour, else that of its highlights. (3,)"""
-    plain, *textured = np.reshape(reflectances_of(list(filter(is_diffuse, terms))), (1 + len(TEXTURES), 3))
+    plain, *textured = shares_in(reflectances_of(list(filter(is_diffuse, terms))))[..., 0].astype(np.float64)
     color = plain + sum(part * _mean(material, name) for name, part in zip(TEXTURES, textured, strict=True))
     if color.max() < _DARKEST:
         color = np.max([np.asarray(term["color"], np.float64) for term in terms], axis=0)

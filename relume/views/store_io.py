@@ -10,6 +10,7 @@ from relume.errors import SceneError, StoreError
 from relume.light.gather_rays import Pattern, make_pattern
 from relume.points import Points
 from relume.project.receivers import GatherRays
+from relume.project.sent import Sent
 from relume.scene.checks import check_camera
 from relume.scene.model import Camera
 
@@ -34,15 +35,15 @@ def pattern_of_material(store: StoreReader, k: int, material: int) -> Pattern:
     return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
 
 
-def read_gather_rays(store: StoreReader, k: int, material: int, start: int, stop: int, radiance: F32) -> GatherRays:
+def read_gather_rays(store: StoreReader, k: int, material: int, start: int, stop: int, sent: Sent) -> GatherRays:
     """Read the gather rays of samples of one material.
 
     Args:
         store: an open store. k: number of the view. material: index of the material.
-        start, stop: rows of the view's arrays. radiance: of cells. (NO_CELL + 1, 3) float32
+        start, stop: rows of the view's arrays. sent: by cells.
     """
     links = store.read(f"views/{k}/links", start, stop)
-    return GatherRays(links, pattern_of_material(store, k, material), radiance)
+    return GatherRays(links, pattern_of_material(store, k, material), sent)
 
 
 def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.uint32]:

@@ -15,6 +15,7 @@ from relume.errors import ChunkDamagedError
 from relume.memory import Memory
 from relume.points import Points
 from relume.project.receivers import GatherRays, LocalRays, Receivers
+from relume.project.sent import Sent
 from relume.scene.model import Camera
 from relume.trace.view_samples import BACKGROUND
 from relume.views.sharing import sharing
@@ -87,7 +88,7 @@ class View:
     def receivers(
         self,
         material: int,
-        reflected: F32 | None = None,
+        reflected: Sent | None = None,
         local: Sequence[LocalRays] = (),
         *,
         is_lit: bool = True,
@@ -96,7 +97,7 @@ class View:
 
         Args:
             material: its index.
-            reflected: radiance of gather cells, whose light arrives too; from `Transfer.reflected_in`.
+            reflected: by gather cells, whose light arrives too; from `Transfer.reflected_in`.
             local: of lights that the samples see.
             is_lit: whether light comes from the environment itself; else no bits are read.
         """
@@ -109,8 +110,8 @@ class View:
         gathered = () if reflected is None else (self.gather_rays(material, reflected),)
         return Receivers(points, towards_eye(self.camera, points.position), visible, (*gathered, *local))
 
-    def gather_rays(self, material: int, reflected: F32) -> GatherRays:
-        """Read from the store the rays of a material's samples that bring the radiance of gather cells."""
+    def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
+        """Read from the store the rays of a material's samples that bring what gather cells send."""
         rows = self.rows(material)
         alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
         return replace(alone, sharing=self._sharing(material))

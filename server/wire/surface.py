@@ -6,7 +6,7 @@ from server.wire.body import Body
 
 
 class LadderBody(Body):
-    """How the functions of the in-basis follow from each other; see `relume.moving.basis.zernike.Ladder`."""
+    """How the functions of the in-basis follow from each other; see `relume.basis.zernike.Ladder`."""
 
     order: list[int]
     norm: list[float]

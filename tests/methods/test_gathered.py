@@ -12,17 +12,21 @@ import twins
 from analytic_terms import ANALYTIC
 from oracle import rendered_afresh
 from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
-from tiny_scenes import scene_of
+from tiny_scenes import looking, quad, scene_of
 
-from relume.brdf.albedo import reflectance, reflectances_of
+from relume.basis.zernike import SENT_DEGREE
+from relume.brdf.albedo import reflectance, reflectances_of, shares_in
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
+from relume.environments.equirect import texel_directions
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
 from relume.light.triangles import subdivide
 from relume.look import validate
 from relume.memory import Memory
+from relume.methods.between import sent_between
 from relume.methods.cell_light import CellLight
+from relume.methods.reflecting import Arrived
 from relume.methods.registry import open_transfer
 from relume.picture.light import light_of
 from relume.picture.picture import Picture
@@ -30,17 +34,29 @@ from relume.picture.routes.preview import Preview
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays, Receivers
+from relume.project.sent import SIDE
 from relume.reference import Points, texels_of
 from relume.reference.indirect import reference_indirect
 from relume.reference.radiance import lobes_of
 from relume.render.image import render_image
 from relume.scene.model import Material
 from relume.trace.cell_tree import NO_CELL
+from relume.trace.cells import gather_samples_of
 from relume.trace.geometry import merge
 
 NUM_CELLS = 90
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
-REFLECTANCES = ((0.5, 0.4, 0.3, 0, 0, 0, 0, 0, 0), (0.1, 0.1, 0.1, 0.6, 0.2, 0.4, 0, 0, 0))
+PLAIN = {"texture": None, "params": {}, "curves": {}}
+REFLECTANCES = (
+    reflectances_of([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
+    reflectances_of(
+        [
+            {**PLAIN, "model": "lambert", "color": [0.6, 0.2, 0.4], "texture": "diffuse"},
+            {**PLAIN, "model": "blinn_phong", "color": [0.1, 0.1, 0.2], "params": {"exponent": 30.0}},
+        ]
+    ),
+)
+BLACK = reflectances_of([])
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +71,22 @@ def cells(lights):
     visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
     links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
     material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
-    return CellLight(normal, visible, links, material, rng.random((2, NUM_CELLS, 3), np.float32))
+    points = gather_samples_of(normal, normal)
+    return CellLight(points, visible, links, make_pattern(4, 0, 9), material, rng.random((2, NUM_CELLS, 3), np.float32))
+
+
+def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
+    reflecting = cells.reflecting(reflectances)
+    vectors = cells.vectors(reflecting.rows, lights, SENT_DEGREE)
+    return sent_between(cells, reflecting, Arrived(cells.irradiance(lights), vectors), first, last)
+
+
+def by_square(sent):
+    """All that is sent, in every direction that is told apart. (cells, squares, 3)"""
+    found = np.repeat(sent.even[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
+    has = sent.lobe[:NUM_CELLS] >= 0
+    found[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +102,7 @@ def receivers(cells, lights):
             below = local_ray(pattern, ray, small_shifts_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
                 links[p, ray] = NO_CELL
-    reflected = cells.radiance(cells.irradiance(lights), cells.reflectance(REFLECTANCES), 1, 24)
-    rays = GatherRays(links, pattern, reflected)
+    rays = GatherRays(links, pattern, sent_by_cells(cells, lights))
     points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
     return Receivers(points, dark.wo, np.zeros_like(dark.visible), (rays,))
 
@@ -95,7 +125,6 @@ def image(model, bands, active, lights, receivers):
 def image_numpy(model, bands, receivers):
     """Ray by ray, float64."""
     term, (rays,) = TERMS[model], receivers.rays
-    radiance = rays.radiance.astype(float)
     out = np.zeros((len(receivers.normal), 3))
     for p, frame in enumerate(twins.frames(receivers)):
         wo = frame @ receivers.wo[p].astype(float)
@@ -104,7 +133,8 @@ def image_numpy(model, bands, receivers):
             if cell == NO_CELL:
                 continue
             wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
-            value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * radiance[cell]
+            seen = twins.sent_towards(rays.sent, cell, -(wi @ frame))
+            value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * seen
             value = value * term.quotients(*wi.astype(float), *wo)
             for curve in term.curves:
                 if not curve.outgoing:
@@ -150,28 +180,26 @@ def test_reflected_light_adds_to_the_lights_own(lights, receivers):
 
 
 def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
-    arriving = cells.irradiance(lights)
-    black = cells.radiance(arriving, cells.reflectance(((0.0,) * 9,) * 2), 1, 5)
-    assert not black.any()
-    by_bounces = [cells.radiance(arriving, cells.reflectance(REFLECTANCES), 1, n).sum() for n in (1, 2, 3, 25, 26)]
+    black = sent_by_cells(cells, lights, 1, 5, (BLACK, BLACK))
+    assert not by_square(black).any()
+    by_bounces = [by_square(sent_by_cells(cells, lights, 1, n)).sum() for n in (1, 2, 3, 25, 26)]
     assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
     assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
 
 
 def test_first_and_further_reflections_are_all_of_them(cells, lights):
-    arriving = cells.irradiance(lights)
-    first, further, both = (
-        cells.radiance(arriving, cells.reflectance(REFLECTANCES), *which) for which in ((1, 1), (2, 6), (1, 6))
-    )
-    np.testing.assert_allclose(first + further, both, rtol=1e-5)
-    assert np.all(further.sum(axis=0) > 0)
+    for split in (1, 2, 3):  # directions are kept for some of them
+        parts = [by_square(sent_by_cells(cells, lights, *which)) for which in ((1, split), (split + 1, 6), (1, 6))]
+        np.testing.assert_allclose(parts[0] + parts[1], parts[2], rtol=1e-3, atol=1e-4 * parts[2].max())
+        assert np.all(parts[1].sum(axis=(0, 1)) > 0)
 
 
 def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
-    found = cells.reflectance(REFLECTANCES)
-    expected = np.array([[0.5, 0.4, 0.3], [0.1, 0.1, 0.1]])[cells.material]
-    expected[cells.material == 1] += np.array([0.6, 0.2, 0.4]) * cells.textures[0][cells.material == 1]
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    found = cells.reflecting(REFLECTANCES)
+    known = [shares_in(of_material)[..., 0] for of_material in REFLECTANCES]
+    expected = np.where(cells.material[:, None] == 0, known[0][0], known[1][0] + known[1][1] * cells.textures[0])
+    np.testing.assert_allclose(found.reflectance, np.minimum(expected, 1), rtol=1e-5)
+    np.testing.assert_array_equal(found.rows, np.flatnonzero(cells.material == 1))
 
 
 def test_reflectance_of_diffuse_terms():
@@ -188,7 +216,7 @@ def test_reflectance_of_highlights():
         blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
         np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
     lambert = {**plain, "model": "lambert", "params": {}}
-    both = np.reshape(reflectances_of([lambert, {**blinn, "texture": "specular"}]), (3, 3))
+    both = shares_in(reflectances_of([lambert, {**blinn, "texture": "specular"}]))[..., 0]
     np.testing.assert_allclose(both[0], [1.0, 0.5, 0.0], rtol=1e-6)
     np.testing.assert_allclose(both[2], reflectance(blinn), atol=0.5 / 128)
 
@@ -209,34 +237,55 @@ def default_look(transfer):
     return validate(transfer.default_look, transfer.default_look)
 
 
+def against_paths(scene, transfer, index, every, spp):
+    """Light that surfaces have reflected onto samples of a material, and by path tracing with its variance. (n, 3)"""
+    view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
+    reflected = transfer.reflected_in(light_of(look, transfer.material_names, has_bounces=True))
+    rows, lit = view.rows(index), view.receivers(index, reflected)
+    chosen, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
+    radiance = np.zeros((len(lit.normal), 3))
+    for document in look.materials[name].terms:
+        bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
+        radiance += image(document["model"], bands, None, transfer.lights, dark) * document["color"]
+    position = view.store.read("views/0/position", rows.start, rows.stop)
+    ones = np.ones_like(position)
+    points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}).rows(chosen)
+    traced = merge(scene), texels_of(scene.environment), look, points, np.full(len(chosen), index)
+    return radiance[chosen], *reference_indirect(scene, *traced, 4, 48, spp, seed=index), position[chosen]
+
+
 def test_gathered_light_is_that_of_path_tracing(corner, gathered):
     """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
-    view, look = gathered.views["front"], default_look(gathered)
-    geometry, texels = merge(corner), texels_of(corner.environment)
-    reflected = gathered.reflected_in(light_of(look, gathered.material_names, has_bounces=True))
-    found, expected, variance = [], [], []
-    for index, name in enumerate(gathered.material_names):
-        rows = view.rows(index)
-        chosen = np.arange(0, rows.stop - rows.start, 12)
-        lit = view.receivers(index, reflected)
-        dark = replace(lit, visible=0 * lit.visible)
-        radiance = np.zeros((len(lit.normal), 3))
-        for document in look.materials[name].terms:
-            bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
-            radiance += image(document["model"], bands, None, gathered.lights, dark) * document["color"]
-        found.append(radiance[chosen])
-        position = view.store.read("views/0/position", rows.start, rows.stop)
-        ones = np.ones_like(position)
-        points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}).rows(chosen)
-        material = np.full(len(chosen), index)
-        truth = reference_indirect(corner, geometry, texels, look, points, material, 4, 48, 24, seed=index)
-        expected.append(truth[0])
-        variance.append(truth[1])
-    found, expected, variance = map(np.concatenate, (found, expected, variance))
+    parts = [against_paths(corner, gathered, index, 12, 24)[:3] for index in range(len(gathered.material_names))]
+    found, expected, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     deviation = np.sqrt(variance.sum(axis=0)) / len(found)  # of the mean
     assert np.all(np.abs(found.mean(axis=0) - expected.mean(axis=0)) < 4 * deviation + 0.01 * expected.mean(axis=0))
     square, noise = ((found - expected) ** 2).mean(), variance.mean()
     assert np.sqrt(max(0.0, square - noise) / (expected**2).mean()) < 0.12
+
+
+def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
+    """A sun low in the west over rough metal: the eastern wall gets almost twice what the northern one gets."""
+    sky = np.full((32, 64, 3), 0.02, np.float32)
+    sun = twins.unit(np.array([-0.75, 0.66, 0.0]))
+    sky[texel_directions(32, 64) @ sun > 0.95] = 20.0
+    white = Material("White", [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}])
+    rough = {"model": "ggx", "color": [1, 1, 1], "texture": None, "params": {"roughness": 0.55, "f0": 0.9}}
+    floor = quad("floor", [(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], 1)
+    east = quad("east", [(1, 0, -1), (1, 0, 1), (1, 1.2, 1), (1, 1.2, -1)], 0, (0, 0, 1))
+    north = quad("north", [(-1, 0, -1), (1, 0, -1), (1, 1.2, -1), (-1, 1.2, -1)], 0)
+    eye = looking("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
+    scene = scene_of(floor, east, north, camera=eye, environment=sky, materials=[white, Material("Metal", [rough])])
+    transfer = bake_corner(scene, "gather", tmp_path)
+    found, expected, variance, place = against_paths(scene, transfer, 0, 1, 256)
+    means = []
+    for wall in (place[:, 0] > 0.99, place[:, 2] < -0.99):
+        mean, truth = found[wall].mean(), expected[wall].mean()
+        deviation = np.sqrt(variance[wall].sum(axis=0)).mean() / wall.sum()  # channels have the same paths
+        assert abs(mean - truth) < 0.04 * truth + 3 * deviation
+        assert deviation < 0.03 * truth
+        means.append(truth)
+    assert means[0] > 1.5 * means[1]
 
 
 def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp_path):

@@ -5,10 +5,10 @@ import pytest
 from tiny_scenes import looking, quad, scene_of, studio
 
 from relume.bake import Recipe
+from relume.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.look import complete, validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.moving.bumps import expansions, towards_light, towards_light_numpy
 from relume.render.image import render_image
 from relume.scene.model import Material, Texture

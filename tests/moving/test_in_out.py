@@ -5,10 +5,10 @@ import pytest
 from test_out_factors import document
 from test_zernike import hemisphere
 
+from relume.basis.zernike import NUM_FUNCTIONS, in_basis, num_functions
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis.in_out import BOUND, in_out
 from relume.moving.basis.out_factors import cosines, out_factors
-from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis, num_functions
 
 
 def test_one_function_is_enough_for_a_diffuse_surface():

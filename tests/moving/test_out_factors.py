@@ -5,10 +5,10 @@ import pytest
 from analytic_terms import ANALYTIC
 from test_zernike import hemisphere
 
+from relume.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis.lobes import is_narrow, lobes_of
 from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors, turned
-from relume.moving.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.moving.evaluate import tables_of
 
 

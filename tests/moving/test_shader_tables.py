@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder
 from relume.moving.arriving import Arriving
-from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder
 from relume.moving.evaluate import tables_of
 from relume.moving.points.surface import Textures
 from relume.moving.shader import geometry, tables

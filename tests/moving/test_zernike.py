@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 from relume.light.triangles import TriangleLights
-from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
-from relume.moving.light_vectors import light_vectors, light_vectors_numpy
 from relume.points import Points
+from relume.project.light_vectors import light_vectors, light_vectors_numpy
 from relume.trace.surface import any_tangent
 
 

@@ -23,6 +23,7 @@ from relume.operators.indirect_kernel import keep, transform
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays, Receivers
+from relume.project.sent import evenly
 from relume.trace.cell_tree import NO_CELL
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
@@ -37,7 +38,7 @@ def receivers():
     middle = np.linspace(0, NUM_CELLS, NUM_POINTS)[:, None]
     links = np.clip(middle + 12 * rng.normal(size=(NUM_POINTS, NUM_RAYS)), 0, NUM_CELLS - 1).astype(np.uint16)
     links[rng.random(links.shape) < 0.1] = NO_CELL
-    rays = GatherRays(links, make_pattern(NUM_RAYS, 0, 7), light(1))
+    rays = GatherRays(links, make_pattern(NUM_RAYS, 0, 7), evenly(light(1)))
     return Receivers(dark.points, dark.wo, np.empty((NUM_POINTS, 0), np.uint8), (rays,))
 
 
@@ -56,7 +57,7 @@ def bands_of(term, **params):
 
 
 def exact_image(term, bands, receivers, radiance):
-    lit = replace(receivers, rays=(replace(receivers.rays[0], radiance=radiance),))
+    lit = replace(receivers, rays=(replace(receivers.rays[0], sent=evenly(radiance)),))
     return Projector(term, contract(term, bands, None), NONE, lit).project(0, NUM_POINTS)[:, 0]
 
 

@@ -16,6 +16,7 @@ from relume.light.triangles import subdivide
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays
+from relume.project.sent import evenly
 from relume.views.sharing import sharing
 
 WIDTH, HEIGHT = 9, 7
@@ -76,7 +77,7 @@ def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active
     points = twins.make_receivers(num, lights.num_lights, seed=3)
     links = rng.integers(0, 50, (num, 24)).astype(np.uint16)
     radiance = rng.random((1 << 16, 3), np.float32)
-    alone = GatherRays(links, make_pattern(16, 8, 5), radiance)
+    alone = GatherRays(links, make_pattern(16, 8, 5), evenly(radiance))
     weights = csr_array(rng.random((num, num)) * (rng.random((num, num)) < 0.1) + np.eye(num)).astype(np.float32)
     term = TERMS[model]
     curve = next(c for c in ANALYTIC[model].curves if not c.outgoing)

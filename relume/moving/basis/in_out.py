@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from relume.basis.zernike import NUM_FUNCTIONS, num_functions
 from relume.moving.basis.lobes import NARROW
 from relume.moving.basis.out_factors import out_factors
-from relume.moving.basis.zernike import NUM_FUNCTIONS, num_functions
 
 BOUND = 0.05
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.symmetry import is_isotropic, is_mirrored
 from relume.moving.basis.symmetry import all_around
-from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.moving.basis.zernike import NUM_FUNCTIONS, ladder
+from relume.basis.zernike import NUM_FUNCTIONS, ladder
 
 F64 = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS
-from relume.moving.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.bumps import expansions
 from relume.moving.points.surface import Surface, Textures
 from relume.moving.transfer import MovingTransfer

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder, num_functions
 from relume.brdf.albedo import TEXTURES
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
-from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder, num_functions
 from relume.moving.frame import Materials, Wanted
 from relume.moving.points.surface import NORMAL_MAP
 from relume.moving.sky import turn_of

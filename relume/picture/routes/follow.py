@@ -23,6 +23,7 @@ from relume.picture.jobs import Cancelled, Job, Place, Progress
 from relume.picture.light import Light, is_same_environment
 from relume.picture.routes.moved import MovedLights
 from relume.picture.view_images import ViewImages
+from relume.project.sent import evenly
 
 F32 = NDArray[np.float32]
 
@@ -57,7 +58,7 @@ class FreezeRows:
         reflected = self.images.transfer.reflected
         assert reflected is not None
         radiance, view = reflected.preview_under(self.light), self.images.view
-        points, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material, radiance)
+        points, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material, evenly(radiance))
         expected = expected_light(radiance[: reflected.num_cells])
         return freeze_rows(self.term, self.bands, points, rays, expected, progress, cancelled)
 

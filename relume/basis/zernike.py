@@ -23,6 +23,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 DEGREE = 7
+SENT_DEGREE = 6  # of those by which surfaces send light to each other
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 
 

@@ -14,8 +14,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
 from relume.light.triangles import TriangleLights
-from relume.moving.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
 from relume.project.receivers import Listed, Rays, Receivers
@@ -82,14 +82,32 @@ def light_vectors(
     if lights.num_lights:
         args = (ladder(degree), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
         for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
-    receivers = Receivers(points, points.normal, visible)  # no ray of a point depends on where it is seen from
+    _add_rays(points, rays, degree, out)
+    return out
+
+
+def ray_vectors(points: Points, rays: Sequence[Rays], degree: int = DEGREE) -> F32:
+    """Do as `light_vectors` where all light comes along rays.
+
+    Args:
+        points, rays, degree: as there.
+    Returns:
+        t. (n, 3, K) float32
+    """
+    out = np.zeros((points.num_points, 3, NUM_FUNCTIONS), np.float32)
+    _add_rays(points, rays, degree, out)
+    return out
+
+
+def _add_rays(points: Points, rays: Sequence[Rays], degree: int, out: F32) -> None:
+    nothing = np.empty((points.num_points, 0), np.uint8)
+    receivers = Receivers(points, points.normal, nothing)  # no ray of a point depends on where it is seen from
     for some in rays:
         for_ranges(
             lambda start, stop, some=some: _list_and_add(some, receivers, degree, start, stop, out),  # type: ignore[misc]
             points.num_points,
             _LISTED_A_RANGE,
         )
-    return out
 
 
 def _list_and_add(rays: Rays, receivers: Receivers, degree: int, start: int, stop: int, out: F32) -> None:

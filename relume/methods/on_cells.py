@@ -1,0 +1,92 @@
+"""What the lights themselves bring to gather cells, before any surface has reflected it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.zernike import SENT_DEGREE
+from relume.light.triangles import TriangleLights
+from relume.look import EnvironmentKey, LightGeometry
+from relume.memory import Memory
+from relume.methods.cell_light import CellLight
+from relume.methods.local_lights import LocalLights
+from relume.methods.reflecting import Arrived, Reflecting
+from relume.picture.light import Light
+from relume.project.light_vectors import ray_vectors
+from relume.project.sent import NUM_SENT
+
+F32 = NDArray[np.float32]
+
+_PREVIEW_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
+
+
+class LightOnCells:
+    """Found for one source after another, and kept: transport is linear in them.
+
+    Args:
+        cells: that it comes to. local: local lights. lights_in: finds the triangles of an environment.
+        memory: of all that is made from the bake. key: of the bake in it.
+    """
+
+    def __init__(
+        self,
+        cells: CellLight,
+        local: LocalLights,
+        lights_in: Callable[[EnvironmentKey], TriangleLights],
+        memory: Memory,
+        key: str,
+    ) -> None:
+        self._cells, self._local, self._lights_in = cells, local, lights_in
+        self._memory, self._key = memory, key
+
+    def arrived(self, light: Light, reflecting: Reflecting, *, is_preview: bool) -> Arrived:
+        """Sum what all sources bring.
+
+        Args:
+            light: all that shines. reflecting: tells which cells ask where light comes from.
+            is_preview: local lights by few samples, directions roughly.
+        """
+        out = Arrived(
+            np.zeros((self._cells.num_cells, 3), np.float32),
+            np.zeros((len(reflecting.rows), 3, NUM_SENT), np.float32),
+        )
+        of_local = self._local.preview_irradiance if is_preview else self._local.irradiance
+        if light.is_environment_lit:
+            gain = np.array(light.environment_gain, np.float32)
+            out.irradiance[:] += gain * self._irradiance(light.environment)
+            out.vectors[:] += gain[:, None] * self._vectors(light.environment, reflecting, is_preview)
+        for geometry, of_light in light.local:
+            gain = np.array(of_light, np.float32)
+            out.irradiance[:] += gain * of_local(geometry)[:, None]
+            out.vectors[:] += gain[:, None] * self._local_vectors(geometry, reflecting, is_preview)
+        return out
+
+    def _irradiance(self, environment: EnvironmentKey) -> F32:
+        key = self._key, "environment on cells", environment
+        return self._memory.keep(key, lambda: self._cells.irradiance(self._lights_in(environment)))
+
+    def _vectors(self, environment: EnvironmentKey, reflecting: Reflecting, is_preview: bool) -> F32:
+        degree = _PREVIEW_DEGREE if is_preview else SENT_DEGREE
+        key = self._key, "environment on cells, by direction", environment, reflecting.has_lobe, degree
+        return self._memory.keep(
+            key, lambda: self._cells.vectors(reflecting.rows, self._lights_in(environment), degree)
+        )
+
+    def _local_vectors(self, geometry: LightGeometry, reflecting: Reflecting, is_preview: bool) -> F32:
+        """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""
+        cells, rows = self._cells, reflecting.rows
+
+        def found() -> F32:
+            if is_preview:
+                points, rays = cells.first_points(rows), self._local.preview_rays_at_cells(geometry, rows)
+            else:
+                points, rays = cells.points_of(rows), self._local.rays_at_cells(geometry, rows)
+            return cells.vectors_of(rows, points, ray_vectors(points, [rays], SENT_DEGREE))
+
+        memory = self._memory.passing if is_preview else self._memory
+        return memory.keep(
+            (self._key, "light on cells, by direction", geometry, reflecting.has_lobe, is_preview), found
+        )

@@ -1,0 +1,107 @@
+"""Light that gather cells send out: of most the same in every direction, of those with highlights not.
+
+    L(c, ωo) = L̄_c + Σ_j L_j h_j(ωo)
+
+with the functions h of the in-basis (`relume.basis.zernike`) about the cell's own normal. Looked up once for every
+gather ray, the sum is tabulated: by the means of each function over the squares of a grid, on which a direction has the
+place (x, y) / (1 + z), so that the horizon is as fine as the normal. Rays spread over the squares, and what they bring
+together hardly knows the difference.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.zernike import SENT_DEGREE, in_basis, num_functions
+from relume.trace.cell_tree import NO_CELL
+
+F32 = NDArray[np.float32]
+
+NUM_SENT = num_functions(SENT_DEGREE)
+"""J, functions by which cells send."""
+
+SIDE = 16  # squares across the disc of all places
+_FINER = 8
+_RIM, _LITTLE = 0.999, 1e-9
+_STEPS = 32_767  # of 16-bit radiance
+
+
+class Sent(NamedTuple):
+    """Radiance that leaves cells.
+
+    Attributes:
+        even: the part that is the same everywhere; black in row `NO_CELL`. (NO_CELL + 1, 3) float32
+        lobe: which row of the others a cell has; −1: it sends nothing but the even part. (NO_CELL + 1,) int32
+        frame: tangents and bitangents. (G, 2, 3) float32
+        scale: what a step of the table is worth. (G, 3) float32
+        table: of each square, x outermost. (G, SIDE², 3) int16
+    """
+
+    even: F32
+    lobe: NDArray[np.int32]
+    frame: F32
+    scale: F32
+    table: NDArray[np.int16]
+
+    def times(self, factor: F32) -> Sent:
+        """Multiply every channel. factor: (3,) float32"""
+        return self._replace(even=self.even * factor, scale=self.scale * factor)
+
+
+def evenly(radiance: F32) -> Sent:
+    """Send the same in every direction. radiance: black in row `NO_CELL`. (NO_CELL + 1, 3) float32"""
+    return sent_by(
+        radiance, np.empty(0, np.intp), np.empty((0, 2, 3), np.float32), np.empty((0, 3, NUM_SENT), np.float32)
+    )
+
+
+def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32) -> Sent:
+    """Put together what cells send.
+
+    Args:
+        even: as in `Sent`. rows: the cells that send more one way than another. (G,)
+        frame: their tangents and bitangents. (G, 2, 3) float32. vectors: L_j of each. (G, 3, J) float32
+    """
+    lobe = np.full(NO_CELL + 1, -1, np.int32)
+    lobe[rows] = np.arange(len(rows))
+    values = (vectors @ grid_means()).transpose(0, 2, 1)
+    scale = np.maximum(np.abs(values).max(axis=1, initial=0), np.float32(1e-30)) / np.float32(_STEPS)
+    return Sent(even, lobe, frame, scale, np.rint(values / scale[:, None]).astype(np.int16))
+
+
+@lru_cache(maxsize=1)
+def grid_means() -> F32:
+    """The mean of each function over each square, by the cosine. (J, SIDE²) float32"""
+    place = (np.arange(SIDE * _FINER) + 0.5) * (2 / (SIDE * _FINER)) - 1
+    x, y = np.meshgrid(place, place, indexing="ij")
+    r2 = x * x + y * y
+    inward = np.minimum(1, _RIM / np.maximum(np.sqrt(r2), _RIM))  # a square off the disc is as the rim beside it
+    near = 1 + r2 * inward**2
+    wi = np.stack([2 * x * inward / near, 2 * y * inward / near, 2 / near - 1], axis=-1)
+    squares = SIDE, _FINER, SIDE, _FINER
+    weight = np.where(r2 < 1, wi[..., 2] / near**2, _LITTLE).reshape(squares)
+    functions = in_basis(wi)[..., :NUM_SENT].reshape(*squares, NUM_SENT)
+    means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
+    return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_SENT).T, np.float32)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def square_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Find the square of a direction.
+
+    Args:
+        frame: of all rows. (G, 2, 3) float32. row: of the cell.
+        dx, dy, dz: unit, away from the cell, world space.
+    """
+    x = frame[row, 0, 0] * dx + frame[row, 0, 1] * dy + frame[row, 0, 2] * dz
+    y = frame[row, 1, 0] * dx + frame[row, 1, 1] * dy + frame[row, 1, 2] * dz
+    half = np.float32(SIDE / 2)
+    scale = half / (np.float32(1) + np.float32(math.sqrt(max(np.float32(0), np.float32(1) - x * x - y * y))))
+    across, along = np.int32(half + scale * x), np.int32(half + scale * y)
+    return min(max(across, 0), SIDE - 1) * SIDE + min(max(along, 0), SIDE - 1)  # type: ignore[operator]

@@ -1,0 +1,72 @@
+"""What cells send by direction: the numbers of materials, and the table of a cell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import twins
+
+from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
+from relume.brdf.albedo import PAIRS, shares
+from relume.brdf.evaluate import eval_brdf
+from relume.project.sent import NUM_SENT, evenly, grid_means, sent_by
+from relume.trace.cell_tree import NO_CELL
+
+PLAIN = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
+
+
+def over_hemisphere(num, seed):
+    """Directions by the cosine. (num, 3)"""
+    rng = np.random.default_rng(seed)
+    r, phi = np.sqrt(rng.random(num)), 2 * np.pi * rng.random(num)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
+
+
+@pytest.mark.parametrize(
+    ("model", "params"),
+    [("blinn_phong", {"exponent": 12.0}), ("ggx", {"roughness": 0.6, "f0": 0.8}), ("ward_anisotropic", {})],
+)
+def test_what_a_term_sends_on_is_its_double_integral(model, params):
+    """F_jk by Monte Carlo over both directions."""
+    document = {**PLAIN, "model": model, "params": params}
+    wi, wo = over_hemisphere(1_000_000, 1), over_hemisphere(1_000_000, 2)
+    value = np.pi**2 * eval_brdf(document, wi, wo)[:, 0]
+    h_i, h_o = in_basis(wi)[:, :NUM_SENT], in_basis(wo)[:, :NUM_SENT]
+    found, rungs = shares(document), ladder(SENT_DEGREE)
+    for pair, (j, k) in enumerate(PAIRS):
+        drawn = value * h_i[:, rungs.cosine[k]] * h_o[:, rungs.cosine[j]]
+        if rungs.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
+            drawn = (drawn + value * h_i[:, rungs.sine[k]] * h_o[:, rungs.sine[j]]) / 2
+        deviation = drawn.std() / np.sqrt(len(drawn))
+        assert found[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
+    np.testing.assert_allclose(found[1], found[0] / 2, rtol=1e-6)
+    assert not found[2].any()
+
+
+def test_a_table_holds_what_its_functions_send():
+    """Of the directions of a cosine's rays, the sum is known without the table."""
+    rng = np.random.default_rng(5)
+    vectors = rng.normal(size=(3, 3, NUM_SENT)).astype(np.float32) / np.arange(1, NUM_SENT + 1)
+    even = np.zeros((NO_CELL + 1, 3), np.float32)
+    even[:5] = 1 + rng.random((5, 3))
+    frame = np.tile(np.eye(3, dtype=np.float32)[:2], (3, 1, 1))
+    sent = sent_by(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
+    wo = over_hemisphere(20_000, 3)
+    for row, cell in enumerate((0, 2, 3)):
+        exact = even[cell] + in_basis(wo)[:, :NUM_SENT] @ vectors[row].T
+        found = np.array([twins.sent_towards(sent, cell, w) for w in wo])
+        assert np.linalg.norm(found - exact) < 0.12 * np.linalg.norm(exact - even[cell])
+        assert np.abs(found.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
+    np.testing.assert_array_equal(twins.sent_towards(sent, 1, wo[0]), even[1])
+    np.testing.assert_allclose(
+        twins.sent_towards(sent.times(np.array([2, 0, 1], np.float32)), 0, wo[7]),
+        twins.sent_towards(sent, 0, wo[7]) * [2, 0, 1], rtol=1e-6,
+    )  # fmt: skip
+
+
+def test_even_light_is_sent_evenly():
+    radiance = np.zeros((NO_CELL + 1, 3), np.float32)
+    radiance[:4] = 3
+    assert evenly(radiance).table.shape[0] == 0
+    assert twins.sent_towards(evenly(radiance), 2, np.array([0.0, 0, 1])) == pytest.approx(3)
+    assert grid_means()[0] == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)
