@@ -2,7 +2,7 @@
 
 The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky; nothing but a
 Blinn–Phong highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
-Mitsuba follows every path, highlights that light other surfaces among them, which ours spread evenly. Edges and
+Mitsuba follows every path, highlights that light other surfaces among them, ours by few functions. Edges and
 background belong to the pictures. Its own noise is taken off: `bench.standard_error.over_passes`.
 """
 
