@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder, num_functions
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
@@ -92,9 +92,9 @@ def ray_vectors(points: Points, rays: Sequence[Rays], degree: int = DEGREE) -> F
     Args:
         points, rays, degree: as there.
     Returns:
-        t. (n, 3, K) float32
+        t, of the functions up to the degree alone. (n, 3, functions) float32
     """
-    out = np.zeros((points.num_points, 3, NUM_FUNCTIONS), np.float32)
+    out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     _add_rays(points, rays, degree, out)
     return out
 

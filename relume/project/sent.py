@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import SENT_DEGREE, in_basis, num_functions
+from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
 
 F32 = NDArray[np.float32]
@@ -30,6 +31,7 @@ SIDE = 16  # squares across the disc of all places
 _FINER = 8
 _RIM, _LITTLE = 0.999, 1e-9
 _STEPS = 32_767  # of 16-bit radiance
+_ROWS_A_RANGE = 1024
 
 
 class Sent(NamedTuple):
@@ -70,9 +72,15 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32) -> Sent
     """
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
-    values = (vectors @ grid_means()).transpose(0, 2, 1)
-    scale = np.maximum(np.abs(values).max(axis=1, initial=0), np.float32(1e-30)) / np.float32(_STEPS)
-    return Sent(even, lobe, frame, scale, np.rint(values / scale[:, None]).astype(np.int16))
+    scale, table = np.empty((len(rows), 3), np.float32), np.empty((len(rows), SIDE * SIDE, 3), np.int16)
+
+    def fill(start: int, stop: int) -> None:
+        values = (vectors[start:stop] @ grid_means()).transpose(0, 2, 1)
+        scale[start:stop] = np.maximum(np.abs(values).max(axis=1), np.float32(1e-30)) / np.float32(_STEPS)
+        table[start:stop] = np.rint(values / scale[start:stop, None])
+
+    for_ranges(fill, len(rows), _ROWS_A_RANGE)
+    return Sent(even, lobe, frame, scale, table)
 
 
 @lru_cache(maxsize=1)
