@@ -25,6 +25,7 @@ from relume.methods.store_io import SHARD_ROWS
 from relume.methods.transfer import BakedViews, FewSamples, described
 from relume.picture.light import Light
 from relume.picture.transfer import Arriving, Axis
+from relume.project.sent import Sent, evenly
 from relume.scene.model import Scene
 from relume.trace.cell_tree import NO_CELL
 from relume.trace.cells import choose_cells
@@ -41,14 +42,14 @@ class FurnaceViews(BakedViews):
 
     axes = frozenset((Axis.CURVE, Axis.PARAMETER, Axis.ENVIRONMENT))
 
-    def glow(self, light: Light) -> np.ndarray:
-        """Radiance of a surface, then of what rays see that hit none. (NO_CELL + 1, 3) float32"""
+    def glow(self, light: Light) -> Sent:
+        """What the one surface sends, the same everywhere."""
         radiance = self.radiance_of(light.environment.map).astype(np.float64)
         share = texel_solid_angles(*radiance.shape[:2]) / (4 * np.pi)
         glow = np.zeros((NO_CELL + 1, 3), np.float32)
         if light.paths.direct:
             glow[0] = GLOW * np.einsum("h,hwc->c", share, radiance) * light.environment_gain
-        return glow
+        return evenly(glow)
 
     def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
         """The glow along gather rays, and no light of the environment's own."""

@@ -172,11 +172,13 @@ def is_same_environment(before: Light, after: Light) -> bool:
 
 
 def is_about(before: Light, after: Light) -> bool:
-    """Whether lights differ in what surfaces reflect onto each other alone, and in that by little."""
+    """Whether lights differ in what surfaces reflect onto each other alone, and in its amount by little."""
     if before._replace(reflectances=after.reflectances) != after:
         return False
     pairs = zip(before.reflectances, after.reflectances, strict=True)
-    return all(np.abs(shares_in(one) - shares_in(other)).max() <= _LITTLE for one, other in pairs if one != other)
+    return all(
+        np.abs(shares_in(one) - shares_in(other))[..., 0].max() <= _LITTLE for one, other in pairs if one != other
+    )
 
 
 def light_of(look: Look, material_names: Sequence[str], *, has_bounces: bool, solo: Solo = None) -> Light:
