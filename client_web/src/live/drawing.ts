@@ -38,6 +38,8 @@ const refused = new WeakSet<BakeConnection>();
 const eyes = new Map<string, number>();
 const away = new Set<string>();
 const dirty = new Set<string>();
+/** Views of which the server sent a picture that is wanted while one was being drawn here, older than it. */
+const overtaken = new Set<string>();
 let running: Promise<void> | null = null;
 let durations: number[] = [];
 
@@ -91,6 +93,7 @@ export async function take(from: BakeConnection, frame: Frame): Promise<void> {
   const isDrawn = drawsHere.peek() && here?.of === from && kind === "picture";
   const isLate = isDrawn && (away.has(view) || (eyes.has(view) && eye !== null && eyes.get(view) !== eye));
   if (isLate) return;
+  if (kind === "picture") overtaken.add(view);
   await takeFrame(from, frame);
   void offer(from, view);
 }
@@ -113,11 +116,12 @@ function redraw(view: string): Promise<void> {
 async function drawAll(): Promise<void> {
   for (let view = first(dirty); view !== undefined && here !== null; view = first(dirty)) {
     dirty.delete(view);
+    overtaken.delete(view);
     const { of } = here;
     const start = performance.now();
     try {
       const frame = await drawn(here, view);
-      if (frame !== null && here?.of === of) await takeFrame(of, frame);
+      if (frame !== null && here?.of === of && !overtaken.has(view)) await takeFrame(of, frame);
     } catch (error) {
       return giveUp(`${(error as Error).message}; the server draws instead.`);
     }
