@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,11 +91,34 @@ def shares(term_document: Mapping[str, Any]) -> F64:
 
 @lru_cache(maxsize=1024)
 def _of_lobe(term_text: str) -> F64:
-    """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi then do.
+    """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi do. (3, pairs)"""
+    document, places = json.loads(term_text), _about_mirrors()
+    turns = _TURNS[:1] if is_isotropic(document) else _TURNS
+    value = np.mean([eval_brdf(document, places.wi @ turn.T, places.wo @ turn.T) for turn in turns], axis=0)
+    arriving = np.einsum("onc,onk->ock", value, places.h_i, optimize=True)
+    return np.stack([places.h_o[:, j] @ arriving[..., k] for j, k in PAIRS], axis=-1)
+
+
+class _Places(NamedTuple):
+    """Where terms are evaluated, which no term changes.
+
+    Attributes:
+        wi, wo: local directions. (o, n, 3), (o, 1, 3)
+        h_i: functions of ωi, weighed. (o, n, rungs). h_o: of ωo, times ∫ cos² mφ dφ. (o, rungs)
+    """
+
+    wi: F64
+    wo: F64
+    h_i: F64
+    h_o: F64
+
+
+@lru_cache(maxsize=1)
+def _about_mirrors() -> _Places:
+    """Spread ωi about the mirror directions of a few ωo.
 
     With θr the angle from there, θr = π u³ and dωi = 3π u² sin θr du dφr; below the horizon there is nothing.
     """
-    document = json.loads(term_text)
     cos_o, weight_o = _gauss(_NUM_OUT)
     u, weight_u = _gauss(_NUM_RADII)
     theta, phi = np.pi * u**3, np.pi * (np.arange(_NUM_AROUND) + 0.5) / _NUM_AROUND
@@ -107,13 +130,10 @@ def _of_lobe(term_text: str) -> F64:
     wi = np.stack([along, np.broadcast_to(y, above.shape), np.maximum(above, 0)], axis=-1)
     wo = np.stack([sine, 0 * sine, cos_o], axis=-1)[:, None]
     weight = (weight_o * cos_o)[:, None] * solid * np.maximum(above, 0)
-    turns = _TURNS[:1] if is_isotropic(document) else _TURNS
-    value = np.mean([eval_brdf(document, wi @ turn.T, wo @ turn.T) for turn in turns], axis=0)
     rungs = ladder(SENT_DEGREE)
-    h_i, h_o = in_basis(wi)[..., rungs.cosine], in_basis(wo[:, 0])[:, rungs.cosine]
-    arriving = np.einsum("on,onc,onk->ock", weight, value, h_i)
-    around = np.where(rungs.order > 0, np.pi, 2 * np.pi)  # ∫ cos² mφ dφ
-    return np.stack([around[j] * np.einsum("o,oc->c", h_o[:, j], arriving[..., k]) for j, k in PAIRS], axis=-1)
+    around = np.where(rungs.order > 0, np.pi, 2 * np.pi)
+    h_i, h_o = weight[..., None] * in_basis(wi)[..., rungs.cosine], around * in_basis(wo[:, 0])[:, rungs.cosine]
+    return _Places(wi, wo, h_i, h_o)
 
 
 def _gauss(num: int) -> tuple[F64, F64]:
@@ -127,7 +147,7 @@ _TURNS = [about_normal(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term th
 
 @lru_cache(maxsize=1024)
 def _of_even(term_text: str) -> F64:
-    """By Gauss–Legendre quadrature over cosines; diffuse terms are smooth, or steps of hand-drawn bands."""
+    """By Gauss–Legendre quadrature over cosines; diffuse terms are smooth, or steps of hand-drawn bands. (3, pairs)"""
     cosine, weight = _gauss(_NUM_COSINES)
     projected = weight * cosine
     sine = np.sqrt(1 - cosine**2)

@@ -32,22 +32,22 @@ def sent_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, fir
         cells: that send it. reflecting: what they make of light.
         arrived: from the lights. first: at least 1. last: not less.
     """
+    rows, frame = reflecting.rows, cells.frames[reflecting.rows]
     even, vectors = reflecting.sent(arrived)
-    number, directed = 1, min(last, _DIRECTED) if len(reflecting.rows) else 1
+    number, directed = 1, min(last, _DIRECTED) if len(rows) else 1
     total, total_vectors = (float(first == 1) * array.astype(np.float64) for array in (even, vectors))
     while number < directed:
-        now = sent_by(padded(even), reflecting.rows, cells.frames[reflecting.rows], vectors)
-        (even, vectors), number = reflecting.sent(cells.arriving(now, reflecting.rows)), number + 1
+        now = sent_by(_padded(even), rows, frame, vectors)
+        (even, vectors), number = reflecting.sent(cells.arriving(now, rows)), number + 1
         if number >= first:
             total, total_vectors = total + even, total_vectors + vectors
     if number < last:
-        even, links, rho = cells.seen(even, vectors, reflecting.rows), cells.links, reflecting.reflectance
+        even, links, rho = cells.seen(even, vectors, rows), cells.links, reflecting.reflectance
         start = max(first, number + 1)
         for _ in range(start - number):
             even = bounce(links, rho, even)
         total += bounced(links, rho, even, last - start)
-    frame = cells.frames[reflecting.rows]
-    return sent_by(padded(total), reflecting.rows, frame, total_vectors.astype(np.float32))
+    return sent_by(_padded(total), rows, frame, total_vectors.astype(np.float32))
 
 
 def preview_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> F32:
@@ -59,10 +59,10 @@ def preview_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, 
     even = cells.seen(*reflecting.sent(arrived), reflecting.rows)
     for _ in range(first - 1):
         even = bounce(cells.links, reflecting.reflectance, even)
-    return padded(preview_bounced(cells.links, cells.few_links, reflecting.reflectance, even, last - first))
+    return _padded(preview_bounced(cells.links, cells.few_links, reflecting.reflectance, even, last - first))
 
 
-def padded(even: NDArray[np.floating[Any]]) -> F32:
+def _padded(even: NDArray[np.floating[Any]]) -> F32:
     """Radiance of cells, (C, 3), and black for those that are none. (NO_CELL + 1, 3) float32"""
     out = np.zeros((NO_CELL + 1, 3), np.float32)
     out[: len(even)] = even
