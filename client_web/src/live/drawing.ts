@@ -93,7 +93,10 @@ export async function take(from: BakeConnection, frame: Frame): Promise<void> {
   const isDrawn = drawsHere.peek() && here?.of === from && kind === "picture";
   const isLate = isDrawn && (away.has(view) || (eyes.has(view) && eye !== null && eyes.get(view) !== eye));
   if (isLate) return;
-  if (kind === "picture") overtaken.add(view);
+  if (kind === "picture") {
+    overtaken.add(view);
+    dirty.delete(view);
+  }
   await takeFrame(from, frame);
   void offer(from, view);
 }
