@@ -12,13 +12,14 @@ from relume.look import Look
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import Lobes, lobes_of
 from relume.moving.behind import Caught, lay_over, seen_behind
+from relume.moving.between_points import SkyLight, take_off_lobes
 from relume.moving.bumps import towards_light
 from relume.moving.edges import resolve
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.pixels import Mirrored, Sent, combine
-from relume.moving.sky import Sky, turn_of
+from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import Light, emission_of
 from relume.scene.model import Camera
@@ -98,9 +99,11 @@ def _radiance(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Came
     """What surfaces send along the rays. (rays, 3)"""
     surface, (tables, lobes, sends), arriving = transfer.surface, wanted.materials, wanted.arriving
     eye = camera.to_world[:3, 3].astype(np.float32)
-    broad = at_vertices(surface, seen.is_seen, send(surface, arriving.total, tables, eye, seen.is_needed))
     glances = glance(surface, transfer.sky_share, arriving.others, lobes, eye, seen.is_needed)
-    mirrored = Mirrored(lobes, *_sky_in(transfer, wanted.light), at_vertices(surface, seen.is_seen, glances))
+    sky, sent_by_points = _sky_in(transfer, wanted.light), send(surface, arriving.total, tables, eye, seen.is_needed)
+    take_off_lobes(surface, lobes, sky, eye, glances, seen.is_needed, sent_by_points)
+    broad = at_vertices(surface, seen.is_seen, sent_by_points)
+    mirrored = Mirrored(lobes, sky, at_vertices(surface, seen.is_seen, glances))
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
     sent = Sent(broad, sends, _towards_light(transfer, arriving, seen))
     return combine(surface, seen, camera.yfov / height, sent, emission, mirrored)
@@ -114,11 +117,11 @@ def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> 
     return at_vertices(surface, seen.is_seen, towards_light(surface, arriving.total, seen.is_needed))
 
 
-def _sky_in(transfer: MovingTransfer, light: Light) -> tuple[Sky, np.float32, F32]:
+def _sky_in(transfer: MovingTransfer, light: Light) -> SkyLight:
     """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
     is_seen = light.paths.direct and light.is_environment_lit
     gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
-    return transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain
+    return SkyLight(transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain)
 
 
 def _caught(transfer: MovingTransfer, wanted: Wanted, seen: Seen) -> Caught:

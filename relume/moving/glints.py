@@ -33,6 +33,26 @@ def row_of(cosine):  # type: ignore[no-untyped-def]
     return row, np.float32(place - row)
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
+    """Find where a lobe looks.
+
+    Args:
+        lobes, lobe: which. n: the normal, d: from the eye, unit.
+    Returns:
+        A row of its table and the share of the next; its direction, three numbers; its width σ.
+    """
+    facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
+    cosine: Any = min(max(facing, LEAST_COSINE), np.float32(1))
+    row, share = row_of(cosine)
+    mean = lobes.mean[lobe, row] + share * (lobes.mean[lobe, row + 1] - lobes.mean[lobe, row])
+    sigma = lobes.sigma[lobe, row] + share * (lobes.sigma[lobe, row + 1] - lobes.sigma[lobe, row])
+    ax, ay, az = d[0] + facing * n[0], d[1] + facing * n[1], d[2] + facing * n[2]
+    length = math.sqrt(max(ax * ax + ay * ay + az * az, np.float32(1e-20)))
+    flat = math.sqrt(max(np.float32(1) - mean * mean, np.float32(0))) / length
+    return row, share, flat * ax + mean * n[0], flat * ay + mean * n[1], flat * az + mean * n[2], sigma
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _glance(rungs, points, material, sky, others, lobes, eye, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
     """Look from points [start, stop) along their lobes. out: (points, 4), the sky's share, then others' radiance"""
@@ -60,8 +80,10 @@ def _glance(rungs, points, material, sky, others, lobes, eye, is_needed, start, 
         add_light(rungs, 1, wi, one, scratch, functions)
         for k in range(sky.shape[1]):
             out[p, 0] += functions[0, k] * sky[p, k]
-            for channel in range(3):
-                out[p, 1 + channel] += functions[0, k] * others[p, channel, k]
+        if not lobes.is_told[lobe]:
+            for k in range(sky.shape[1]):
+                for channel in range(3):
+                    out[p, 1 + channel] += functions[0, k] * others[p, channel, k]
         out[p, 0] = min(max(out[p, 0], np.float32(0)), np.float32(1))
         for channel in range(1, 4):
             out[p, channel] = max(out[p, channel], np.float32(0))
@@ -72,7 +94,8 @@ def glance(surface: Surface, sky: F32, others: F32, lobes: Lobes, eye: F32, is_n
 
     Args:
         surface: whose points. sky: v, what each sees of the sky. (points, K) float32
-        others: t of all light but the sky's own. (points, 3, K) float32
+        others: t of all light but the sky's own; lobes that the in-basis tells leave it to that.
+            (points, 3, K) float32
         lobes: of all materials. eye: where it is. (3,) float32
         is_needed: points that are asked. (points,) uint8
     Returns:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
+from relume.moving.between_points import SkyLight
 from relume.moving.bumps import leaning, shading_ratio, unit
-from relume.moving.glints import LEAST_COSINE, row_of
+from relume.moving.glints import along_lobe
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
-from relume.moving.sky import Sky, sky_about
+from relume.moving.sky import sky_about
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -27,15 +28,12 @@ class Mirrored(NamedTuple):
     """What lobes send.
 
     Attributes:
-        lobes: of all materials. sky: that they show where points see it. turn: of it, from `turn_of`.
-        gain: of its light, in each channel. (3,) float32
+        lobes: of all materials. sky: that they show where points see it.
         glances: of vertices along their lobes, from `relume.moving.glints`. (vertices, 4) float32
     """
 
     lobes: Lobes
-    sky: Sky
-    turn: np.float32
-    gain: F32
+    sky: SkyLight
     glances: F32
 
 
@@ -59,24 +57,15 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     lobes, open_sky = mirrored.lobes, np.float32(0)
     for k in range(3):
         open_sky += weight[k] * mirrored.glances[vertex[k], 0]
-    nx, ny, nz = n
     dx, dy, dz = direction[0], direction[1], direction[2]
-    facing = -(nx * dx + ny * dy + nz * dz)
-    cosine: Any = min(max(facing, LEAST_COSINE), np.float32(1))
-    row, share = row_of(cosine)
-    mean = lobes.mean[lobe, row] + share * (lobes.mean[lobe, row + 1] - lobes.mean[lobe, row])
-    sigma = lobes.sigma[lobe, row] + share * (lobes.sigma[lobe, row + 1] - lobes.sigma[lobe, row])
-    ax, ay, az = dx + facing * nx, dy + facing * ny, dz + facing * nz
-    length = math.sqrt(max(ax * ax + ay * ay + az * az, np.float32(1e-20)))
-    flat = math.sqrt(max(np.float32(1) - mean * mean, np.float32(0))) / length
-    rx, ry, rz = flat * ax + mean * nx, flat * ay + mean * ny, flat * az + mean * nz
-    sky_about(mirrored.sky, mirrored.turn, rx, ry, rz, sigma, light)
+    row, share, rx, ry, rz, sigma = along_lobe(lobes, lobe, n, direction)
+    sky_about(mirrored.sky.sky, mirrored.sky.turn, rx, ry, rz, sigma, light)
     along = dx * outward[0] + dy * outward[1] + dz * outward[2]
     away = (rx * outward[0] + ry * outward[1] + rz * outward[2]) * (np.float32(-1) if along > 0 else np.float32(1))
     # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
     above = min(_share_above(away / sigma) / _share_above(abs(along) / sigma), np.float32(1))
     for channel in range(3):
-        light[channel] *= open_sky * mirrored.gain[channel]
+        light[channel] *= open_sky * mirrored.sky.gain[channel]
         for k in range(3):
             light[channel] += weight[k] * mirrored.glances[vertex[k], 1 + channel]
         light[channel] *= above
@@ -167,12 +156,12 @@ def _combine(  # type: ignore[no-untyped-def]
                 total = np.float32(0)
                 for k in range(3):
                     total += shares[k] * sent[about[k], group, channel]
-                total = ratio * max(total, np.float32(0))
+                total *= ratio
                 if lobe >= 0:
                     near = lobes.albedo[lobe, row, group, channel]
                     albedo = near + share * (lobes.albedo[lobe, row + 1, group, channel] - near)
                     total += albedo * light[channel]
-                out[p, channel] += texture_value[channel] * total
+                out[p, channel] += texture_value[channel] * max(total, np.float32(0))
 
 
 class Sent(NamedTuple):

@@ -12,6 +12,7 @@ from relume.errors import PlanError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.basis.lobes import lobes_of
+from relume.moving.between_points import SkyLight
 from relume.moving.evaluate import send, send_numpy, tables_of
 from relume.moving.look_up import at_vertices, look
 from relume.moving.pixels import Mirrored, Sent, combine
@@ -145,9 +146,7 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
     dark = np.zeros((len(moving.material_names), 3), np.float32)
     mirrored = Mirrored(
         lobes_of([()] * len(dark)),
-        moving.sky_in(None),
-        turn_of(0.0),
-        np.zeros(3, np.float32),
+        SkyLight(moving.sky_in(None), turn_of(0.0), np.zeros(3, np.float32)),
         np.zeros((len(sent), 4), np.float32),
     )
     all_groups = Sent(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))

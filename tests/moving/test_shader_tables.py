@@ -38,19 +38,19 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
 def test_light_vectors_survive_half_precision_whatever_their_size(size: float) -> None:
     vectors = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = tables._light(Arriving(vectors, -vectors), has_lobes=True, is_rough=False)
+    sent = tables._light(Arriving(vectors, -vectors), has_narrow=True, is_rough=False)
     for name, truth in (("vectors", vectors), ("others", -vectors)):
         scale, texels = sent[f"{name}_scale"][0]
         assert texels == NUM_FUNCTIONS / 4
         found = sent[name].astype(np.float64).reshape(vectors.shape) * float(scale)
         assert np.abs(found - truth).max() <= 1e-3 * np.abs(truth).max()
-    assert "others" not in tables._light(Arriving(vectors, vectors), has_lobes=False, is_rough=False)
+    assert "others" not in tables._light(Arriving(vectors, vectors), has_narrow=False, is_rough=False)
 
 
 def test_what_was_found_quickly_is_sent_up_to_its_degree() -> None:
     vectors = np.zeros((5, 3, NUM_FUNCTIONS), np.float32)
     vectors[:, :, :10] = 1
-    sent = tables._light(Arriving(vectors, vectors), has_lobes=False, is_rough=True)
+    sent = tables._light(Arriving(vectors, vectors), has_narrow=False, is_rough=True)
     assert sent["vectors"].reshape(5, 3, -1).shape == (5, 3, 12)
     assert sent["vectors_scale"][0, 1] == 3
 

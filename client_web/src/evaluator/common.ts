@@ -56,6 +56,30 @@ vec3 skyAt(ivec3 level, vec2 place) {
 }
 `;
 
+/** The sky about directions, blurred by σ radians, and where a lobe looks: texel `of` of its table, and the next. */
+export const LOBES = `
+uniform sampler2D uLobes;
+uniform ivec3 uSkyLevels[8];
+uniform int uNumSkyLevels;
+uniform vec3 uSkyGain;
+vec3 skyAbout(vec3 direction, float sigma) {
+  float place = clamp(log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0, float(uNumSkyLevels - 1));
+  int lower = int(place);
+  float share = place - float(lower);
+  vec2 where = placeOf(direction);
+  vec3 found = skyAt(uSkyLevels[lower], where);
+  return share > 0.0 ? mix(found, skyAt(uSkyLevels[lower + 1], where), share) : found;
+}
+vec3 alongLobe(int of, float share, vec3 n, vec3 d, out vec3 shape) {
+  shape = mix(texelFetch(uLobes, at(of), 0).xyz, texelFetch(uLobes, at(of + ${GROUPS + 1}), 0).xyz, share);
+  vec3 aside = d - dot(n, d) * n;
+  return sqrt(max(1.0 - shape.x * shape.x, 0.0)) * inversesqrt(max(dot(aside, aside), 1e-20)) * aside + shape.x * n;
+}
+`;
+/** The albedo of a lobe in a group of terms, whose texel of a table is `of`. */
+export const albedoOf = (of: string) =>
+  `mix(texelFetch(uLobes, at(${of}), 0).rgb, texelFetch(uLobes, at(${of} + ${GROUPS + 1}), 0).rgb, share)`;
+
 /** What lies behind surfaces: a map, or one colour where its gain is nothing. */
 export const BEHIND = `
 uniform sampler2D uBackground;

@@ -139,7 +139,7 @@ export class Evaluator {
     }
     const images = this.images;
     gl.disable(gl.DEPTH_TEST);
-    this.drawPoints(camera);
+    this.drawPoints(camera, numbers);
     this.drawVertices();
     this.drawPixels(camera, numbers, images);
     if (images.radiance !== null) this.drawWords(images, images.radiance);
@@ -148,16 +148,17 @@ export class Evaluator {
     return { width, height, words, hides: hides?.filter((_, index) => index % 4 === 0) ?? null };
   }
 
-  private drawPoints(camera: Camera): void {
+  private drawPoints(camera: Camera, numbers: Tables): void {
     const { gl } = this;
     const features = { uneven: this.texels.count("uneven") > 0, lobes: this.hasLobes, maps: this.hasTextures };
     const made = this.program(features, () => new Program(gl, COVER, pointShader(this.surface, features)));
-    const program = this.use(made, ["vectors", "others", "sky_share", "places", "point_normals", "tangents", "even", "uneven", "lobes", "materials"]);
+    const program = this.use(made, ["vectors", "others", "sky_share", "places", "point_normals", "tangents", "even", "uneven", "lobes", "materials", "sky"]);
     gl.uniform1i(program.at("uNumPoints"), this.texels.count("places"));
     gl.uniform1i(program.at("uStride"), this.scales.vectors[1] as number);
     gl.uniform1f(program.at("uScale"), this.scales.vectors[0] as number);
     gl.uniform1i(program.at("uOthersStride"), this.scales.others[1] as number);
     gl.uniform1f(program.at("uOthersScale"), this.scales.others[0] as number);
+    this.saySky(program, numbers);
     gl.uniform3fv(program.at("uEye"), placeOf(camera));
     this.cover(this.ofPoints.buffer, WIDTH, this.ofPoints.rows);
   }
@@ -191,9 +192,7 @@ export class Evaluator {
     gl.uniform3fv(program.at("uEye"), placeOf(camera));
     gl.uniform1f(program.at("uPixelAngle"), camera.yfov / height);
     gl.uniform3fv(program.at("uGain"), numbers.gain);
-    gl.uniform3fv(program.at("uSkyGain"), numbers.sky_gain);
-    gl.uniform3iv(program.at("uSkyLevels"), numbers.sky_levels.slice(0, 8).flat());
-    gl.uniform1i(program.at("uNumSkyLevels"), Math.min(8, numbers.sky_levels.length));
+    this.saySky(program, numbers);
     gl.bindFramebuffer(gl.FRAMEBUFFER, images.drawn);
     gl.viewport(0, 0, width, height);
     gl.enable(gl.DEPTH_TEST);
@@ -246,6 +245,14 @@ export class Evaluator {
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, values.texture);
     gl.uniform1i(program.at("uValues"), unit);
+  }
+
+  private saySky(program: Program, numbers: Tables): void {
+    const { gl } = this;
+    gl.uniform3fv(program.at("uSkyGain"), numbers.sky_gain);
+    gl.uniform3iv(program.at("uSkyLevels"), numbers.sky_levels.slice(0, 8).flat());
+    gl.uniform1i(program.at("uNumSkyLevels"), Math.min(8, numbers.sky_levels.length));
+    gl.uniform1f(program.at("uTurn"), numbers.sky_turn);
   }
 
   private sayBehind(program: Program, numbers: Tables): void {

@@ -1,8 +1,8 @@
 /** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, its looks along lobes
- * (`glints`), and where their light comes from (`bumps`), written from the ladder. Sixteen numbers of each point:
+ * (`glints`), less the sky in these (`between_points`), and where their light comes from (`bumps`), written from the ladder. Sixteen numbers of each point:
  * radiance of three groups, the direction of the light, the share of the sky along the lobe, radiance beside it. */
 import type { SurfaceBody } from "../protocol";
-import { GROUPS, HEAD, MATERIAL, rowOf } from "./common";
+import { albedoOf, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
 
 const CHANNELS = [0, 1, 2];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -124,12 +124,16 @@ function glance(surface: SurfaceBody): string {
   return `int lobe = texelFetch(uMaterials, at(material + ${GROUPS}), 0).x;
   if (lobe >= 0) {
     int of = (lobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
-    float mean = mix(texelFetch(uLobes, at(of), 0).x, texelFetch(uLobes, at(of + ${GROUPS + 1}), 0).x, share);
-    vec2 w = flatness > 0.0 ? -sqrt(max(1.0 - mean * mean, 0.0)) * vec2(across, along) / flatness : vec2(0.0);
+    vec3 shape, r = alongLobe(of, share, n, -wo, shape);
+    vec2 w = vec2(dot(tangent, r), dot(bitangent, r));
     ${named("h", texels)}
     ${functionsAt(surface)}
     float open = ${range(texels).map((q) => `dot(h${q}, texelFetch(uSkyShare, at(p * ${texels} + ${q}), 0))`).join(" + ")};
-    glance = vec4(clamp(open, 0.0, 1.0), max(uOthersScale * vec3(${sums.join(",\n      ")}), 0.0));
+    glance.x = clamp(open, 0.0, 1.0);
+    if (shape.z > 0.0) {
+      vec3 light = glance.x * uSkyGain * skyAbout(r, shape.y);
+      ${range(GROUPS).map((group) => `sent${group} -= light * ${albedoOf(`of - ${GROUPS - group}`)};`).join("\n      ")}
+    } else glance.yzw = max(uOthersScale * vec3(${sums.join(",\n      ")}), 0.0);
   }`;
 }
 
@@ -139,8 +143,12 @@ export function pointShader(surface: SurfaceBody, features: PointFeatures): stri
   const texel = (channel: number, q: number) =>
     `t${channel * vectors + q} = uScale * texelFetch(uVectors, at((p * 3 + ${channel}) * uStride + ${q}), 0);`;
   const load = (q: number) => `if (${q} < texels) { ${CHANNELS.map((channel) => texel(channel, q)).join(" ")} }`;
-  return `${HEAD}${rowOf(rows)}
-uniform sampler2D uVectors, uOthers, uSkyShare, uPlaces, uPointNormals, uTangents, uEven, uUneven, uLobes;
+  const sent = (group: number) => `vec3 sent${group} = vec3(0.0);
+  tables = texelFetch(uMaterials, at(material + ${group}), 0);
+  if (tables.x >= 0) sent${group} += even(tables.x, row, share, needed);
+  ${features.uneven ? `if (tables.y >= 0) sent${group} += uneven(tables.y, row, share, cp, sp);` : ""}`;
+  return `${HEAD}${rowOf(rows)}${features.lobes ? `${PLACE}${SKY}${LOBES}` : ""}
+uniform sampler2D uVectors, uOthers, uSkyShare, uPlaces, uPointNormals, uTangents, uEven, uUneven;
 uniform isampler2D uMaterials;
 uniform int uNumPoints, uStride, uOthersStride;
 uniform float uScale, uOthersScale;
@@ -176,21 +184,16 @@ void main() {
     ${turned(surface)}
   }
 
-  vec3 sent[${GROUPS}];
-  for (int group = 0; group < ${GROUPS}; group++) {
-    ivec4 tables = texelFetch(uMaterials, at(material + group), 0);
-    sent[group] = vec3(0.0);
-    if (tables.x >= 0) sent[group] += even(tables.x, row, share, needed);
-    ${features.uneven ? "if (tables.y >= 0) sent[group] += uneven(tables.y, row, share, cp, sp);" : ""}
-  }
+  ivec4 tables;
+  ${range(GROUPS).map(sent).join("\n  ")}
 
   vec3 towards = vec3(0.0);
   ${features.maps ? `${expanded(surface)}\n  towards = local.x * tangent + local.y * bitangent + local.z * n;` : ""}
   vec4 glance = vec4(0.0);
   ${features.lobes ? glance(surface) : ""}
-  out0 = vec4(sent[0], sent[1].r);
-  out1 = vec4(sent[1].gb, sent[2].rg);
-  out2 = vec4(sent[2].b, towards);
+  out0 = vec4(sent0, sent1.r);
+  out1 = vec4(sent1.gb, sent2.rg);
+  out2 = vec4(sent2.b, towards);
   out3 = glance;
 }
 `;

@@ -1,7 +1,7 @@
 /** Surfaces as an eye sees them: the places of `relume.moving.look_up`, the sum of `relume.moving.pixels`, catchers of
  * `relume.moving.behind`. Triangles are drawn as they are; what vertices of the lattice send is found in each pixel. */
 import type { SurfaceBody } from "../protocol";
-import { BEHIND, GROUPS, HEAD, MATERIAL, PLACE, rowOf, SKY } from "./common";
+import { albedoOf, BEHIND, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
 
 /** What pixels of a triangle have in common: corners and material, its lattice, normal and scale of textures, lobe,
  * normal map and whether it catches, what it emits. */
@@ -120,15 +120,14 @@ const fetched = (name: string, layer: number) =>
 
 /** Adds what a group of terms sends. */
 function group(number: number, sent: string, { lobes, textures }: SurfaceFeatures, rows: number): string {
-  const table = `(kind.x * ${rows} + row) * ${GROUPS + 1} + ${number}`;
-  const albedo = `mix(texelFetch(uLobes, at(${table}), 0).rgb, texelFetch(uLobes, at(${table} + ${GROUPS + 1}), 0).rgb, share)`;
+  const albedo = albedoOf(`(kind.x * ${rows} + row) * ${GROUPS + 1} + ${number}`);
   return `{
     ivec4 of = texelFetch(uMaterials, at(material + ${number}), 0);
     if (of.z > 0) {
-      vec3 total = ratio * max(${sent}, 0.0);
+      vec3 total = ratio * ${sent};
       ${lobes ? `if (kind.x >= 0) total += light * ${albedo};` : ""}
       ${textures ? "if (of.w >= 0) total *= textureAt(of.w, place, footprint);" : ""}
-      color += total;
+      color += max(total, 0.0);
     }
   }`;
 }
@@ -157,15 +156,13 @@ export interface SurfaceFeatures {
 
 export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures): string {
   const { groups, textures: hasTextures, lobes, catchers } = features;
-  return `${HEAD}${rowOf(rows)}${PLACE}${SKY}${catchers ? BEHIND : ""}${features.direct ? DIRECT : SAMPLED}${hasTextures ? TEXTURES : NO_TEXTURES}${LEAN}
+  return `${HEAD}${rowOf(rows)}${PLACE}${SKY}${LOBES}${catchers ? BEHIND : ""}${features.direct ? DIRECT : SAMPLED}${hasTextures ? TEXTURES : NO_TEXTURES}${LEAN}
 uniform usampler2D uNodes, uPoints;
-uniform sampler2D uNormals, uWeights, uUnhidden, uLobes;
+uniform sampler2D uNormals, uWeights, uUnhidden;
 uniform sampler2DArray uValues;
 uniform isampler2D uMaterials;
 uniform float uPixelAngle, uFree;
-uniform vec3 uGain, uSkyGain;
-uniform ivec3 uSkyLevels[8];
-uniform int uNumSkyLevels;
+uniform vec3 uGain;
 ${FLAT}
 centroid in vec2 vBary;
 centroid in vec3 vAway;
@@ -173,24 +170,11 @@ int nodeOf(int rows, int i, int j) { return i * (rows + 1) - i * (i - 1) / 2 + j
 
 float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
 
-vec3 skyAbout(vec3 direction, float sigma) {
-  float place = clamp(log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0, float(uNumSkyLevels - 1));
-  int lower = int(place);
-  float share = place - float(lower);
-  vec2 where = placeOf(direction);
-  vec3 found = skyAt(uSkyLevels[lower], where);
-  return share > 0.0 ? mix(found, skyAt(uSkyLevels[lower + 1], where), share) : found;
-}
-
 /** The light that a lobe sees, and where its albedo lies in tables. */
 vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, out float share) {
-  float facing = -dot(n, d);
-  row = rowOf(clamp(facing, 0.01, 1.0), share);
+  row = rowOf(clamp(-dot(n, d), 0.01, 1.0), share);
   int of = (lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS};
-  vec2 shape = mix(texelFetch(uLobes, at(of), 0).xy, texelFetch(uLobes, at(of + ${GROUPS + 1}), 0).xy, share);
-  vec3 aside = d + facing * n;
-  float sine = sqrt(max(1.0 - shape.x * shape.x, 0.0)) * inversesqrt(max(dot(aside, aside), 1e-20));
-  vec3 r = sine * aside + shape.x * n;
+  vec3 shape, r = alongLobe(of, share, n, d, shape);
   float along = dot(d, outward), away = dot(r, outward) * (along > 0.0 ? -1.0 : 1.0);
   float above = min(shareAbove(away / shape.y) / shareAbove(abs(along) / shape.y), 1.0);
   return above * (glance.x * uSkyGain * skyAbout(r, shape.y) + glance.yzw);

@@ -1,9 +1,13 @@
-"""Lobes: what is narrower than the in-basis can tell is sent apart, as light of a blurred mirror (after Sun 2007).
+"""Lobes: highlights as light of a blurred mirror (after Sun 2007).
 
-    B(ωo) ≈ a(θo) · L̄(ωm, σ),   a = ∫ ρ cos θi dωi,   R ωm = ∫ ωi ρ cos θi dωi / ∫ ρ cos θi dωi,   σ² ≈ 1 − R
+    L(ωo) = a(θo) · L̄(ωm, σ)
+    a = ∫ ρ cos θi dωi,   R ωm = ∫ ωi ρ cos θi dωi / ∫ ρ cos θi dωi,   σ² ≈ 1 − R
 
-L̄ is the light about the lobe's mean direction ωm, blurred by σ. Both stand in tables over θo, as out-factors do; of
-terms that depend on φo as well, the mean over it.
+L̄ is the light about the lobe's mean direction ωm, blurred by σ; it is found for each pixel, where Σ_k p_k t_k is found
+for points. What is narrower than the in-basis can tell is sent as L alone. Of wider highlights, L is what changes
+fastest from point to point, and B − L is what is interpolated: B(pixel) = L(pixel) + Σ_points w (B − L)
+(docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as out-factors do; of terms that depend on
+φo as well, the mean over it.
 """
 
 from __future__ import annotations
@@ -24,7 +28,8 @@ from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NARROW = 0.2  # what the in-basis misses of a term that is sent apart, see `OutFactors.missed`
+NARROW = 0.2  # what the in-basis misses of a term that it cannot tell, see `OutFactors.missed`
+_DIRECTED = 3, 0.15  # a degree, and what its functions miss of a term that has a highlight
 NUM_GROUPS = 1 + len(TEXTURES)
 _RINGS, _SPOKES = 64, 24  # of the quadrature about the mirror direction
 _INNERMOST = 3e-4  # radians
@@ -39,22 +44,29 @@ class Lobes(NamedTuple):
         albedo: a, by groups of terms as in `relume.moving.evaluate`. (lobes, `NUM_ROWS`, groups, 3) float32
         mean: cos θm, on the side that the mirror direction is. (lobes, `NUM_ROWS`) float32
         sigma: radians. (lobes, `NUM_ROWS`) float32
+        is_told: the in-basis tells what they send, too; they only say how it differs from pixel to pixel. (lobes,) bool
         of: lobe of each material, −1 for none. (materials,) int32
     """
 
     albedo: F32
     mean: F32
     sigma: F32
+    is_told: NDArray[np.bool_]
     of: NDArray[np.int32]
 
 
 def is_narrow(term_document: Mapping[str, Any]) -> bool:
-    """Whether a term is sent as a lobe instead of through the in-basis."""
+    """Whether the in-basis cannot tell a term."""
     return out_factors(term_document).missed > NARROW
 
 
+def _has_highlight(term_document: Mapping[str, Any]) -> bool:
+    degree, bound = _DIRECTED
+    return out_factors(term_document).missed_by_degree[degree] > bound
+
+
 def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
-    """Sum the narrow terms of each material to one lobe.
+    """Sum the narrow terms of each material to one lobe; where it has none, those with a highlight.
 
     Args:
         materials: the terms of each, of a complete look.
@@ -63,13 +75,16 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     albedo: list[F64] = []
     mean: list[F64] = []
     sigma: list[F64] = []
+    told: list[bool] = []
     for index, terms in enumerate(materials):
         narrow = [term for term in terms if is_narrow(term)]
-        if not narrow:
+        seen = narrow or [term for term in terms if _has_highlight(term)]
+        if not seen:
             continue
         of[index] = len(albedo)
+        told.append(not narrow)
         by_group, about, width = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros(NUM_ROWS), np.zeros(NUM_ROWS)
-        for term in narrow:
+        for term in seen:
             found = _lobe_of(json.dumps({**term, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
             by_group[:, 0 if term.get("texture") is None else 1 + TEXTURES.index(term["texture"])] += sent
@@ -85,6 +100,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         np.reshape(np.array(albedo, np.float32), (*shape, NUM_GROUPS, 3)),
         np.reshape(np.array(mean, np.float32), shape),
         np.reshape(np.array(sigma, np.float32), shape),
+        np.array(told, np.bool_),
         of,
     )
 

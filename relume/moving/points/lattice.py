@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from relume.errors import PlanError
 from relume.moving.points.vertices import Nodes, Vertices, find_vertices, shared_points
@@ -117,9 +119,9 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
 
     while is_too_fine(spacing) and spacing < longest.max():
         spacing *= _COARSER
-    normals = geometry.face_normals
+    normals, piece = geometry.face_normals, pieces_of(geometry)
     for trial in range(_MOST_TRIALS):
-        lattice, nodes = _grids(geometry, normals, is_open, _rows(longest, spacing), spacing * coarse)
+        lattice, nodes = _grids(geometry, normals, piece, is_open, _rows(longest, spacing), spacing * coarse)
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
         chosen = shared_points(nodes, alike)
         ratio = len(chosen) / num_points
@@ -143,6 +145,17 @@ def _coarseness(centre: F64, area: F64, eyes: F64) -> F64:
     return np.asarray(2.0 ** np.rint(np.log2(coarse)))
 
 
+def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
+    """Find which faces hang together by corners in the same place. (faces,) int32"""
+    as_bytes = np.ascontiguousarray(geometry.positions, np.float32).view("V12").ravel()
+    _, place = np.unique(as_bytes, return_inverse=True)
+    a, b, c = place[geometry.faces].T
+    pairs = np.concatenate([a, b]), np.concatenate([b, c])
+    num = int(place.max()) + 1
+    _, piece = connected_components(coo_array((np.ones(len(pairs[0]), np.bool_), pairs), (num, num)), directed=False)
+    return np.asarray(piece[a], np.int32)
+
+
 def most_nodes(num_faces: int, num_points: int) -> int:
     """How many nodes a scene's lattice has at most: the corners of all sides, and what is between."""
     return 6 * num_faces + _NODES_A_POINT * num_points
@@ -153,11 +166,16 @@ def _rows(longest: F64, spacing: float) -> NDArray[np.int64]:
 
 
 def _grids(
-    geometry: Geometry, normals: F32, is_open: NDArray[np.bool_], rows: NDArray[np.int64], spacing: F64
+    geometry: Geometry,
+    normals: F32,
+    piece: NDArray[np.int32],
+    is_open: NDArray[np.bool_],
+    rows: NDArray[np.int64],
+    spacing: F64,
 ) -> tuple[Lattice, Nodes]:
     """Place the nodes of all grids, which are not numbered as vertices yet.
 
-    normals: of the faces. (faces, 3). spacing: of points on each. (faces,)
+    normals: of the faces. (faces, 3). piece: that each is of. spacing: of points on each. (faces,)
     """
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
     counts = num_nodes(num_rows).ravel()
@@ -167,7 +185,7 @@ def _grids(
     points = surface_at(geometry, Hits(at.face, at.uv, np.ones(len(at.face), np.float32)), -normal).points
     material = geometry.face_material[at.face].astype(np.uint16)
     lattice = Lattice(num_rows, first.astype(np.uint32), np.empty(0, np.uint32))
-    return lattice, Nodes(points, material, at.side, spacing[at.face])
+    return lattice, Nodes(points, material, at.side, piece[at.face], spacing[at.face])
 
 
 def _placement(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Placement:

@@ -26,6 +26,7 @@ _TURN = 1.5  # spacings that a turn of the normal by a radian is worth
 _PLACE_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
 _U64 = np.uint64
 _APART = 1e3  # spacings between materials, and between sides
+_ELSEWHERE = 4.0  # that a surface which does not hang together with another is farther away than it is
 
 
 class Vertices(NamedTuple):
@@ -53,6 +54,7 @@ class Nodes(NamedTuple):
     points: Points
     material: NDArray[np.uint16]
     side: NDArray[np.uint8]
+    piece: NDArray[np.int32]
     spacing: F64
 
 
@@ -95,10 +97,12 @@ def find_vertices(nodes: Nodes, chosen: NDArray[np.intp]) -> tuple[Vertices, NDA
 
 
 def _features(nodes: Nodes) -> F64:
-    """Where nodes are, in spacings, for what is near to be like. (n, 8)"""
+    """Where nodes are, in spacings, for what is near to be like. (n, 11)"""
     place = nodes.points.position.astype(np.float64) / nodes.spacing.min()
     apart = _APART * np.column_stack([nodes.material, nodes.side])
-    return np.column_stack([place, _TURN * nodes.points.normal, apart])
+    elsewhere = np.random.default_rng(1).normal(size=(int(nodes.piece.max()) + 1, 3))
+    elsewhere *= _ELSEWHERE / np.sqrt(2) / np.linalg.norm(elsewhere, axis=1, keepdims=True)
+    return np.column_stack([place, _TURN * nodes.points.normal, apart, elsewhere[nodes.piece]])
 
 
 def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -59,15 +59,16 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
         transfer: of the bake. wanted: what is shown. versions: of its materials, and of its light vectors.
     """
     look, light = wanted.look, wanted.light
-    has_lobes, background = bool((wanted.materials.lobes.of >= 0).any()), look.background
+    lobes, background = wanted.materials.lobes, look.background
+    has_lobes, has_narrow = bool(len(lobes.is_told)), not lobes.is_told.all()
     catchers = tuple(k for k, name in enumerate(transfer.material_names) if look.materials[name].catcher)
     parts = {
         "materials": Part(
             (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, wanted)
         ),
         "light": Part(
-            (versions[1], has_lobes),
-            lambda: _light(wanted.arriving, has_lobes=has_lobes, is_rough=wanted.is_rough),
+            (versions[1], has_narrow),
+            lambda: _light(wanted.arriving, has_narrow=has_narrow, is_rough=wanted.is_rough),
         ),
     }
     if has_lobes or background.kind == "map":
@@ -113,11 +114,13 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 
 
 def _lobes(lobes: Lobes) -> F32:
-    """Of each row of each lobe the albedos by groups, then its mean and σ. (lobes · rows · (groups + 1), 4)"""
+    """Of each row of each lobe the albedos by groups, then its mean, σ, and whether the in-basis tells it.
+    (lobes · rows · (groups + 1), 4)"""
     num, rows = lobes.mean.shape
     out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
     out[:, :, :NUM_GROUPS, :3] = lobes.albedo
     out[:, :, NUM_GROUPS, 0], out[:, :, NUM_GROUPS, 1] = lobes.mean, lobes.sigma
+    out[:, :, NUM_GROUPS, 2] = lobes.is_told[:, None]
     return out.reshape(-1, 4)
 
 
@@ -154,10 +157,10 @@ def _degrees(tables: F32, degree_of: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(matters.sum(axis=1) - 1, np.int64).clip(0)
 
 
-def _light(arriving: Arriving, *, has_lobes: bool, is_rough: bool) -> dict[str, Texels]:
+def _light(arriving: Arriving, *, has_narrow: bool, is_rough: bool) -> dict[str, Texels]:
     """Light vectors in half precision, channel by channel, and by how much they were divided."""
     kept = (_ROUGH if is_rough else NUM_FUNCTIONS // 4) * 4
-    vectors = {"vectors": arriving.total} | ({"others": arriving.others} if has_lobes else {})
+    vectors = {"vectors": arriving.total} | ({"others": arriving.others} if has_narrow else {})
     out: dict[str, Texels] = {}
     for name, values in vectors.items():
         largest = float(max(values.max(), -values.min(), 1e-30))

@@ -146,6 +146,26 @@ def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> 
     assert np.abs(here - there).mean() < 1
 
 
+@pytest.mark.parametrize("model", ["blinn_phong", "ggx"])  # one that the in-basis tells, and one that is a lobe alone
+def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int]], model: str) -> None:
+    editor, _ = moving
+    page = editor.page
+    draw_here(page)
+    dull = settled(editor)
+    for name in ("Floor", "Tall block"):
+        drawn = num_drawn(page)
+        page.get_by_role("option", name=name).click()
+        page.get_by_label("Add a term").select_option(model)
+        page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
+    here = settled(editor)
+    assert changed(dull, here) > 0.05
+    choose(page, "server")
+    there = settled(editor)
+    inside = beside_edges(there)
+    assert inside.mean() > 0.3
+    assert (np.abs(there - here).max(axis=2)[inside] > 2).mean() < 2e-3
+
+
 def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
     server: Server, browser: Browser, moving_scene: str
 ) -> None:
