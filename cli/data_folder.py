@@ -24,11 +24,12 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     """
     from pydantic import ValidationError
 
+    from relume.btf.shelf import STORE as BTFS
     from relume.environments.asset_store import STORE as ENVIRONMENTS
     from relume.errors import ParameterError
     from relume.measured.asset_store import STORE as MATERIALS
     from server.settings import Settings
-    from worker.paths import environments_path, materials_path
+    from worker.paths import btfs_path, environments_path, materials_path
 
     given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
     try:
@@ -39,6 +40,7 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         raise ParameterError(name, first["input"], first["msg"].lower()) from None
     settings.data.mkdir(parents=True, exist_ok=True)
     MATERIALS.use(materials_path(settings.data))
+    BTFS.use(btfs_path(settings.data))
     ENVIRONMENTS.use(environments_path(settings.data))
     return settings
 

@@ -17,13 +17,12 @@ from cli import (
     environment_import,
     environment_list,
     import_scene,
-    material_export,
-    material_import,
     reference,
     render,
     serve,
     worker,
 )
+from cli.material import exporting, importing, making
 from cli.sentence import sentence
 
 app = typer.Typer(
@@ -44,9 +43,14 @@ app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
-materials = typer.Typer(help="Measured materials in MERL files.", no_args_is_help=True, rich_markup_mode=None)
-materials.command("import")(material_import.material_import)
-materials.command("export")(material_export.material_export)
+materials = typer.Typer(
+    help="Measured materials, and textures that look different from every side.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+materials.command("import")(importing.material_import)
+materials.command("make-btf")(making.material_make_btf)
+materials.command("export")(exporting.material_export)
 app.add_typer(materials, name="material")
 environments = typer.Typer(help="Light that a look may name.", no_args_is_help=True, rich_markup_mode=None)
 environments.command("import")(environment_import.environment_import)

@@ -10,6 +10,7 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
+from relume.btf.shelf import STORE as BTFS
 from relume.environments.asset_store import STORE as ENVIRONMENTS
 from relume.measured.asset_store import STORE as MATERIALS
 from server import errors
@@ -18,6 +19,7 @@ from server.library.opening import open_library
 from server.metrics import Metrics
 from server.routes import (
     bakes,
+    btfs,
     built_ins,
     cameras,
     client,
@@ -38,7 +40,7 @@ from server.routes import (
 from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
-from worker.paths import environments_path, materials_path
+from worker.paths import btfs_path, environments_path, materials_path
 
 ROUTE_GROUPS = (
     scenes,
@@ -47,6 +49,7 @@ ROUTE_GROUPS = (
     built_ins,
     models,
     materials,
+    btfs,
     library,
     environments,
     bakes,
@@ -79,7 +82,11 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with MATERIALS.at(materials_path(settings.data)), ENVIRONMENTS.at(environments_path(settings.data)):
+        with (
+            MATERIALS.at(materials_path(settings.data)),
+            BTFS.at(btfs_path(settings.data)),
+            ENVIRONMENTS.at(environments_path(settings.data)),
+        ):
             async with open_services(settings, metrics, open_library, open_bakes, clock) as services:
                 app.state.services = services
                 yield

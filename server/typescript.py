@@ -72,6 +72,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,
     bodies.MeasuredBody,
+    bodies.BtfBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

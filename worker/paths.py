@@ -26,6 +26,11 @@ def materials_path(data_dir: Path) -> Path:
     return data_dir / "materials"
 
 
+def btfs_path(data_dir: Path) -> Path:
+    """Folder of the BTFs; `relume.btf.shelf` names what is in it."""
+    return data_dir / "btfs"
+
+
 def environments_path(data_dir: Path) -> Path:
     """Folder of the imported environments; `relume.environments.asset_store` names what is in it."""
     return data_dir / "environments"

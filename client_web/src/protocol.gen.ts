@@ -230,6 +230,23 @@ export interface BakeMessage {
   seconds_left: number | null;
 }
 
+/** A bidirectional texture; looks name it by `data`, `terms` is how it begins. `synthetic` says which geometry it was rendered from; null where it was measured. `error` is the relative RMS of the compression by how many components are used, from none on; `ratio` what is saved by it. */
+export interface BtfBody {
+  id: string;
+  data: string;
+  name: string;
+  created: string;
+  terms: Record<string, unknown>[];
+  thumbnail: string;
+  synthetic: string | null;
+  size: [number, number];
+  directions: number;
+  clusters: number;
+  components: number;
+  error: number[];
+  ratio: number;
+}
+
 /** A scene made by code; `size` and `method` of a bake show it well. */
 export interface BuiltInBody {
   name: string;
@@ -411,7 +428,7 @@ export interface MeasuredBody {
   homomorphic_error: [number, number, number];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`). */
+/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, and `data_prefix` how the names of such data begin (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
@@ -419,6 +436,7 @@ export interface ModelBody {
   source: string;
   texture: string;
   needs_data: boolean;
+  data_prefix: string | null;
   parameters: ParameterBody[];
   curves: CurveBody[];
 }

@@ -97,6 +97,7 @@ describe("terms", () => {
     source: "",
     texture: "specular",
     needs_data: false,
+    data_prefix: null,
     parameters: parameters.map((p) => ({
       name: p,
       label: p,
@@ -130,7 +131,7 @@ describe("terms", () => {
   });
 
   test("measured models are offered to terms that name a material, and keep it between them", () => {
-    const measured = models.map((m) => ({ ...m, model: `measured_${m.model}`, needs_data: true }));
+    const measured = models.map((m) => ({ ...m, model: `measured_${m.model}`, needs_data: true, data_prefix: "merl:" }));
     const all = [...models, ...measured];
     const term = { model: "ggx", color: [1, 1, 1] as Rgb };
     const other = { ...term, model: measured[0]!.model, data: "merl:0123456789abcdef" };

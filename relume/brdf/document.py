@@ -23,7 +23,6 @@ from relume.checks import (
     fail,
     names_text,
 )
-from relume.measured.asset_store import STORE
 
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
@@ -65,13 +64,13 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
 def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
     """The name of the material that a term is measured from, where it is."""
     name = given.get("data")
-    if not term.needs_data:
+    if term.data is None:
         if "data" in given:
             raise fail(pointer, name, f"nothing: {term.model!r} has no data")
         return {}
-    if not isinstance(name, str) or not STORE.is_known(name):
-        known = names_text(STORE.known_names())
-        raise fail(pointer, name, f"the data of a measured material that was imported here: {known}")
+    if not isinstance(name, str) or not term.data.is_known(name):
+        known = names_text(term.data.known_names())
+        raise fail(pointer, name, f"the data of a {term.data.what} that was imported here: {known}")
     return {"data": name}
 
 

@@ -9,6 +9,7 @@ from relume.brdf.term import Curve, Term
 from relume.brdf.terms.ashikhmin_shirley import ASHIKHMIN_SHIRLEY
 from relume.brdf.terms.beard_maxwell import BEARD_MAXWELL
 from relume.brdf.terms.blinn_phong import BLINN_PHONG
+from relume.brdf.terms.btf import MEASURED_BTF
 from relume.brdf.terms.cook_torrance import COOK_TORRANCE
 from relume.brdf.terms.ggx import GGX
 from relume.brdf.terms.lafortune import LAFORTUNE
@@ -25,7 +26,7 @@ _ALL = (
     LAMBERT, OREN_NAYAR,
     PHONG, BLINN_PHONG, LAFORTUNE, WARD, WARD_DUER, WARD_ANISOTROPIC, ASHIKHMIN_SHIRLEY,
     COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX,
-    MEASURED_LV, MEASURED_HD, MEASURED_HF,
+    MEASURED_LV, MEASURED_HD, MEASURED_HF, MEASURED_BTF,
 )  # fmt: skip
 
 TERMS: dict[str, Term] = {term.model: term for term in _ALL}
@@ -52,6 +53,7 @@ def describe() -> list[dict[str, Any]]:
             "source": term.source,
             "texture": term.texture,
             "needs_data": term.needs_data,
+            "data_prefix": None if term.data is None else term.data.prefix,
             "parameters": [
                 asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters
             ],

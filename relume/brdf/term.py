@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.asset_store import AssetStore
+
 F64 = NDArray[np.float64]
 Params = Mapping[str, float]
 
@@ -103,7 +105,8 @@ class Term:
             defaults.
         num_channels: of the quotient, 1 or 3.
         is_lambertian: whether the quotient is one value above the horizon.
-        needs_data: whether documents must name a measured material, as `data`; it is fixed at freeze too.
+        data: where documents must name something measured that is kept there; it is fixed at freeze too.
+        texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from `settle`.
     """
 
     model: str
@@ -118,7 +121,13 @@ class Term:
     settle: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     num_channels: int = 1
     is_lambertian: bool = False
-    needs_data: bool = False
+    data: AssetStore | None = None
+    texels: Any = None
+
+    @property
+    def needs_data(self) -> bool:
+        """Whether documents must name something measured."""
+        return self.data is not None
 
     def fixed_values(self, document: Mapping[str, Any]) -> tuple[tuple[str, float | str], ...]:
         """Names and values of what a term document fixes at freeze; what it leaves out has its default."""

@@ -8,7 +8,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     lights/tiles                                             relume.light.tiles.Tiles
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
-    views/<k>/position, normal, tangent, diffuse, specular
+    views/<k>/position, normal, tangent, diffuse, specular, uv
     views/<k>/visibility                                     samples on surfaces only
     views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
 """
@@ -37,7 +37,7 @@ from relume.trace.view_samples import BACKGROUND, sample_view
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
-_SURFACE_BYTES = 4 + 4 + 2 + 5 * 12
+_SURFACE_BYTES = 4 + 4 + 2 + 5 * 12 + 20
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 
@@ -148,7 +148,7 @@ class SampledViews:
         arrays: dict[str, NDArray[Any]] = {
             "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
             "position": points.position, "normal": points.normal, "tangent": points.tangent,
-            "diffuse": samples.surface.diffuse, "specular": samples.surface.specular,
+            "diffuse": samples.surface.diffuse, "specular": samples.surface.specular, "uv": samples.surface.uv,
         }  # fmt: skip
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)

@@ -20,6 +20,7 @@ from relume.parallel import for_steps
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import Receivers
+from relume.project.texels import texel_rows
 
 F32 = NDArray[np.float32]
 
@@ -78,7 +79,10 @@ def shade(
     contraction = contract(term, bands, None)
 
     def step(start: int, stop: int) -> None:
-        rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)[:, 0]
+        if term.texels is not None and receivers.uv is not None:
+            rows[start:stop] = texel_rows(term.texels, lights, receivers, start, stop)
+        else:
+            rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)[:, 0]
 
     for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "shading")
     return Shaded.of(rows)

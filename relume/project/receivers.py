@@ -121,12 +121,15 @@ class Receivers:
         points: where it arrives. wo: towards the viewer, unit, world space. (n, 3) float32
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon. (n, bytes) uint8
         rays: light that arrives along rays; none where only the environment's triangles are meant.
+        uv: where they lie in textures, see `relume.trace.surface.Surface`; None where that is not known.
+            (n, 5) float32
     """
 
     points: Points
     wo: F32
     visible: NDArray[np.uint8]
     rays: Sequence[Rays] = ()
+    uv: F32 | None = None
 
     @property
     def normal(self) -> F32:
@@ -140,4 +143,5 @@ class Receivers:
 
     def places(self, chosen: NDArray[np.integer]) -> Receivers:
         """Choose some of them, without their light."""
-        return Receivers(self.points.rows(chosen), self.wo[chosen], np.empty((len(chosen), 0), np.uint8))
+        uv = None if self.uv is None else self.uv[chosen]
+        return Receivers(self.points.rows(chosen), self.wo[chosen], np.empty((len(chosen), 0), np.uint8), uv=uv)

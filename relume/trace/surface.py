@@ -28,11 +28,15 @@ class Surface:
     Attributes:
         points: turned to the viewer, moved off the surface by the scene's epsilon; their seeds are their numbers.
         diffuse, specular: texture channels, 1 where the material has none. (n, 3) float32
+        uv: places in textures (u, v), side of what a pixel covers there, angle from the tangent to the texture's x axis
+            in radians, −1 where the texture is seen mirrored, else 1. Where a triangle has no place in textures, it
+            is that of a projection along the axis of the world that it faces most, in metres. (n, 5) float32
     """
 
     points: Points
     diffuse: F32
     specular: F32
+    uv: F32
 
 
 def _unit(v: F32, otherwise: F32) -> F32:
@@ -81,9 +85,9 @@ def surface_at(
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
     columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
-    position, normal, tangent, diffuse, specular = map(np.concatenate, columns)
+    position, normal, tangent, diffuse, specular, uv = map(np.concatenate, columns)
     seed = np.arange(len(directions), dtype=np.uint32)
-    return Surface(Points(position, normal, tangent, seed), diffuse, specular)
+    return Surface(Points(position, normal, tangent, seed), diffuse, specular, uv)
 
 
 def _surface_at(
@@ -94,7 +98,7 @@ def _surface_at(
     pixel_angle: float,
     origin: F32 | None,
 ) -> tuple[F32, ...]:
-    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular. (n, 3) float32 each"""
+    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular, uv."""
     hit = hits.face >= 0
     corners = geometry.faces[np.maximum(hits.face, 0)]
     p = geometry.positions[corners]
@@ -110,6 +114,7 @@ def _surface_at(
     uv = (geometry.uvs[corners] * b).sum(axis=1)
     position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
     diffuse, specular = np.ones((2, *position.shape), np.float32)
+    footprint = np.zeros(len(uv), np.float32)
     if materials and origin is not None:
         (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
         uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
@@ -127,13 +132,57 @@ def _surface_at(
                 mapped = MipMap.of(m.normal_map).sample(uv[rows], footprint[rows])
                 normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
     normal = _towards(normal, directions)
+    tangent = _across(tangents[:, :3], normal)
+    place = _in_texture(p, geometry.uvs[corners], uv, normal, tangent)
+    place[:, 2] = footprint
+    is_flat = place[:, 4] == 0
+    if is_flat.any():
+        side = (np.where(hit, hits.distance, 1.0) * pixel_angle)[is_flat]
+        place[is_flat] = _projected(position[is_flat], face_normal[is_flat], normal[is_flat], tangent[is_flat], side)
     return (
         np.where(hit[:, None], position, directions).astype(np.float32),
         np.where(hit[:, None], normal, -directions).astype(np.float32),
-        _across(tangents[:, :3], normal),
+        tangent,
         diffuse,
         specular,
+        place.astype(np.float32),
     )
+
+
+def _in_texture(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
+    """Where points lie in textures, but for the footprint, and how textures lie there; see `Surface.uv`.
+
+    Args:
+        p, uvs: corners of their triangles. (n, 3, 3), (n, 3, 2). uv: of the points. (n, 2)
+        normal, tangent: of the points. (n, 3) each
+    Returns:
+        (n, 5); the last is 0 where a triangle has no area in textures.
+    """
+    e, d = p[:, 1:] - p[:, :1], uvs[:, 1:] - uvs[:, :1]
+    area = d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1]
+    sign = np.sign(area)[:, None]
+    along_u = sign * (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:])
+    along_v = sign * (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1])
+    x, y = np.einsum("nc,nc->n", along_u, tangent), np.einsum("nc,nc->n", along_u, np.cross(normal, tangent))
+    is_upright = np.einsum("nc,nc->n", np.cross(normal, along_u), along_v) < 0  # v runs down
+    turn, none = np.arctan2(y, x), np.zeros(len(uv))
+    return np.asarray(np.column_stack([uv, none, turn, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
+
+
+def _projected(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
+    """Places of a texture that is projected along the axes of the world, a metre wide; see `Surface.uv`.
+
+    Args:
+        position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, metres. (n,)
+    """
+    axis = np.abs(face_normal).argmax(axis=1)
+    sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
+    across = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
+    up = np.cross(sign[:, None] * np.eye(3)[axis], across)
+    u, v = np.einsum("nc,nc->n", position, across), -np.einsum("nc,nc->n", position, up)
+    x = np.einsum("nc,nc->n", across, tangent)
+    y = np.einsum("nc,nc->n", across, np.cross(normal, tangent))
+    return np.asarray(np.column_stack([u, v, side, np.arctan2(y, x), np.ones(len(u))]))
 
 
 def _off_edges(b: F32, p: F32, twice_area: F32, epsilon: float) -> F32:

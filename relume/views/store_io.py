@@ -75,3 +75,18 @@ def towards_eye(camera: Camera, position: F32) -> F32:
     """Find the unit directions from places (n, 3) to a camera: the wo of what it sees there. (n, 3) float32"""
     towards = camera.to_world[:3, 3].astype(np.float32) - position
     return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float32)
+
+
+def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
+    """Read where samples of a view lie in textures; None in stores that do not say so.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+    Returns:
+        See `relume.trace.surface.Surface`. (stop - start, 5) float32
+    """
+    try:
+        store.shape(f"views/{k}/uv")
+    except StoreError:
+        return None
+    return np.asarray(store.read(f"views/{k}/uv", start, stop), np.float32)

@@ -19,7 +19,7 @@ from relume.project.sent import Sent
 from relume.scene.model import Camera
 from relume.trace.view_samples import BACKGROUND
 from relume.views.sharing import sharing
-from relume.views.store_io import read_camera, read_gather_rays, read_points, read_seeds, towards_eye
+from relume.views.store_io import read_camera, read_gather_rays, read_points, read_seeds, read_uv, towards_eye
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
@@ -108,7 +108,8 @@ class View:
             visible = np.empty((rows.stop - rows.start, 0), np.uint8)
         points = self.points(material)
         gathered = () if reflected is None else (self.gather_rays(material, reflected),)
-        return Receivers(points, towards_eye(self.camera, points.position), visible, (*gathered, *local))
+        uv = read_uv(self.store, self.index, rows.start, rows.stop)
+        return Receivers(points, towards_eye(self.camera, points.position), visible, (*gathered, *local), uv)
 
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""

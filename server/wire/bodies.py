@@ -144,7 +144,8 @@ class MaterialMapBody(Body):
 
 
 class ModelBody(Body):
-    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured (see `data`)."""
+    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, and `data_prefix`
+    how the names of such data begin (see `data`)."""
 
     model: str
     label: str
@@ -152,6 +153,7 @@ class ModelBody(Body):
     source: str
     texture: str
     needs_data: bool
+    data_prefix: str | None
     parameters: list[ParameterBody]
     curves: list[CurveBody]
 
@@ -187,6 +189,28 @@ class MeasuredBody(Body):
     thumbnail: str
     lobes_error: tuple[float, float, float]
     homomorphic_error: tuple[float, float, float]
+
+
+class BtfBody(Body):
+    """A bidirectional texture; looks name it by `data`, `terms` is how it begins.
+
+    `synthetic` says which geometry it was rendered from; null where it was measured. `error` is the relative RMS of the
+    compression by how many components are used, from none on; `ratio` what is saved by it.
+    """
+
+    id: str
+    data: str
+    name: str
+    created: str
+    terms: list[dict[str, Any]]
+    thumbnail: str
+    synthetic: str | None
+    size: tuple[int, int]
+    directions: int
+    clusters: int
+    components: int
+    error: tuple[float, ...]
+    ratio: float
 
 
 class EnvironmentBody(Body):

@@ -79,7 +79,7 @@ def test_rest_imports_lists_shows_and_deletes(home, red, tmp_path):
         assert ball.shape == (64, 64, 3)
         assert ball[16:48, 16:48, 0].mean() > 1.5 * ball[16:48, 16:48, 2].mean()
         needing = [m["model"] for m in client.get("/api/models").json() if m["needs_data"]]
-        assert needing == ["measured_lv", "measured_hd", "measured_hf"]
+        assert needing == ["measured_lv", "measured_hd", "measured_hf", "measured_btf"]
         assert client.delete(f"{url}/{made['id']}").status_code == 204
         assert client.get(url).json() == []
         assert client.get(f"{url}/{made['id']}").status_code == 404

@@ -21,9 +21,9 @@ export function defaultTerm(model: ModelBody): Term {
   };
 }
 
-/** The models that a term can take: those that are measured only where it names a measured material. */
+/** The models that a term can take: those that are measured only where it names a measurement of their kind. */
 export function modelsFor(term: Term | null, models: readonly ModelBody[]): readonly ModelBody[] {
-  return models.filter((model) => !model.needs_data || term?.data !== undefined);
+  return models.filter(({ data_prefix: prefix }) => prefix === null || term?.data?.startsWith(prefix) === true);
 }
 
 /** The term under another model: colour and texture stay, and parameters of the same name. Drawn curves belong to
@@ -35,6 +35,6 @@ export function withModel(term: Term, name: string, models: readonly ModelBody[]
     model.parameters.map((info) => [info.name, term.params?.[info.name] ?? info.default]),
   );
   const { data, ...others } = term;
-  const measured = model.needs_data && data !== undefined ? { data } : {};
+  const measured = model.data_prefix !== null && data?.startsWith(model.data_prefix) === true ? { data } : {};
   return { ...others, ...measured, model: name, params, curves: {} };
 }

@@ -6,10 +6,12 @@ import { selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { NavigationMap } from "./NavigationMap";
 import {
+  BTFS,
   DRAG_TYPE,
   fittedModels,
   group,
   groups,
+  hasKinds,
   importMeasured,
   MEASURED,
   model,
@@ -26,7 +28,7 @@ function Filters() {
       <select
         aria-label="Kind"
         value={group.value}
-        disabled={model.value === MEASURED}
+        disabled={!hasKinds.value}
         onChange={(event) => (group.value = event.currentTarget.value)}
       >
         <option value="all">all kinds</option>
@@ -41,6 +43,7 @@ function Filters() {
           </option>
         ))}
         <option value={MEASURED}>imported measurements</option>
+        <option value={BTFS}>textures from all sides</option>
       </select>
     </div>
   );
@@ -100,6 +103,12 @@ export function LibraryPanel() {
       )}
       {shown.value.length === 0 && query.value === "" && model.value === MEASURED && (
         <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>
+      )}
+      {shown.value.length === 0 && query.value === "" && model.value === BTFS && (
+        <p class="library-help">
+          No such textures yet. In a terminal, <code>relume material make-btf weave</code> renders a synthetic cloth, and{" "}
+          <code>relume material import FILE.zip</code> takes measured images.
+        </p>
       )}
       <ul class="library-balls">
         {shown.value.map((material) => (

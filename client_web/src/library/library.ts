@@ -2,9 +2,9 @@
 import { computed, signal } from "@preact/signals";
 import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
-import { listMaterials, listMeasured, materialThumbnail } from "../net/api";
+import { listBtfs, listMaterials, listMeasured, materialThumbnail } from "../net/api";
 import { uploadMeasured } from "../net/upload";
-import type { MaterialBody, MeasuredBody, Term } from "../protocol";
+import type { BtfBody, MaterialBody, MeasuredBody, Term } from "../protocol";
 import { togglePanel } from "../state/room";
 import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
@@ -12,6 +12,8 @@ import { attempt, note } from "../ui/toasts";
 export const DRAG_TYPE = "application/x-relume-material";
 /** Among the models: what was measured and is not fitted. */
 export const MEASURED = "measured";
+/** And textures that look different from every side. */
+export const BTFS = "btfs";
 
 /** What a ball of the library stands for. */
 interface Entry {
@@ -20,7 +22,7 @@ interface Entry {
   about: string;
   thumbnail: string;
   terms: Term[];
-  /** Of its fit, or `MEASURED`. */
+  /** Of its fit, `MEASURED` or `BTFS`. */
   model: string;
   /** What it is made of; measurements do not say. */
   group: string | null;
@@ -28,6 +30,7 @@ interface Entry {
 
 export const library = signal<MaterialBody[]>([]);
 const measured = signal<MeasuredBody[]>([]);
+const btfs = signal<BtfBody[]>([]);
 /** What was typed to find a material: all of its words are in what an entry is called, or in where it is from. */
 export const query = signal("");
 export const group = signal("all");
@@ -48,11 +51,24 @@ function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): Entry {
   return { id, name, about, thumbnail, terms, model: MEASURED, group: null };
 }
 
-const entries = computed<Entry[]>(() => [...library.value.map(fittedEntry), ...measured.value.map(measuredEntry)]);
+function btfEntry({ id, name, thumbnail, terms, synthetic, size, error }: BtfBody): Entry {
+  const from = synthetic === null ? "measured" : "synthetic, rendered from a small geometry";
+  const missed = (100 * (error.at(-1) ?? 0)).toFixed(1);
+  const about = `${name}, ${from}. ${size[1]}×${size[0]} texels, kept to ${missed} %.`;
+  return { id, name, about, thumbnail, terms, model: BTFS, group: null };
+}
+
+const entries = computed<Entry[]>(() => [
+  ...library.value.map(fittedEntry),
+  ...measured.value.map(measuredEntry),
+  ...btfs.value.map(btfEntry),
+]);
+/** Whether what is shown has kinds: measurements have none. */
+export const hasKinds = computed(() => model.value !== MEASURED && model.value !== BTFS);
 
 /** One entry a material and source, of the model and group that are chosen. */
 export const shown = computed<Entry[]>(() => {
-  const isOfGroup = (entry: Entry) => model.value === MEASURED || group.value === "all" || entry.group === group.value;
+  const isOfGroup = (entry: Entry) => !hasKinds.value || group.value === "all" || entry.group === group.value;
   return entries.value.filter((entry) => entry.model === model.value && isOfGroup(entry) && isFound(entry, query.value));
 });
 
@@ -63,8 +79,9 @@ export function isFound({ name, about }: Pick<Entry, "name" | "about">, typed: s
 
 export async function openLibrary(): Promise<void> {
   togglePanel("library");
-  if (library.value.length > 0) return;
   await attempt(async () => {
+    btfs.value = await listBtfs(); // commands make them meanwhile
+    if (library.value.length > 0) return;
     [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
   });
 }

@@ -11,6 +11,7 @@ import type {
   LooksBody,
   MaterialBody,
   MaterialMapBody,
+  BtfBody,
   MeasuredBody,
   ModelBody,
   Problem,
@@ -80,6 +81,7 @@ export async function takeBuiltIn(name: string): Promise<SceneBody> {
 }
 export const listModels = () => getJson<ModelBody[]>("/api/models");
 export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
+export const listBtfs = () => getJson<BtfBody[]>("/api/materials/btf");
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
 export const materialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);

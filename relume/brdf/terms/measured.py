@@ -19,7 +19,7 @@ import numpy as np
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.term import F64, Angle, Curve, Params, Term
 from relume.errors import ParameterError
-from relume.measured.asset_store import material
+from relume.measured.asset_store import STORE, material
 from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, Part, quotients
 
 _ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D, Angle.THETA_O: THETA_O}
@@ -94,7 +94,7 @@ def _term(model: str, label: str, part: Part, source: str, texture: str, text: s
         help=text,
         settle=_settled(part),
         num_channels=3,
-        needs_data=True,
+        data=STORE,
     )
 
 

@@ -23,6 +23,7 @@ from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import LocalRays, Receivers
+from relume.project.texels import texel_rows
 from relume.trace.local_shadows import arriving
 from relume.trace.preview_light import PreviewLight
 from relume.views.compose import add_even
@@ -103,7 +104,10 @@ class MovedLights:
         rows = np.zeros((material.num_samples, 3, 1), np.float32)
 
         def add(start: int, stop: int) -> None:
-            RayProjector(live.term, contraction, points, stop - start).add(start, stop, rows[start:stop])
+            if live.term.texels is not None and points.uv is not None:
+                rows[start:stop, :, 0] = texel_rows(live.term.texels, None, points, start, stop)
+            else:
+                RayProjector(live.term, contraction, points, stop - start).add(start, stop, rows[start:stop])
 
         for_shares(add, len(rows))
         return Shaded.of(rows[:, :, 0])

@@ -1,0 +1,64 @@
+"""`relume material import`: keeps a measured material, or a BTF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import Data
+
+_BTF = ".zip"
+
+
+def material_import(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.binary|FILE.zip",
+            help="Isotropic BRDF in the MERL layout, or images named by light and view (UBO2003).",
+        ),
+    ],
+    name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
+    error: Annotated[float, typer.Option(help="Of a BTF: relative RMS that compression may miss.")] = 0.05,
+    data: Data = None,
+) -> None:
+    """Import a measured material; print its name in looks, and how well it is kept."""
+    import json
+
+    from cli.data_folder import open_settings
+    from relume.asset_store import check_name
+    from relume.measured.asset_store import keep
+    from worker.paths import materials_path
+
+    folder, called = open_settings(data).data, check_name(name or file.stem)
+    if file.suffix.lower() == _BTF:
+        _import_btf(folder, file, called, error)
+        return
+    record = keep(materials_path(folder), file, called)
+    typer.echo(record.data)
+    typer.echo(f"  {json.dumps({'terms': record.terms()})}")
+    for model, errors in (
+        ("measured_lv + measured_hd", record.lobes_error),
+        ("measured_hf", record.homomorphic_error),
+    ):
+        typer.echo(f"  {model}: curves alone err by {', '.join(f'{error:.1%}' for error in errors)} (red, green, blue)")
+
+
+def _import_btf(folder: Path, file: Path, name: str, bound: float) -> None:
+    from cli.interrupts import until_interrupted
+    from cli.material.words import tell
+    from relume.btf.compress import compress
+    from relume.btf.shelf import keep
+    from relume.btf.zips import ZippedBtf
+    from worker.paths import btfs_path
+
+    tell(
+        until_interrupted(
+            file.name,
+            lambda progress, cancelled: keep(
+                btfs_path(folder), file, name, None, lambda: compress(ZippedBtf(file), bound, progress, cancelled)
+            ),
+        )
+    )

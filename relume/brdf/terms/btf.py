@@ -1,0 +1,84 @@
+"""measured_btf: a bidirectional texture function, each texel with a BRDF of its own (Müller 2004).
+
+As a BRDF it is the mean of its texels: so it is where no texel can be told, in light that it sends to other surfaces.
+Where a surface is seen, `relume.project.texels` finds each texel's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any, NoReturn
+
+import numpy as np
+
+from relume.brdf.term import Parameter, Term
+from relume.btf.average import mean_brdf
+from relume.btf.compress import MOST_COMPONENTS
+from relume.btf.eigen import F32, EigenBtf
+from relume.btf.shelf import STORE, btf
+from relume.errors import ParameterError
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """How a surface is covered with a BTF.
+
+    Attributes:
+        btf: with the components that are used. tables: of it, see `EigenBtf.tables`.
+        scale: how often it repeats along a unit of texture coordinates. rotation: counter-clockwise, radians.
+    """
+
+    btf: EigenBtf
+    tables: F32
+    scale: float
+    rotation: float
+
+
+def _without_data(*directions: object) -> NoReturn:
+    raise ParameterError("data", None, "the data of a BTF that was imported or made")
+
+
+@lru_cache(maxsize=3)
+def _tables(data: str, components: int) -> tuple[EigenBtf, F32]:
+    found = btf(data).with_components(components)
+    return found, found.tables()
+
+
+def _settle(fixed: Mapping[str, Any]) -> dict[str, Any]:
+    found, tables = _tables(fixed["data"], int(fixed["components"]))
+    rotation = float(np.radians(fixed["rotation"]))
+    return {
+        "quotient": partial(mean_brdf, found.rings, found.average, rotation),
+        "texels": Texels(found, tables, float(fixed["scale"]), rotation),
+    }
+
+
+MEASURED_BTF = Term(
+    model="measured_btf",
+    label="Measured texture (BTF)",
+    parameters=(
+        Parameter("scale", "Repeats", 0.01, 1000.0, 1.0, "", "log", "How often it repeats along the texture's side."),
+        Parameter("rotation", "Rotation", -180.0, 180.0, 0.0, "°", "linear", "Turns the texture on the surface."),
+        Parameter(
+            "components",
+            "Quality",
+            0,
+            MOST_COMPONENTS,
+            MOST_COMPONENTS,
+            "",
+            "linear",
+            "Components that are summed for each texel: fewer are quicker, and nearer to the mean.",
+        ),
+    ),
+    curves=(),
+    quotient=_without_data,
+    source="Müller 2004: B ≈ M + Σ α E",
+    texture="diffuse",
+    help="A texture that looks different from every side and in every light: cloth, pebbles, leather.",
+    fixed=("scale", "rotation", "components"),
+    settle=_settle,
+    num_channels=3,
+    data=STORE,
+)

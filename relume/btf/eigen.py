@@ -1,0 +1,94 @@
+"""A compressed BTF: means and eigen-BRDFs of clusters of texels, and each texel's weights (Müller 2004, section 3).
+
+    B_x(v, l) ≈ M_k(v, l) + Σ_j α_j(x) E_kj(v, l),   k = k(x)
+
+Values are radiance towards v for light of one unit of irradiance across its direction l: the cosine is in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.btf.rings import Rings
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I8 = NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class EigenBtf:
+    """What is kept of a BTF of V view and L light directions, in K clusters with C components each.
+
+    Attributes:
+        rings: of both directions.
+        levels: first texel, height, width of the texels and of their means over 2 × 2, over 4 × 4, and so on.
+            (levels, 3) int32
+        cluster: of each texel of each level. (texels,) uint8
+        weight: α. (texels, C) float16
+        mean: M. (K, V, L, 3) float16
+        eigen: E, in steps of `step`. (K, C, V, L, 3) int8
+        step: (K, C) float32
+        average: of all texels. (V, L, 3) float32
+        error: of the texels, relative RMS, by how many components are used, from none on. (C + 1,)
+    """
+
+    rings: Rings
+    levels: NDArray[np.int32]
+    cluster: NDArray[np.uint8]
+    weight: NDArray[np.float16]
+    mean: NDArray[np.float16]
+    eigen: I8
+    step: F32
+    average: F32
+    error: tuple[float, ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width in texels."""
+        return int(self.levels[0, 1]), int(self.levels[0, 2])
+
+    @property
+    def num_components(self) -> int:
+        """C."""
+        return int(self.weight.shape[1])
+
+    @property
+    def num_bytes(self) -> int:
+        """What is kept, the coarser levels left out, which files of measurements do not have either."""
+        texels = self.size[0] * self.size[1]
+        of_texels = texels * (1 + self.weight.itemsize * self.num_components)
+        return of_texels + self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
+
+    @property
+    def measured_bytes(self) -> int:
+        """The same uncompressed: a byte for each channel of each image, as measurements are published."""
+        directions = self.rings.num_directions
+        return self.size[0] * self.size[1] * directions * directions * 3
+
+    def with_components(self, num: int) -> EigenBtf:
+        """Use the first of them alone."""
+        kept = max(0, min(num, self.num_components))
+        return replace(
+            self,
+            weight=self.weight[:, :kept],
+            eigen=self.eigen[:, :kept],
+            step=self.step[:, :kept],
+            error=self.error[: kept + 1],
+        )
+
+    def tables(self) -> F32:
+        """Means and components for sums over light: (K, V, 1 + C, 3, L) float32."""
+        components = self.eigen.astype(np.float32) * self.step[:, :, None, None, None]
+        both = np.concatenate([self.mean[:, None].astype(np.float32), components], axis=1)
+        return np.ascontiguousarray(both.transpose(0, 2, 1, 4, 3))
+
+    def texel(self, number: int) -> F64:
+        """The BRDF times cosine of a texel. (V, L, 3)"""
+        k = int(self.cluster[number])
+        components = self.eigen[k].astype(np.float64) * self.step[k][:, None, None, None]
+        told = np.tensordot(self.weight[number].astype(np.float64), components, 1)
+        return np.asarray(self.mean[k].astype(np.float64) + told)

@@ -1,0 +1,126 @@
+"""The directions that a BTF was measured in: rings about the normal, and how values between them are found.
+
+Between two rings the mean goes along θ, on each ring along φ: four directions, whose weights are continuous everywhere
+and sum to one. There is no seam where φ is 0, and none at the pole. Beyond the last ring it is the last ring's value;
+for light times what is left of the cosine, which a BTF's values contain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import MaterialError
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+UBO_81 = ((0.0, 1), (15.0, 6), (30.0, 12), (45.0, 18), (60.0, 20), (75.0, 24))
+"""Degrees of θ and directions of each ring of the Bonn measurements, φ from 0 on (Sattler 2003)."""
+MOST_DIRECTIONS = 400
+_NO_LESS = 4  # directions of rings but the first: fewer leave no room for a mean
+
+
+class Rings(NamedTuple):
+    """Rings of directions, numbered from the pole outwards, on each from φ = 0 on.
+
+    Attributes:
+        theta: of each ring, rising from 0, radians. (rings,) float32
+        first: number of the first direction of each, then the number of all. (rings + 1,) int32
+    """
+
+    theta: F32
+    first: NDArray[np.int32]
+
+    @property
+    def num_directions(self) -> int:
+        """Of all rings."""
+        return int(self.first[-1])
+
+
+def rings_of(described: Sequence[tuple[float, int]]) -> Rings:
+    """Rings from their θ in degrees and how many directions each has.
+
+    Raises:
+        MaterialError: they do not begin with the pole, do not rise, or are too many.
+    """
+    theta, count = np.array([row[0] for row in described]), np.array([row[1] for row in described], np.int64)
+    rises = len(theta) >= 2 and theta[0] == 0 and bool((np.diff(theta) > 0).all()) and theta[-1] < 90
+    if not rises or count[0] != 1 or (count[1:] < _NO_LESS).any() or count.sum() > MOST_DIRECTIONS:
+        raise MaterialError(
+            "the directions of the BTF are no rings about the normal: one at the pole, then at least "
+            f"{_NO_LESS} on each ring above the horizon, at most {MOST_DIRECTIONS} in all"
+        )
+    return Rings(np.radians(theta).astype(np.float32), np.concatenate([[0], np.cumsum(count)]).astype(np.int32))
+
+
+@lru_cache(maxsize=1)
+def ubo_rings() -> Rings:
+    """Those of `UBO_81`."""
+    return rings_of(UBO_81)
+
+
+def directions(rings: Rings) -> F64:
+    """All of them, unit, local frame, z = normal. (n, 3)"""
+    count = np.diff(rings.first)
+    theta = np.repeat(rings.theta.astype(np.float64), count)
+    phi = np.concatenate([2 * np.pi * np.arange(n) / n for n in count])
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
+    """Find the four directions about one, and their weights.
+
+    Args:
+        rings: the `Rings`. x, y, z: the direction, unit, above the horizon.
+        index: written. (4,) int32. weight: written. (4,) float32
+    Returns:
+        What is left of the cosine beyond the last ring: z over the last ring's, at most one.
+    """
+    theta_last = rings.theta[rings.theta.shape[0] - 1]
+    theta = math.acos(min(max(z, np.float32(0)), np.float32(1)))
+    lower = 0
+    while lower < rings.theta.shape[0] - 2 and theta >= rings.theta[lower + 1]:
+        lower += 1
+    share: Any = (theta - rings.theta[lower]) / (rings.theta[lower + 1] - rings.theta[lower])
+    share = np.float32(min(max(share, 0.0), 1.0))
+    turn = np.float32(math.atan2(y, x) / (2 * math.pi))
+    turn -= math.floor(turn)
+    for k in range(2):
+        first, count = rings.first[lower + k], rings.first[lower + k + 1] - rings.first[lower + k]
+        place = np.float32(turn * count)
+        near: Any = min(np.int64(place), count - 1)
+        part = np.float32(place - near)
+        of_ring = share if k == 1 else np.float32(1) - share
+        index[2 * k], index[2 * k + 1] = first + near, first + (near + 1) % count
+        weight[2 * k], weight[2 * k + 1] = of_ring * (np.float32(1) - part), of_ring * part
+    return np.float32(min(max(z, np.float32(0)) / math.cos(theta_last), np.float32(1)))
+
+
+def taps_numpy(rings: Rings, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
+    """Do as `taps` for directions (n, 3), in plain NumPy: its oracle.
+
+    Returns:
+        Directions (n, 4), weights (n, 4), what is left of the cosine (n,).
+    """
+    theta = np.arccos(np.clip(w[:, 2], 0, 1))
+    all_theta, first = rings.theta.astype(np.float64), rings.first.astype(np.int64)
+    lower = np.clip(np.searchsorted(all_theta, theta, side="right") - 1, 0, len(all_theta) - 2)
+    share = np.clip((theta - all_theta[lower]) / (all_theta[lower + 1] - all_theta[lower]), 0, 1)
+    turn = np.arctan2(w[:, 1], w[:, 0]) / (2 * np.pi) % 1.0
+    index, weight = [], []
+    for ring, of_ring in ((lower, 1 - share), (lower + 1, share)):
+        count = first[ring + 1] - first[ring]
+        near = np.minimum((turn * count).astype(np.int64), count - 1)
+        part = turn * count - near
+        index += [first[ring] + near, first[ring] + (near + 1) % count]
+        weight += [of_ring * (1 - part), of_ring * part]
+    left = np.minimum(np.maximum(w[:, 2], 0) / np.cos(all_theta[-1]), 1)
+    return np.stack(index, axis=1), np.stack(weight, axis=1), left

@@ -1,0 +1,162 @@
+"""BTFs that were imported or made; `relume.asset_store` keeps them.
+
+    <folder>/<id>/cluster.npy, weight.npy, …    arrays of `relume.btf.eigen.EigenBtf`
+                  btf.json                      name, what it is, how well it is kept
+
+Look documents name one as "btf:<id>".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.asset_store import AssetStore
+from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
+from relume.btf.eigen import EigenBtf
+from relume.btf.rings import rings_of
+from relume.errors import MaterialError
+
+STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
+_ARRAYS = {
+    "levels": np.int32, "cluster": np.uint8, "weight": np.float16, "mean": np.float16, "eigen": np.int8,
+    "step": np.float32, "average": np.float32,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class BtfRecord:
+    """What lists show of a BTF.
+
+    Attributes:
+        created: seconds since 1970.
+        synthetic: which geometry it was rendered from; None where it was measured.
+        size: height and width, texels. directions: of light, and as many of view.
+        clusters, components: that are kept. error: relative RMS, by how many components are used, from none on.
+        ratio: of what was measured, a byte a channel, to what is kept.
+    """
+
+    id: str
+    name: str
+    created: float
+    synthetic: str | None
+    size: tuple[int, int]
+    directions: int
+    clusters: int
+    components: int
+    error: tuple[float, ...]
+    ratio: float
+
+    @property
+    def data(self) -> str:
+        """The name by which look documents mean it."""
+        return STORE.prefix + self.id
+
+    def terms(self) -> list[dict[str, Any]]:
+        """It as terms of a look, without a texture of the scene's: it is its own."""
+        return [{"model": "measured_btf", "data": self.data, "texture": None}]
+
+
+def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Callable[[], EigenBtf]) -> BtfRecord:
+    """Keep a BTF under the hash of what it came from; the same twice is the same BTF, its newest name wins.
+
+    Args:
+        folder: of the asset store. source: the file that was imported, or says what was made.
+        name: what people call it. synthetic: which geometry it was rendered from; None where it was measured.
+        make: reads or renders, and compresses; not called where it is here already.
+    Raises:
+        MaterialError: the store is full. And what `make` raises; then nothing is kept.
+    """
+
+    def fill(made: Path) -> dict[str, Any]:
+        found = make()
+        for array in _ARRAYS:
+            np.save(made / f"{array}.npy", getattr(found, array))
+        return {
+            "synthetic": synthetic,
+            "rings": [
+                [float(np.degrees(theta)), int(count)]
+                for theta, count in zip(found.rings.theta, np.diff(found.rings.first), strict=True)
+            ],
+            "error": list(found.error),
+            "ratio": found.measured_bytes / found.num_bytes,
+        }
+
+    return get_record(folder, STORE.keep(folder, source, name, fill))
+
+
+def records(folder: Path) -> list[BtfRecord]:
+    """All BTFs of a folder, newest first."""
+    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
+    return sorted(found, key=lambda record: (-record.created, record.name))
+
+
+def get_record(folder: Path, identity: str) -> BtfRecord:
+    """One of them. Raises NotFoundError; MaterialError where its files are damaged."""
+    path = STORE.path(folder, identity)
+    document, found = STORE.read(path), _load(path)
+    synthetic, ratio = document.get("synthetic"), document.get("ratio")
+    if not (synthetic is None or isinstance(synthetic, str)) or not isinstance(ratio, float):
+        raise STORE.damaged(path)
+    return BtfRecord(
+        identity, document["name"], document["created"], synthetic, found.size, found.rings.num_directions,
+        len(found.mean), found.num_components, found.error, ratio,
+    )  # fmt: skip
+
+
+def btf(data: str) -> EigenBtf:
+    """What a look's `data` names.
+
+    Raises:
+        NotFoundError: it is not here. MaterialError: its files are damaged.
+    """
+    return _load(STORE.found(data))
+
+
+@lru_cache(maxsize=4)
+def _load(path: Path) -> EigenBtf:
+    document = STORE.read(path)
+    try:
+        rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]])
+        error = tuple(float(one) for one in document["error"])
+        arrays = {name: np.load(path / f"{name}.npy", allow_pickle=False) for name in _ARRAYS}
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
+        raise STORE.damaged(path) from problem
+    if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
+        raise STORE.damaged(path)
+    found = EigenBtf(rings=rings, error=error, **arrays)
+    if not _is_sound(found):
+        raise STORE.damaged(path)
+    return found
+
+
+def _is_sound(found: EigenBtf) -> bool:
+    """Whether its arrays fit each other: kernels read them without looking."""
+    directions = found.rings.num_directions
+    clusters, components = len(found.mean), len(found.error) - 1
+    if not (1 <= clusters <= MOST_CLUSTERS and 0 <= components <= MOST_COMPONENTS):
+        return False
+    if found.levels.ndim != 2 or found.levels.shape[1] != 3 or not 1 <= len(found.levels) <= 32:
+        return False
+    first, height, width = found.levels.T.astype(np.int64)
+    texels = int((height * width).sum())
+    ends = np.concatenate([[0], np.cumsum(height * width)[:-1]])
+    return bool(
+        (height > 0).all()
+        and (width > 0).all()
+        and height[0] * width[0] <= MOST_TEXELS
+        and (first == ends).all()
+        and found.cluster.shape == (texels,)
+        and int(found.cluster.max()) < clusters
+        and found.weight.shape == (texels, components)
+        and found.mean.shape == (clusters, directions, directions, 3)
+        and found.eigen.shape == (clusters, components, directions, directions, 3)
+        and found.step.shape == (clusters, components)
+        and found.average.shape == (directions, directions, 3)
+        and all(np.isfinite(array).all() for array in (found.weight, found.mean, found.step, found.average))
+    )

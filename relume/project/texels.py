@@ -1,0 +1,231 @@
+"""What surfaces send whose every texel has a BRDF of its own: the sum over light, texel by texel.
+
+    L(x, ωo) = Σ_j α_j(x) Σ_l E_kj(ωo, l) a_l(x),   a_l = Σ_s w_s hat_l(ω_s)
+
+where a is all light that arrives at a place, shared out to the directions l in which the BTF is known: its values are
+linear between these (`relume.btf.rings`), so that the sum over light is exact for what is known. The weights w have no
+cosine: it is in the BTF's values.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.terms.btf import Texels
+from relume.btf.rings import Rings, taps, taps_numpy
+from relume.light.triangles import TriangleLights
+from relume.project.receivers import Listed, Rays, Receivers
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_LEAST_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _turned(x, y, axis):  # type: ignore[no-untyped-def]
+    """Bring a direction of a shading frame into the texture's, whose x and y axes are there axis[:2] and axis[2:]."""
+    return axis[0] * x + axis[1] * y, axis[2] * x + axis[3] * y
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_triangles(rings, normal, tangent, axes, visible, direction, irradiance, out):  # type: ignore[no-untyped-def]
+    """Add light triangles that n points see. out: (n, 3, L)"""
+    index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
+    for p in range(out.shape[0]):
+        n, t = normal[p], tangent[p]
+        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+        for m in range(direction.shape[0]):
+            if not (visible[p, m >> 3] >> (m & 7)) & 1:
+                continue
+            x, y, z = direction[m, 0], direction[m, 1], direction[m, 2]
+            up = n[0] * x + n[1] * y + n[2] * z
+            if up <= 0:
+                continue
+            lx, ly = _turned(t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z, axes[p])
+            left = taps(rings, lx, ly, up, index, weight)
+            for k in range(4):
+                for channel in range(3):
+                    out[p, channel, index[k]] += left * weight[k] * irradiance[m, channel]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_listed(rings, axes, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
+    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (n, 3, L)"""
+    index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
+    for p in range(out.shape[0]):
+        for ray in range(first[p], first[p + 1]):
+            up = wi[2, ray]
+            lx, ly = _turned(wi[0, ray], wi[1, ray], axes[p])
+            left = taps(rings, lx, ly, up, index, weight) / max(up, _LEAST_COSINE)
+            for k in range(4):
+                for channel in range(3):
+                    out[p, channel, index[k]] += left * weight[k] * irradiance[channel, ray]
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _folded(i, count):  # type: ignore[no-untyped-def]
+    """Number of a texel that repeats without end."""
+    rest = i % count
+    return rest + count if rest < 0 else rest
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # type: ignore[no-untyped-def]
+    """Find the texels about a place, of the two levels about a footprint, as sums of each cluster's weights.
+
+    Args:
+        levels, cluster, weight: of the BTF. u, v: the place, in repeats. footprint: side of it, in repeats.
+        found: clusters, written. (8,) int32. sums: of their means' and components' weights, written. (8, 1 + C)
+    Returns:
+        How many clusters there are.
+    """
+    finest = max(levels[0, 1], levels[0, 2])
+    place = math.log2(max(footprint * finest, np.float32(1)))
+    coarsest = levels.shape[0] - 1
+    level: Any = min(place, np.float32(coarsest))
+    lower: Any = min(np.int64(level), max(coarsest - 1, 0))
+    share = np.float32(level - lower)
+    num = 0
+    for step in range(2):
+        of_level = share if step == 1 else np.float32(1) - share
+        if of_level <= 0 or lower + step > coarsest:
+            continue
+        first, height, width = levels[lower + step]
+        x, y = u * width - np.float32(0.5), v * height - np.float32(0.5)
+        left, upper = math.floor(x), math.floor(y)
+        fx, fy = np.float32(x - left), np.float32(y - upper)
+        for corner in range(4):
+            across, down = corner & 1, corner >> 1
+            w = of_level * (fx if across == 1 else 1 - fx) * (fy if down == 1 else 1 - fy)
+            if w <= 0:
+                continue
+            texel = first + _folded(np.int64(upper) + down, height) * width + _folded(np.int64(left) + across, width)
+            slot = 0
+            while slot < num and found[slot] != cluster[texel]:
+                slot += 1
+            if slot == num:
+                found[slot] = cluster[texel]
+                sums[slot, :] = 0
+                num += 1
+            sums[slot, 0] += w
+            for j in range(weight.shape[1]):
+                sums[slot, 1 + j] += w * weight[texel, j]
+    return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: ignore[no-untyped-def]
+    """Sum what n points send.
+
+    Args:
+        arriving: (n, 3, L). wo: in shading frames. (n, 3). places: u and v in repeats, side of the footprint. (n, 3)
+        out: written. (n, 3)
+    """
+    levels, cluster, weight = texels
+    index, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
+    found, sums = np.empty(8, np.int32), np.empty((8, tables.shape[2]), np.float32)
+    for p in range(arriving.shape[0]):
+        out[p, :] = 0
+        if wo[p, 2] <= 0:
+            continue
+        vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
+        taps(rings, vx, vy, wo[p, 2], index, of_view)
+        num = _gather_texels(levels, cluster, weight, places[p, 0], places[p, 1], places[p, 2], found, sums)
+        for slot in range(num):
+            for tap in range(4):
+                if of_view[tap] <= 0:
+                    continue
+                of_cluster = tables[found[slot], index[tap]]
+                for j in range(tables.shape[2]):
+                    factor = of_view[tap] * sums[slot, j]
+                    for channel in range(3):
+                        total = np.float32(0)
+                        for light in range(tables.shape[4]):
+                            total += of_cluster[j, channel, light] * arriving[p, channel, light]
+                        out[p, channel] += factor * total
+        for channel in range(3):
+            out[p, channel] = max(out[p, channel], np.float32(0))
+
+
+class _Covered(NamedTuple):
+    """How points are covered.
+
+    Attributes:
+        axes: of the texture, as `_turned` wants them. (n, 4) float32. places: as `_send` does. (n, 3) float32
+    """
+
+    axes: F32
+    places: F32
+
+
+def _covered(texels: Texels, uv: F32) -> _Covered:
+    cosine, sine, u, up = math.cos(texels.rotation), math.sin(texels.rotation), uv[:, 0], -uv[:, 1]
+    x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
+    y = uv[:, 4:] * np.stack([-x[:, 1], x[:, 0]], axis=1)
+    axes = np.concatenate([cosine * x + sine * y, cosine * y - sine * x], axis=1)
+    # up in the texture is down in its coordinates
+    places = texels.scale * np.stack([cosine * u + sine * up, sine * u - cosine * up, uv[:, 2]], axis=1)
+    return _Covered(axes.astype(np.float32), places.astype(np.float32))
+
+
+def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receivers, start: int, stop: int) -> F32:
+    """Find what points send, texel by texel.
+
+    Args:
+        texels: how they are covered. lights: of the environment, None for rays alone.
+        receivers: all points; `uv` says where they are.
+        start, stop: those that are asked about.
+    Returns:
+        Radiance. (stop - start, 3) float32
+    """
+    assert receivers.uv is not None
+    rows, rings, found = slice(start, stop), texels.btf.rings, texels.btf
+    covered = _covered(texels, receivers.uv[rows])
+    arriving = np.zeros((stop - start, 3, rings.num_directions), np.float32)
+    n, t, wo = (np.ascontiguousarray(a[rows], np.float32) for a in (receivers.normal, receivers.tangent, receivers.wo))
+    if lights is not None and lights.num_lights and receivers.visible.shape[1]:
+        seen = np.ascontiguousarray(receivers.visible[rows])
+        _from_triangles(rings, n, t, covered.axes, seen, lights.direction, lights.irradiance, arriving)
+    for rays in receivers.rays:
+        _add_rays(rings, rays, receivers, covered.axes, start, stop, arriving)
+    local = np.stack([(t * wo).sum(axis=1), (np.cross(n, t) * wo).sum(axis=1), (n * wo).sum(axis=1)], axis=1)
+    out = np.empty((stop - start, 3), np.float32)
+    of_texels = found.levels, found.cluster, found.weight.astype(np.float32)
+    _send(rings, texels.tables, of_texels, arriving, covered.axes, np.ascontiguousarray(local), covered.places, out)
+    return out
+
+
+def _add_rays(rings: Rings, rays: Rays, receivers: Receivers, axes: F32, start: int, stop: int, out: F32) -> None:
+    most = (stop - start) * rays.rays_a_point
+    listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
+    rays.list_into(listed, receivers, start, stop)
+    _from_listed(rings, axes, listed.first, listed.wi, listed.irradiance, out)
+
+
+def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place: F64) -> F64:
+    """Do as `texel_rows` for one point under given lights, in plain NumPy: its oracle.
+
+    Args:
+        texels: how it is covered. directions: to lights, in the texture's frame, unit. (m, 3)
+        irradiance: of each light, across its direction. (m, 3)
+        wo: to the eye, in the texture's frame. (3,)
+        place: column and row, in texels of the finest level, from the middle of the first.
+    Returns:
+        (3,) float64
+    """
+    found, (height, width) = texels.btf, texels.btf.size
+    column, row = int(np.floor(place[0])), int(np.floor(place[1]))
+    value = np.zeros((found.rings.num_directions,) * 2 + (3,))
+    for down, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        share = abs(1 - across - (place[0] - column)) * abs(1 - down - (place[1] - row))
+        value += share * found.texel((row + down) % height * width + (column + across) % width)
+    light, of_light, left = taps_numpy(found.rings, directions)
+    view, of_view, _ = taps_numpy(found.rings, wo[None])
+    seen = np.einsum("a,alc->lc", of_view[0], value[view[0]])
+    return np.asarray(np.einsum("mk,m,mkc,mc->c", of_light, left, seen[light], irradiance).clip(0))

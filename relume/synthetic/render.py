@@ -1,0 +1,174 @@
+"""What a small geometry sends from each place of its plane to each side, lit from each: the values of its BTF.
+
+    B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx
+
+where an eye far off towards v sees the geometry through the texel. Eyes and lamps have a size, as lenses and lamps of
+measurements have: both are spread over `_SPREAD` about their directions, so that shadows and outlines between these
+follow from them. Light that comes straight is traced from what is
+seen; E_l is the irradiance by light that other faces have sent on, which do so as matt surfaces of the same
+reflectance ρ: found once for the middles of all faces, by rays to other faces, as often as it takes.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from relume.brdf.albedo import reflectance
+from relume.brdf.evaluate import eval_brdf
+from relume.btf.rings import Rings, directions
+from relume.synthetic.tile import Tile, levelled, repeated
+from relume.trace.embree import EmbreeScene
+from relume.trace.primary import Hits, trace_from
+from relume.trace.surface import any_tangent
+from relume.trace.visibility import trace_visibility
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_TIMES = 3  # periods beside the one that is looked at: at 75° a ray passes over one in a height of a quarter
+_OFF = 1e-5  # periods that rays begin off surfaces
+_RAYS_A_FACE = 96  # to other faces
+_BOUNCES = 5
+_ABOVE = 4.0  # periods above the plane that eyes' rays begin
+_PAIRS_AT_ONCE = 1 << 19
+_SPREAD = np.radians(7.5)  # about a direction, half of what is between two
+_GOLDEN = np.pi * (3 - 5**0.5)
+
+
+class _Places(NamedTuple):
+    """Places on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32"""
+
+    position: F32
+    normal: F32
+
+
+class SmallGeometry:
+    """A tile and what is beside it, ready to be lit and looked at.
+
+    Args:
+        tile: one period. rings: of directions to lights and to eyes. size: height and width of the texture, texels.
+        grid: places along each side of a texel that are looked at.
+        seed: of the rays between faces.
+    """
+
+    def __init__(self, tile: Tile, rings: Rings, size: tuple[int, int], grid: int, seed: int) -> None:
+        self.rings, self.size, self._grid, self._seed = rings, size, grid, seed
+        self._terms = [{"params": {}, "curves": {}, "texture": None, **term} for term in tile.terms]
+        self._num_faces = len(tile.faces)
+        self._around = repeated(levelled(tile), _TIMES)
+        self._positions = self._around.positions.astype(np.float32)
+        self._embree = EmbreeScene.build(self._positions, self._around.faces.astype(np.uint32))
+        self._directions = directions(rings)
+
+    def seen_from(self, view: int) -> F32:
+        """Every texel's values from one direction. (lights, texels, 3) float32"""
+        (height, width), grid = self.size, self._grid
+        row, column = np.divmod(np.arange(height * width), width)
+        out = np.zeros((self.rings.num_directions, height * width, 3))
+        for part in range(grid * grid):
+            x = (column + (part % grid + 0.5) / grid) / width
+            y = 1 - (row + (part // grid + 0.5) / grid) / height
+            # the same places of lamps and of lenses for all texels: what they make is no noise
+            wo = _beside(self._directions[view : view + 1], part * 5 + 3, grid * grid)[0]
+            lights = _beside(self._directions, part * 3 + 1, grid * grid)
+            origin = np.stack([x, y, np.zeros_like(x)], axis=1) + _ABOVE * wo / wo[2]
+            hits = trace_from(self._embree, origin.astype(np.float32), np.tile(-wo.astype(np.float32), (len(x), 1)))
+            out += self._sent(hits, wo, lights)
+        return (out / grid**2).astype(np.float32)
+
+    def _sent(self, hits: Hits, wo: F64, lights: F64) -> F64:
+        """What is sent from hits towards wo, by light. (lights, hits, 3)"""
+        found, seen = hits.face >= 0, np.zeros((self.rings.num_directions, len(hits.face), 3))
+        some = Hits(hits.face[found], hits.uv[found], hits.distance[found])
+        places = self._places(some, wo)
+        step = max(1, _PAIRS_AT_ONCE // self.rings.num_directions)
+        rows = np.flatnonzero(found)
+        for start in range(0, len(rows), step):
+            chosen = _Places(places.position[start : start + step], places.normal[start : start + step])
+            seen[:, rows[start : start + step]] = self._direct(chosen, wo, lights).transpose(1, 0, 2)
+        seen[:, rows] += self._reflectance / np.pi * self._irradiance[some.face % self._num_faces].transpose(1, 0, 2)
+        return seen
+
+    def _direct(self, places: _Places, wo: F64, lights: F64) -> F64:
+        """f cos θ V of all pairs of places and lights. (places, lights, 3)"""
+        n = places.normal.astype(np.float64)
+        t = any_tangent(places.normal).astype(np.float64)
+        frame = np.stack([t, np.cross(n, t), n], axis=1)
+        local = np.einsum("pij,lj->pli", frame, lights)
+        towards = np.einsum("pij,j->pi", frame, wo)[:, None]
+        value = sum(eval_brdf(term, local, towards) for term in self._terms)
+        return np.asarray(value * (np.maximum(local[..., 2], 0) * self._visible(places, lights))[..., None])
+
+    def _visible(self, places: _Places, lights: F64) -> F64:
+        seen = trace_visibility(self._embree, places.position, places.normal, lights.astype(np.float32)).visible
+        return np.unpackbits(seen, axis=1, count=len(lights), bitorder="little").astype(np.float64)
+
+    def _places(self, hits: Hits, wo: F64) -> _Places:
+        corners = self._around.faces[hits.face]
+        p, n = self._positions[corners].astype(np.float64), self._around.normals[corners]
+        b = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])[..., None]
+        face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        face_normal /= np.linalg.norm(face_normal, axis=1, keepdims=True)
+        face_normal *= np.where(face_normal @ wo < 0, -1, 1)[:, None]
+        normal = (n * b).sum(axis=1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
+        lacking = np.maximum(0.01 - normal @ wo, 0)[:, None]  # what is seen faces the eye
+        normal += lacking * wo
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        position = (p * b).sum(axis=1) + _OFF * face_normal
+        return _Places(position.astype(np.float32), normal.astype(np.float32))
+
+    @cached_property
+    def _reflectance(self) -> F64:
+        """ρ. (3,)"""
+        return np.asarray(sum(reflectance(term) for term in self._terms), np.float64)
+
+    @cached_property
+    def _irradiance(self) -> F64:
+        """E of each face of the tile, by light: what has been sent on at least once. (faces, lights, 3)"""
+        middle = Hits(
+            np.arange(self._num_faces, dtype=np.int32) + self._num_faces * (2 * _TIMES + 2) * _TIMES,
+            np.full((self._num_faces, 2), 1 / 3, np.float32),
+            np.ones(self._num_faces, np.float32),
+        )
+        places = self._places(middle, np.array([0.0, 0.0, 1.0]))
+        cosine = np.maximum(np.einsum("nc,lc->nl", places.normal.astype(np.float64), self._directions), 0)
+        straight = (cosine * self._visible(places, self._directions))[..., None] * np.ones(3)
+        between = self._between(places)
+        num, lights = straight.shape[:2]
+        arriving, sent_on = straight, np.zeros_like(straight)
+        for _ in range(_BOUNCES):
+            arriving = (between @ (self._reflectance * arriving).reshape(num, -1)).reshape(num, lights, 3)
+            sent_on += arriving
+        return np.asarray(sent_on)
+
+    def _between(self, places: _Places) -> csr_array:
+        """Form factors: what share of the hemisphere over each face others take. (faces, faces)"""
+        rng, num = np.random.default_rng(self._seed), self._num_faces
+        u, turn = rng.random((2, num, _RAYS_A_FACE))
+        u = (np.arange(_RAYS_A_FACE) + u) / _RAYS_A_FACE
+        radius, phi = np.sqrt(u)[..., None], (2 * np.pi * turn)[..., None]
+        n = places.normal.astype(np.float64)[:, None]
+        t = any_tangent(places.normal).astype(np.float64)[:, None]
+        w = radius * (np.cos(phi) * t + np.sin(phi) * np.cross(n, t)) + np.sqrt(1 - u)[..., None] * n
+        origin = np.repeat(places.position, _RAYS_A_FACE, axis=0)
+        hits = trace_from(self._embree, origin, w.reshape(-1, 3).astype(np.float32))
+        hit = hits.face >= 0
+        row = np.repeat(np.arange(num), _RAYS_A_FACE)[hit]
+        weight = np.full(len(row), 1 / _RAYS_A_FACE)
+        return csr_array((weight, (row, hits.face[hit] % num)), (num, num))
+
+
+def _beside(directions: F64, part: int, num: int) -> F64:
+    """Directions (n, 3) moved to a place in a disc about each: one of `num` places that fill it evenly."""
+    t = any_tangent(directions.astype(np.float32)).astype(np.float64)
+    away = _SPREAD * np.sqrt((part % num + 0.5) / num)
+    turn = part * _GOLDEN + np.arange(len(directions))[:, None]  # another one for each
+    moved = directions + np.tan(away) * (np.cos(turn) * t + np.sin(turn) * np.cross(directions, t))
+    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))

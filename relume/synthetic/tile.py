@@ -1,0 +1,71 @@
+"""One period of a small geometry: what lies over the unit square, and repeats beside it without end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+
+
+class Tile(NamedTuple):
+    """A geometry over [0, 1]², x to the right and y up in its texture, z towards the eye; z = 0 is the texture's plane.
+
+    Triangles may reach over the square's sides: what is beside it does so too.
+
+    Attributes:
+        positions: (n, 3). normals: unit. (n, 3). faces: counter-clockwise seen from outside. (m, 3)
+        terms: of its one material, in the form of look documents; isotropic.
+    """
+
+    positions: F64
+    normals: F64
+    faces: I64
+    terms: tuple[Mapping[str, Any], ...]
+
+
+def levelled(tile: Tile) -> Tile:
+    """Put the middle of its heights to z = 0."""
+    z = tile.positions[:, 2]
+    shift = np.array([0, 0, 0.5 * (z.min() + z.max())])
+    return tile._replace(positions=tile.positions - shift)
+
+
+def repeated(tile: Tile, times: int) -> Tile:
+    """Put as many periods beside it, on each side."""
+    offsets = [(x, y, 0) for y in range(-times, times + 1) for x in range(-times, times + 1)]
+    count = len(tile.positions)
+    return tile._replace(
+        positions=np.concatenate([tile.positions + offset for offset in offsets]),
+        normals=np.tile(tile.normals, (len(offsets), 1)),
+        faces=np.concatenate([tile.faces + k * count for k in range(len(offsets))]),
+    )
+
+
+def swept(path: F64, radius: float, around: int, flat: float = 1.0) -> tuple[F64, F64, I64]:
+    """A yarn along a path: its positions, normals and faces.
+
+    Args:
+        path: of its middle, in a plane that z lies in; the yarn lacks its first and its last place, which say how it
+            goes on. (n, 3). radius: across z.
+        around: corners of its cross-section. flat: its height over its width.
+    """
+    along, path = path[2:] - path[:-2], path[1:-1]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    side = np.cross([0, 0, 1.0], along)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    up = np.cross(along, side)
+    turn = np.arange(around) * (2 * np.pi / around)
+    cosine, sine = np.cos(turn)[None, :, None], np.sin(turn)[None, :, None]
+    offset = radius * (cosine * side[:, None] + flat * sine * up[:, None])
+    normal = flat * cosine * side[:, None] + sine * up[:, None]
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    positions = path[:, None] + offset
+    i, j = np.meshgrid(np.arange(len(path) - 1), np.arange(around), indexing="ij")
+    a, b = i * around + j, i * around + (j + 1) % around
+    faces = np.concatenate([np.stack([a, b, a + around], -1), np.stack([b, b + around, a + around], -1)]).reshape(-1, 3)
+    return positions.reshape(-1, 3), normal.reshape(-1, 3), faces

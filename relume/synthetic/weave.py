@@ -1,0 +1,33 @@
+"""Plain weave: yarns that go over and under each other by turns, warp and weft."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relume.synthetic.tile import Tile, swept
+
+_YARNS = 4  # a period, in each direction; even
+_STEPS, _AROUND = 12, 14  # of a yarn's path a crossing, and of its cross-section
+_WIDTH, _FLAT, _LIFT = 0.43, 0.45, 0.42  # radius and lift in shares of the spacing
+
+TERMS = (
+    {"model": "lambert", "color": [0.42, 0.13, 0.09]},
+    {"model": "blinn_phong", "color": [0.05, 0.045, 0.04], "params": {"exponent": 24.0}},
+)
+
+
+def weave() -> Tile:
+    """One period of it."""
+    spacing = 1 / _YARNS
+    s = np.arange(-1, _YARNS * _STEPS + 2) / (_YARNS * _STEPS)
+    parts = []
+    for direction in range(2):
+        for yarn in range(_YARNS):
+            across = np.full_like(s, (yarn + 0.5) * spacing)
+            height = _LIFT * spacing * np.cos(np.pi * (s / spacing - 0.5 + yarn + direction))
+            path = np.stack([s, across, height] if direction == 0 else [across, s, height], axis=1)
+            parts.append(swept(path, _WIDTH * spacing, _AROUND, _FLAT))
+    counts = np.cumsum([0, *(len(part[0]) for part in parts)])
+    positions, normals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    faces = np.concatenate([part[2] + start for part, start in zip(parts, counts, strict=False)])
+    return Tile(positions, normals, faces, TERMS)

@@ -1,0 +1,70 @@
+"""/api/materials/btf: list, show and delete BTFs; `relume material` makes and imports them, which takes minutes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from fastapi import APIRouter, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume.brdf.document import complete_term
+from relume.btf.shelf import STORE, BtfRecord, get_record, records
+from server.files.png import A_DAY, PngResponse
+from server.services import Shared
+from server.wire.bodies import BtfBody, moment
+from server.wire.body import Id
+from worker.paths import btfs_path
+
+router = APIRouter(prefix="/api/materials/btf", tags=["materials"])
+
+
+@router.get("")
+def list_btfs(services: Shared) -> list[BtfBody]:
+    """All BTFs, newest first."""
+    return [_body(record) for record in records(btfs_path(services.settings.data))]
+
+
+@router.get("/{material}")
+def get_btf(material: Id, services: Shared) -> BtfBody:
+    """One BTF."""
+    return _body(get_record(btfs_path(services.settings.data), material))
+
+
+@router.get("/{material}/thumbnail.png", response_class=PngResponse)
+async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
+    """A ball that is covered with it."""
+    record = get_record(btfs_path(services.settings.data), material)
+    png = await run_in_threadpool(_thumbnail, record)
+    return PngResponse(png, headers=A_DAY)
+
+
+@lru_cache(maxsize=256)
+def _thumbnail(record: BtfRecord) -> bytes:
+    from relume.balls.ball import ball_png  # loads compiled kernels
+
+    return ball_png([complete_term(("btf", k), term, None) for k, term in enumerate(record.terms())])
+
+
+@router.delete("/{material}", status_code=204)
+def delete_btf(material: Id, services: Shared) -> Response:
+    """Delete a BTF; looks that name it are refused from then on."""
+    STORE.remove(btfs_path(services.settings.data), material)
+    return Response(status_code=204)
+
+
+def _body(record: BtfRecord) -> BtfBody:
+    return BtfBody(
+        id=record.id,
+        data=record.data,
+        name=record.name,
+        created=moment(record.created),
+        terms=[complete_term(("btf", k), term, None) for k, term in enumerate(record.terms())],
+        thumbnail=f"/api/materials/btf/{record.id}/thumbnail.png",
+        synthetic=record.synthetic,
+        size=record.size,
+        directions=record.directions,
+        clusters=record.clusters,
+        components=record.components,
+        error=record.error,
+        ratio=record.ratio,
+    )

@@ -1,0 +1,103 @@
+"""Local PCA: what it keeps is what was there, to the error it says, in as little as it says."""
+
+import numpy as np
+import pytest
+
+from relume.btf.compress import MOST_COMPONENTS, compress
+from relume.btf.rings import directions, ubo_rings
+from relume.errors import CancelledError, MaterialError
+
+RINGS = ubo_rings()
+
+
+class Facets:
+    """Texels of few kinds, each a Lambertian facet that leans; `kinds` different ones."""
+
+    rings = RINGS
+
+    def __init__(self, kinds, size=(12, 10), seed=2):
+        rng = np.random.default_rng(seed)
+        self.size = size
+        normals = rng.normal(size=(kinds, 3)) * 0.3 + [0, 0, 1]
+        self._normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self._kind = rng.integers(0, kinds, size[0] * size[1])
+        self._gain = rng.uniform(0.2, 1, (size[0] * size[1], 3))
+
+    def seen_from(self, view):
+        lit = np.maximum(self._normals[self._kind] @ directions(RINGS).T, 0)
+        seen = np.maximum(self._normals[self._kind] @ directions(RINGS)[view], 0.1)
+        return ((lit * seen[:, None]).T[..., None] * self._gain).astype(np.float32)
+
+
+def kept(images, bound=0.01, **others):
+    return compress(images, bound, others.get("progress", lambda share: None), others.get("cancelled", lambda: False))
+
+
+def whole(images):
+    return np.stack([images.seen_from(v) for v in range(81)]).transpose(2, 0, 1, 3).astype(np.float64)
+
+
+def test_the_error_it_says_is_that_of_what_it_kept():
+    images = Facets(kinds=9)
+    found, truth = kept(images), whole(images)
+    told = np.stack([found.texel(k) for k in range(len(truth))])
+    error = np.linalg.norm(told - truth) / np.linalg.norm(truth)
+    assert found.error[-1] == pytest.approx(error, rel=1e-3)
+    assert error <= 0.015  # the bound, and rounding to 256 steps
+    fewer = found.with_components(1)
+    one = np.stack([fewer.texel(k) for k in range(len(truth))])
+    assert found.error[1] == pytest.approx(np.linalg.norm(one - truth) / np.linalg.norm(truth), rel=1e-3)
+    assert list(found.error) == sorted(found.error, reverse=True)
+
+
+def test_a_looser_bound_keeps_less():
+    images = Facets(kinds=30)
+    tight, loose = kept(images, 0.01), kept(images, 0.2)
+    assert loose.num_bytes < tight.num_bytes
+    assert loose.error[-1] <= 0.21
+    assert tight.num_components <= MOST_COMPONENTS
+
+
+def test_the_average_is_the_mean_of_all_texels_and_coarser_levels_are_means():
+    images = Facets(kinds=6, size=(8, 8))
+    found, truth = kept(images, 0.001), whole(images)
+    np.testing.assert_allclose(found.average, truth.mean(axis=0), atol=2e-3)
+    assert found.levels.tolist() == [[0, 8, 8], [64, 4, 4], [80, 2, 2], [84, 1, 1]]
+    of_four = truth.reshape(4, 2, 4, 2, 81, 81, 3).mean(axis=(1, 3)).reshape(16, 81, 81, 3)
+    coarser = np.stack([found.texel(64 + k) for k in range(16)])
+    assert np.linalg.norm(coarser - of_four) < 0.06 * np.linalg.norm(of_four)
+
+
+def test_progress_rises_to_the_end_and_a_cancelled_one_stops():
+    shares = []
+    kept(Facets(kinds=3), progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.9
+    with pytest.raises(CancelledError):
+        kept(Facets(kinds=3), cancelled=lambda: len(shares) > 0)
+
+
+@pytest.mark.parametrize(("value", "said"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
+def test_values_that_are_none_are_refused(value, said):
+    images = Facets(kinds=3)
+    good = images.seen_from
+
+    def bad(view):
+        values = good(view)
+        if view == 40:
+            values[3, 5, 1] = value
+        return values
+
+    images.seen_from = bad
+    with pytest.raises(MaterialError, match=said):
+        kept(images)
+
+
+def test_a_black_btf_and_one_that_is_too_large_are_refused():
+    images = Facets(kinds=3)
+    images.seen_from = lambda view: np.zeros((81, 120, 3), np.float32)
+    with pytest.raises(MaterialError, match="black"):
+        kept(images)
+    images.size = (1 << 20, 1 << 20)
+    with pytest.raises(MaterialError, match="texels"):
+        kept(images)

@@ -1,0 +1,79 @@
+"""Directions between those that a BTF was measured in."""
+
+import numpy as np
+import pytest
+
+from relume.btf.rings import UBO_81, Rings, directions, rings_of, taps, taps_numpy, ubo_rings
+from relume.errors import MaterialError
+
+
+def random_directions(num, seed=3):
+    rng = np.random.default_rng(seed)
+    z, phi = rng.random(num), rng.uniform(-np.pi, np.pi, num)
+    sine = np.sqrt(1 - z**2)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=1)
+
+
+def of_kernel(rings, w):
+    index, weight = np.zeros((len(w), 4), np.int32), np.zeros((len(w), 4), np.float32)
+    left = [taps(rings, *row.astype(np.float32), index[k], weight[k]) for k, row in enumerate(w)]
+    return index, weight, np.array(left)
+
+
+def dense(index, weight, count):
+    out = np.zeros((len(index), count))
+    for k in range(4):
+        np.add.at(out, (np.arange(len(index)), index[:, k]), weight[:, k])
+    return out
+
+
+@pytest.mark.parametrize("described", [UBO_81, ((0.0, 1), (30.0, 4), (80.0, 7))])
+def test_the_kernel_finds_what_plain_numpy_does(described):
+    rings, w = rings_of(described), random_directions(500)
+    index, weight, left = of_kernel(rings, w)
+    expected, of_expected, expected_left = taps_numpy(rings, w)
+    found = dense(index, weight, rings.num_directions)
+    np.testing.assert_allclose(found, dense(expected, of_expected, rings.num_directions), atol=2e-5)
+    np.testing.assert_allclose(left, expected_left, atol=1e-5)
+
+
+def test_a_measured_direction_is_itself_alone():
+    rings = ubo_rings()
+    found = dense(*taps_numpy(rings, directions(rings))[:2], rings.num_directions)
+    np.testing.assert_allclose(found, np.eye(81), atol=1e-6)
+
+
+def test_weights_sum_to_one_and_have_no_seams():
+    rings = ubo_rings()
+    theta = np.radians(np.linspace(1, 89, 60))
+    for first, second in ((np.pi - 1e-7, -np.pi + 1e-7), (-1e-7, 1e-7)):
+        sides = [
+            np.stack([np.sin(theta) * np.cos(p), np.sin(theta) * np.sin(p), np.cos(theta)], 1) for p in (first, second)
+        ]
+        one, other = (dense(*taps_numpy(rings, side)[:2], 81) for side in sides)
+        np.testing.assert_allclose(one, other, atol=1e-5)
+        np.testing.assert_allclose(one.sum(axis=1), 1, atol=1e-9)
+    pole = np.array([[1e-7, 0, 1.0], [0, -1e-7, 1.0], [-1e-7, 1e-7, 1.0]])
+    np.testing.assert_allclose(dense(*taps_numpy(rings, pole)[:2], 81)[:, 0], 1, atol=1e-5)
+
+
+def test_below_the_last_ring_the_cosine_goes_on():
+    rings = ubo_rings()
+    theta = np.radians([75.0, 85.0, 90.0])
+    w = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=1)
+    np.testing.assert_allclose(taps_numpy(rings, w)[2], np.cos(theta) / np.cos(np.radians(75)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "described",
+    [((0.0, 1),), ((5.0, 1), (30.0, 6)), ((0.0, 2), (30.0, 6)), ((0.0, 1), (30.0, 3)), ((0.0, 1), (90.0, 8)),
+     ((0.0, 1), (40.0, 8), (30.0, 8)), ((0.0, 1), (30.0, 500))],
+)  # fmt: skip
+def test_what_is_no_rings_is_refused(described):
+    with pytest.raises(MaterialError, match="rings"):
+        rings_of(described)
+
+
+def test_rings_know_their_number():
+    assert isinstance(ubo_rings(), Rings)
+    assert ubo_rings().num_directions == 81

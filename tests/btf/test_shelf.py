@@ -1,0 +1,130 @@
+"""BTFs that are kept: made, resumed, damaged, deleted; by the command line and over HTTP."""
+
+import io
+import json
+import shutil
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from cli.main import main
+from relume.brdf.document import complete_term
+from relume.btf import shelf
+from relume.btf.rings import ubo_rings
+from relume.btf.shelf import STORE, btf, get_record, records
+from relume.btf.values import Values
+from relume.errors import CancelledError, MaterialError, NotFoundError, ParameterError
+from relume.synthetic.make import Made, make_btf
+from server.app import create_app
+from server.settings import Settings
+
+
+def test_what_is_kept_is_found_by_its_name(small_btf):
+    record = small_btf.record
+    assert record.synthetic == "corduroy"
+    assert record.size == (16, 16)
+    assert record.error[-1] < 0.03
+    assert records(small_btf.folder) == [record]
+    assert btf(record.data).num_components == record.components
+    term = complete_term(("terms", 0), record.terms()[0], None)
+    assert term["params"] == {"scale": 1.0, "rotation": 0.0, "components": 16}
+    assert not (small_btf.folder / "making").exists() or not list((small_btf.folder / "making").iterdir())
+
+
+@pytest.mark.parametrize("data", ["btf:0123456789abcdef", "merl:0123456789abcdef", "btf:../../x", 3, None])
+def test_a_look_that_names_another_is_refused(small_btf, data):
+    with pytest.raises(ParameterError, match="imported here"):
+        complete_term(("terms", 0), {"model": "measured_btf", "data": data}, None)
+
+
+@pytest.mark.parametrize("array", ["cluster", "weight", "mean", "eigen", "step", "average", "levels"])
+@pytest.mark.parametrize("how", ["gone", "cut", "shape", "numbers"])
+def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
+    shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / small_btf.record.id)
+    path = tmp_path / small_btf.record.id / f"{array}.npy"
+    values = np.load(path)
+    if how == "gone":
+        path.unlink()
+    elif how == "cut":
+        path.write_bytes(path.read_bytes()[:-5])
+    elif how == "shape":
+        np.save(path, values[:-1])
+    else:
+        np.save(path, np.full_like(values, 250 if array == "cluster" else -1 if array == "levels" else 0) * (
+            np.nan if values.dtype.kind == "f" else 1))  # fmt: skip
+        if array == "eigen":
+            pytest.skip("any steps are sound")
+    with pytest.raises(MaterialError, match="damaged"):
+        get_record(tmp_path, small_btf.record.id)
+
+
+def test_making_goes_on_where_it_was_and_gives_the_same(small_btf, tmp_path):
+    asked = []
+
+    def after_some():
+        asked.append(0)
+        return len(asked) > 20
+
+    wanted = Made("corduroy", 16, 2, 0.02)
+    with pytest.raises(CancelledError):
+        make_btf(tmp_path, wanted, "Corduroy", lambda share: None, after_some)
+    (begun,) = (tmp_path / "making").iterdir()
+    done = int((begun / "done").read_text())
+    assert 5 < done < 81
+    shares = []
+    record = make_btf(tmp_path, wanted, "Corduroy", shares.append, lambda: False)
+    assert shares[0] == pytest.approx(0.8 * done / 81)
+    assert record.id == small_btf.record.id
+    for array in shelf._ARRAYS:
+        one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (tmp_path, small_btf.folder))
+        np.testing.assert_array_equal(one, other)
+
+
+def test_values_of_another_btf_are_not_taken(tmp_path):
+    Values(tmp_path, ubo_rings(), (8, 8))
+    with pytest.raises(MaterialError, match="another BTF"):
+        Values(tmp_path, ubo_rings(), (8, 9))
+    (tmp_path / "done").write_text("x")
+    assert Values(tmp_path, ubo_rings(), (8, 8)).num_done == 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        (Made("wool", 16, 1, 0.1), "weave"),
+        (Made("weave", 0, 1, 0.1), "texels"),
+        (Made("weave", 1 << 20, 1, 0.1), "texels"),
+        (Made("weave", 16, 0, 0.1), "1 to 8"),
+        (Made("weave", 16, 1, float("nan")), "0.5"),
+    ],
+)
+def test_what_cannot_be_made_is_said(tmp_path, wanted, said):
+    with pytest.raises(ParameterError, match=said):
+        make_btf(tmp_path, wanted, "x", lambda share: None, lambda: False)
+
+
+def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
+    data = tmp_path / "data"
+    arguments = ["material", "make-btf", "pebbles", "--size", "8", "--grid", "1", "--data", str(data)]
+    assert main(arguments) == 0
+    name, terms, words = capsys.readouterr().out.splitlines()
+    assert json.loads(terms)["terms"][0] == {"model": "measured_btf", "data": name, "texture": None}
+    assert "relative RMS" in words
+    assert main(["material", "make-btf", "wool", "--data", str(data)]) == 1
+    assert "weave, pebbles, corduroy" in capsys.readouterr().err
+    settings = Settings(data=data, client=tmp_path / "client", allowed_hosts=["testserver"])
+    with TestClient(create_app(settings)) as client:
+        (found,) = client.get("/api/materials/btf").json()
+        assert (found["data"], found["synthetic"], found["name"]) == (name, "pebbles", "Pebbles (synthetic)")
+        assert client.get(f"/api/materials/btf/{found['id']}").json() == found
+        ball = np.asarray(Image.open(io.BytesIO(client.get(found["thumbnail"]).content)), int)
+        assert ball[24:40, 24:40].mean() > 10
+        (model,) = [one for one in client.get("/api/models").json() if one["model"] == "measured_btf"]
+        assert (model["needs_data"], model["data_prefix"], model["curves"]) == (True, "btf:", [])
+        assert client.delete(f"/api/materials/btf/{found['id']}").status_code == 204
+        assert client.get(f"/api/materials/btf/{found['id']}").status_code == 404
+        assert client.get("/api/materials/btf").json() == []
+    with pytest.raises(NotFoundError):
+        STORE.found(name)

@@ -1,0 +1,174 @@
+"""Pictures of BTFs: texel by texel as the oracle has them, and as the values before compression are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, quad, scene_of, sphere, studio
+
+from relume.bake import Recipe
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.registry import TERMS
+from relume.btf.rings import taps_numpy
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.picture.light import light_of
+from relume.project.texels import texel_numpy, texel_rows
+from relume.render.image import render_image
+from relume.scene.model import Material
+from relume.store import bake_here
+
+CAMERA = looking("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
+GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
+SIZE = (48, 36)
+
+
+def floor():
+    ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    return scene_of(ground, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+
+
+def opened(scene, folder, method="direct"):
+    recipe = Recipe(method, ("front",), SIZE, 300, num_points=800)
+    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+
+
+def covered(bake, record, color=(1, 1, 1), **params):
+    term = {"model": "measured_btf", "data": record.data, "texture": None, "color": list(color), "params": params}
+    return validate({"materials": {"Floor": {"terms": [term]}}}, bake.default_look)
+
+
+@pytest.fixture(scope="module")
+def bake(tmp_path_factory):
+    return opened(floor(), tmp_path_factory.mktemp("floor"))
+
+
+def settled(record, **params):
+    document = {"model": "measured_btf", "data": record.data, "params": params}
+    return TERMS["measured_btf"].settled(document)
+
+
+def arriving(bake, look):
+    """What arrives at the floor, and where it does, in the finest level."""
+    light = light_of(look, bake.material_names, has_bounces=False)
+    lights, receivers = bake.arriving(bake.views["front"], 0, light, bake.memory)
+    uv = np.array(receivers.uv)
+    uv[:, 2] = 0
+    return lights, replace(receivers, uv=uv)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 50.0])
+def test_the_kernel_is_the_oracle(bake, small_btf, rotation):
+    """The floor's texture: x to the right, y away from the eye, v = 0 where z is −1."""
+    look = covered(bake, small_btf.record, scale=3.0, rotation=rotation)
+    lights, receivers = arriving(bake, look)
+    texels = settled(small_btf.record, scale=3.0, rotation=rotation).texels
+    rows = texel_rows(texels, lights, receivers, 0, len(receivers.uv))
+    turn, (height, width) = np.radians(rotation), texels.btf.size
+    x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
+    across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
+    axes = np.array([across, up, [0, 1, 0]])
+    for point in range(0, len(rows), 97):
+        seen = np.unpackbits(receivers.visible[point], count=lights.num_lights, bitorder="little").astype(bool)
+        from_corner = (receivers.points.position[point].astype(np.float64) + np.array([1, 0, 1])) / 2
+        place = 3 * np.array([width * across @ from_corner, -height * up @ from_corner]) - 0.5
+        expected = texel_numpy(
+            texels, lights.direction[seen] @ axes.T, lights.irradiance[seen], axes @ receivers.wo[point], place
+        )
+        np.testing.assert_allclose(rows[point], expected, rtol=2e-3, atol=1e-4)
+
+
+def test_a_picture_is_that_of_the_values_before_compression(bake, small_btf):
+    """The same places and lights, each texel's own values instead of the clusters'."""
+    look = covered(bake, small_btf.record, scale=1.0)
+    lights, receivers = arriving(bake, look)
+    uv = np.array(receivers.uv)
+    (height, width), texels = small_btf.values.size, settled(small_btf.record, scale=1.0).texels
+    # in the middles of texels, so that no mean over texels is in it
+    uv[:, 0] = (np.floor(uv[:, 0] * width) + 0.5) / width
+    uv[:, 1] = (np.floor(uv[:, 1] * height) + 0.5) / height
+    rows = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
+    axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1, 0]])
+    light, of_light, left = taps_numpy(small_btf.values.rings, lights.direction @ axes.T)
+    view, of_view, _ = taps_numpy(small_btf.values.rings, receivers.wo.astype(np.float64) @ axes.T)
+    seen = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
+    values = [small_btf.values.seen_from(v).astype(np.float64) for v in range(81)]
+    texel = (np.floor(uv[:, 1] * height) % height * width + np.floor(uv[:, 0] * width) % width).astype(int)
+    expected = np.zeros_like(rows, dtype=np.float64)
+    for point in range(len(rows)):
+        of_texel = sum(w * values[v][:, texel[point]] for v, w in zip(view[point], of_view[point], strict=True))
+        for_lights = np.einsum("mk,mkc->mc", of_light, of_texel[light]) * left[:, None]
+        expected[point] = (seen[point, :, None] * for_lights * lights.irradiance).sum(axis=0)
+    assert np.linalg.norm(rows - expected) < 0.025 * np.linalg.norm(expected)
+
+
+def test_the_mean_of_its_texels_is_a_brdf(small_btf):
+    """What a picture from far away shows, and what the surface sends to others."""
+    document = {"model": "measured_btf", "data": small_btf.record.data, "color": [1, 1, 1], "params": {}}
+    rng = np.random.default_rng(4)
+    wi, wo = (np.abs(rng.normal(size=(50, 3))) + np.array([0, 0, 0.4]) for _ in range(2))
+    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
+    found = eval_brdf(document, wi, wo)
+    average = sum(
+        small_btf.values.seen_from(v).mean(axis=1)[None] * (np.arange(81) == v)[:, None, None] for v in range(81)
+    )
+    light, of_light, left = taps_numpy(small_btf.values.rings, wi)
+    view, of_view, _ = taps_numpy(small_btf.values.rings, wo)
+    expected = np.einsum("na,nb,nabc->nc", of_view, of_light, average[view[:, :, None], light[:, None]])
+    expected *= (left / wi[:, 2])[:, None]
+    np.testing.assert_allclose(found, expected, rtol=0.03, atol=1e-3)
+    assert not eval_brdf(document, wi * [1, 1, -1], wo).any()
+
+
+def test_from_far_away_it_is_the_mean_of_its_texels(bake, small_btf):
+    """A footprint of many repeats: the coarsest level, which no place matters to."""
+    lights, receivers = arriving(bake, covered(bake, small_btf.record))
+    uv = np.array(receivers.uv)
+    uv[:, 2] = 5
+    texels = settled(small_btf.record).texels
+    one = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
+    uv[:, :2] += 0.37
+    other = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
+    np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-6)
+
+
+def test_quality_scale_and_rotation_change_the_picture_and_tint_is_a_factor(bake, small_btf):
+    pictures = [
+        render_image(bake, "front", covered(bake, small_btf.record, **params))
+        for params in (
+            {"scale": 2.0},
+            {"scale": 4.0},
+            {"scale": 2.0, "rotation": 90.0},
+            {"scale": 2.0, "components": 0},
+        )
+    ]
+    for other in pictures[1:]:
+        assert np.linalg.norm(other - pictures[0]) > 0.02 * np.linalg.norm(pictures[0])
+    tinted = render_image(bake, "front", covered(bake, small_btf.record, (2.0, 1.0, 0.5), scale=2.0))
+    covered_pixels = pictures[0].min(axis=2) > 0.01
+    ratio = (tinted / np.maximum(pictures[0], 1e-6))[covered_pixels]
+    np.testing.assert_allclose(np.median(ratio, axis=0), [2, 1, 0.5], rtol=0.01)
+
+
+def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_path):
+    """A ball of no texture coordinates is covered all round, in metres."""
+    ball = sphere("ball", [0, 0, 0], 0.6, 0, 16)
+    bare = type(ball)(**{**vars(ball), "uvs": np.zeros_like(ball.uvs)})
+    scene = scene_of(bare, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+    bake = opened(scene, tmp_path)
+    _, receivers = arriving(bake, covered(bake, small_btf.record))
+    position = receivers.points.position
+    near = np.linalg.norm(position[1:] - position[:-1], axis=1)
+    apart = np.linalg.norm(receivers.uv[1:, :2] - receivers.uv[:-1, :2], axis=1)
+    same_side = np.abs(receivers.normal[1:]).argmax(axis=1) == np.abs(receivers.normal[:-1]).argmax(axis=1)
+    assert (apart[same_side & (near < 0.1)] <= near[same_side & (near < 0.1)] * 1.05 + 2e-3).mean() > 0.9
+    assert np.isfinite(render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))).all()
+
+
+@pytest.mark.parametrize("method", ["gather", "surface"])
+def test_other_methods_show_it_too(small_btf, tmp_path, method):
+    bake = opened(floor(), tmp_path, method)
+    picture = render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))
+    assert np.isfinite(picture).all()
+    assert picture[..., :3].mean() > 0.01

@@ -1,0 +1,107 @@
+"""Zips of measured images: read as they are, and refused where they are not what they seem."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cli.main import main
+from relume.btf.rings import rings_of
+from relume.btf.zips import ZippedBtf
+from relume.color import srgb_encode
+from relume.errors import MaterialError
+
+DIRECTIONS = [(0, 0), *((40, phi) for phi in (0, 90, 180, 270)), *((70, phi) for phi in (0, 72, 144, 216, 288))]
+
+
+def image_of(view, light, size=(6, 5), kind="PNG"):
+    """A picture that says who lights it and who looks."""
+    value = 0.05 + 0.07 * DIRECTIONS.index(view) + 0.02 * DIRECTIONS.index(light)
+    row, column = np.mgrid[: size[0], : size[1]]
+    linear = np.clip(value * (1 + 0.3 * np.sin(row + 2 * column))[..., None] * [1, 0.8, 0.6], 0, 1).astype(np.float32)
+    file = io.BytesIO()
+    Image.fromarray(np.rint(255 * srgb_encode(linear)).astype(np.uint8)).save(file, kind)
+    return file.getvalue(), linear
+
+
+def name_of(view, light, number=0):
+    return f"tv{view[0]:03}/{number:05} tl{light[0]:03} pl{light[1]:03} tv{view[0]:03} pv{view[1]:03}.png"
+
+
+def zipped(path, change=lambda files: None):
+    files = {name_of(view, light): image_of(view, light)[0] for view in DIRECTIONS for light in DIRECTIONS}
+    files["readme.txt"] = b"measured by nobody"
+    change(files)
+    with zipfile.ZipFile(path, "w") as file:
+        for name, content in files.items():
+            file.writestr(name, content)
+    return path
+
+
+def test_images_come_in_the_order_of_the_rings_and_linear(tmp_path):
+    found = ZippedBtf(zipped(tmp_path / "a.zip"))
+    expected = rings_of([(0.0, 1), (40.0, 4), (70.0, 5)])
+    np.testing.assert_array_equal(found.rings.first, expected.first)
+    assert found.size == (6, 5)
+    for view in (0, 3, 9):
+        values = found.seen_from(view)
+        for light in (0, 2, 7):
+            truth = image_of(DIRECTIONS[view], DIRECTIONS[light])[1].reshape(-1, 3)
+            np.testing.assert_allclose(values[light], truth, atol=0.006)
+
+
+def renamed(old, new):
+    return lambda files: files.update({new: files.pop(old)})
+
+
+FIRST, SECOND = (name_of(DIRECTIONS[k], DIRECTIONS[2]) for k in (1, 3))
+
+
+def whole(path):
+    found = ZippedBtf(path)
+    return [found.seen_from(view) for view in range(len(DIRECTIONS))]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda files: files.pop(FIRST), "1 images of the BTF are missing"),
+        (lambda files: files.update({FIRST.replace("tv040/", "again/"): files[FIRST]}), "two images"),
+        (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
+        (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}), "another size"),
+        (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}), "cannot be read"),
+        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),
+        (lambda files: files.clear(), "named by their directions"),
+        (lambda files: [files.pop(n) for n in list(files) if "tl070" in n], "not the same"),
+    ],
+)
+def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, change, said):
+    path = zipped(tmp_path / "bad.zip", change)
+    with pytest.raises(MaterialError, match=said):
+        whole(path)
+
+
+def test_directions_that_are_not_evenly_on_rings_are_refused(tmp_path):
+    def crooked(files):
+        for name in [n for n in files if " pl090 " in n or n.endswith("pv090.png")]:
+            new = name.replace(" pl090 ", " pl100 ").replace("pv090.png", "pv100.png")
+            files[new] = files.pop(name)
+
+    with pytest.raises(MaterialError, match="evenly on rings"):
+        ZippedBtf(zipped(tmp_path / "crooked.zip", crooked))
+
+
+def test_what_is_no_zip_is_refused(tmp_path):
+    (tmp_path / "no.zip").write_bytes(b"PK\x03\x04 and then nothing")
+    with pytest.raises(MaterialError, match="not a zip"):
+        ZippedBtf(tmp_path / "no.zip")
+
+
+def test_the_command_line_imports_one(tmp_path, capsys):
+    path = zipped(tmp_path / "cloth.zip")
+    assert main(["material", "import", str(path), "--name", "Cloth", "--data", str(tmp_path / "data")]) == 0
+    first, _, words = capsys.readouterr().out.splitlines()
+    assert first.startswith("btf:")
+    assert "relative RMS" in words
