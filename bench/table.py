@@ -41,6 +41,8 @@ TARGETS = {
     "surface.bytes_per_point": "≤ 1000",
     "surface.view_fps": "≥ 15",
     "surface.canvas_fps": "≥ 15",
+    "btf.compression_error": "≤ 2 %",
+    "btf.geometry_rmse": "≤ 5 %",
     "surface.rmse_diffuse": "≤ 3 %",
     "surface.rmse_glossy_0.5": "≤ 6 %",
     "surface.rmse_glossy_0.3": "≤ 12 %",
@@ -77,7 +79,9 @@ def document_of(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
-        if name.startswith(("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "gather.full", "lights.rmse"))
+        if name.startswith(
+            ("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "gather.full", "lights.rmse", "btf.")
+        )
         or name == "frame.incremental_rmse"
         else "performance.md"
     )

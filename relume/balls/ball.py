@@ -25,7 +25,7 @@ _EXPOSURE = 1.0
 _NUM_LIGHTS = 200
 _FINER = 2  # samples a pixel, along each side
 _BEHIND = 0.05  # radiance around the ball
-_PIXEL = 1 / (_FINER * THUMBNAIL_SIZE)  # side of one on the texture, a half turn being one
+_PIXEL = 2 / (_FINER * THUMBNAIL_SIZE)  # side of one on the texture, a half turn being one
 _TO_CAMERA = np.array([0.0, 0.0, 1.0], np.float32)
 
 
@@ -69,8 +69,8 @@ def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     visible = np.packbits(normal @ _lights().direction.T > 0, axis=1, bitorder="little")
     points = Points(normal, normal, tangent, np.arange(len(x), dtype=np.uint32))
-    # a texture goes round it twice, and is seen the right way up
-    around, up = np.arctan2(x, normal[:, 2]) / np.pi, np.arcsin(y) / np.pi
+    # a texture goes round it four times, and is seen the right way up
+    around, up = 2 * np.arctan2(x, normal[:, 2]) / np.pi, 2 * np.arcsin(y) / np.pi
     uv = np.stack([around, -up, np.full(len(x), _PIXEL), np.zeros(len(x)), np.ones(len(x))], axis=1)
     return Receivers(points, np.tile(_TO_CAMERA, (len(x), 1)), visible, uv=uv.astype(np.float32))
 

@@ -30,7 +30,7 @@ from relume.trace.visibility import trace_visibility
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_TIMES = 3  # periods beside the one that is looked at: at 75° a ray passes over one in a height of a quarter
+_GRAZING = np.radians(82.5)  # θ of the lowest rays
 _OFF = 1e-5  # periods that rays begin off surfaces
 _RAYS_A_FACE = 96  # to other faces
 _BOUNCES = 5
@@ -60,7 +60,9 @@ class SmallGeometry:
         self.rings, self.size, self._grid, self._seed = rings, size, grid, seed
         self._terms = [{"params": {}, "curves": {}, "texture": None, **term} for term in tile.terms]
         self._num_faces = len(tile.faces)
-        self._around = repeated(levelled(tile), _TIMES)
+        flat = levelled(tile)
+        self._times = int(np.ceil(np.ptp(flat.positions[:, 2]) * np.tan(_GRAZING)))  # that rays pass on their way
+        self._around = repeated(flat, self._times)
         self._positions = self._around.positions.astype(np.float32)
         self._embree = EmbreeScene.build(self._positions, self._around.faces.astype(np.uint32))
         self._directions = directions(rings)
@@ -133,7 +135,7 @@ class SmallGeometry:
     def _irradiance(self) -> F64:
         """E of each face of the tile, by light: what has been sent on at least once. (faces, lights, 3)"""
         middle = Hits(
-            np.arange(self._num_faces, dtype=np.int32) + self._num_faces * (2 * _TIMES + 2) * _TIMES,
+            np.arange(self._num_faces, dtype=np.int32) + self._num_faces * (2 * self._times + 2) * self._times,
             np.full((self._num_faces, 2), 1 / 3, np.float32),
             np.ones(self._num_faces, np.float32),
         )
