@@ -40,7 +40,7 @@ from relume.synthetic.make import GEOMETRIES
 from relume.synthetic.render import SmallGeometry
 from relume.synthetic.tile import levelled, repeated
 
-_BOUNDS = (0.03, 0.06, 0.12, 0.2)
+_BOUNDS = (0.04, 0.08, 0.16)
 _AT_RATIO, _AT_ERROR = 50.0, 0.05
 _SEEN = 1.5  # periods across the picture
 _REACH = 5  # periods of the geometry on each side
@@ -49,7 +49,7 @@ _EYE = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as can be from 
 
 def measure(tiny: bool) -> list[Figure]:
     """Make the three, compress each for some bounds, and compare the first with its geometry."""
-    size, grid = (8, 1) if tiny else (64, 3)
+    size, grid = (8, 1) if tiny else (128, 2)
     with tempfile.TemporaryDirectory() as folder:
         curves = {}
         for name, geometry in GEOMETRIES.items():

@@ -19,6 +19,7 @@ from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.pixels import Mirrored, Sent, combine
+from relume.moving.relief import Cover, covers_of, show_texels
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import Light, emission_of
@@ -33,11 +34,13 @@ class Materials(NamedTuple):
     Attributes:
         tables: of what the in-basis tells. lobes: of the rest.
         sends: whether a material sends anything of a group of terms. (materials, groups) bool
+        covers: of materials whose every texel sends something else.
     """
 
     tables: Tables
     lobes: Lobes
     sends: NDArray[np.bool_]
+    covers: Mapping[int, Cover]
 
     @classmethod
     def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]]) -> Self:
@@ -45,7 +48,7 @@ class Materials(NamedTuple):
         tables, lobes = tables_of(terms), lobes_of(terms)
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends)
+        return cls(tables, lobes, sends, covers_of(terms))
 
 
 class Wanted(NamedTuple):
@@ -97,7 +100,7 @@ def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camer
 
 def _radiance(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, height: int) -> F32:
     """What surfaces send along the rays. (rays, 3)"""
-    surface, (tables, lobes, sends), arriving = transfer.surface, wanted.materials, wanted.arriving
+    surface, (tables, lobes, sends, covers), arriving = transfer.surface, wanted.materials, wanted.arriving
     eye = camera.to_world[:3, 3].astype(np.float32)
     glances = glance(surface, transfer.sky_share, arriving.others, lobes, eye, seen.is_needed)
     sky, sent_by_points = _sky_in(transfer, wanted.light), send(surface, arriving.total, tables, eye, seen.is_needed)
@@ -105,14 +108,16 @@ def _radiance(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Came
     broad = at_vertices(surface, seen.is_seen, sent_by_points)
     mirrored = Mirrored(lobes, sky, at_vertices(surface, seen.is_seen, glances))
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
-    sent = Sent(broad, sends, _towards_light(transfer, arriving, seen))
-    return combine(surface, seen, camera.yfov / height, sent, emission, mirrored)
+    pixel_angle, towards = camera.yfov / height, _towards_light(transfer, arriving, seen, is_covered=bool(covers))
+    out = combine(surface, seen, pixel_angle, Sent(broad, sends, towards), emission, mirrored)
+    show_texels(covers, surface, transfer.positions, seen, eye, pixel_angle, towards, emission, out)
+    return out
 
 
-def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:
-    """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
+def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen, *, is_covered: bool) -> F32:
+    """Where the light of vertices comes from, which matters under normal maps and on BTFs alone. (vertices or 0, 3)"""
     surface = transfer.surface
-    if not len(surface.tangents):
+    if not (len(surface.tangents) or is_covered):
         return np.empty((0, 3), np.float32)
     return at_vertices(surface, seen.is_seen, towards_light(surface, arriving.total, seen.is_needed))
 

@@ -76,7 +76,7 @@ def _folded(i, count):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # type: ignore[no-untyped-def]
+def gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # type: ignore[no-untyped-def]
     """Find the texels about a place, of the two levels about a footprint, as sums of each cluster's weights.
 
     Args:
@@ -136,7 +136,7 @@ def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: igno
             continue
         vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
         taps(rings, vx, vy, wo[p, 2], index, of_view)
-        num = _gather_texels(levels, cluster, weight, places[p, 0], places[p, 1], places[p, 2], found, sums)
+        num = gather_texels(levels, cluster, weight, places[p, 0], places[p, 1], places[p, 2], found, sums)
         for slot in range(num):
             for tap in range(4):
                 if of_view[tap] <= 0:

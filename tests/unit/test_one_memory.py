@@ -157,6 +157,7 @@ BOUNDED = {
     "moving/basis/out_factors.py",
     "basis/zernike.py",
     "moving/bumps.py",
+    "moving/relief.py",
     "operators/nodes.py",
     "picture/light.py",
     "project/sent.py",

@@ -15,7 +15,8 @@ function words({ functions, missed, needed, is_mirror }: InOutBody): string {
 
 export function InMotion({ term }: { term: Term }) {
   const [told, setTold] = useState<InOutBody | null>(null);
-  const asked = moves.value ? JSON.stringify(term) : null;
+  const isCover = term.model === "measured_btf";
+  const asked = moves.value && !isCover ? JSON.stringify(term) : null;
   useEffect(() => {
     if (asked === null) return undefined;
     let isOld = false;
@@ -30,6 +31,9 @@ export function InMotion({ term }: { term: Term }) {
       clearTimeout(timer);
     };
   }, [asked]);
+  if (moves.value && isCover) {
+    return <p class="in-motion">While the eye moves: its texels in simplified light; where this browser draws, their mean.</p>;
+  }
   if (asked === null || told === null) return null;
   return (
     <p class="in-motion" title="In-out factorisation of this term, cosine-weighted RMS. Where the eye rests it is exact.">
