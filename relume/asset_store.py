@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from relume.errors import NotFoundError, ParameterError, RelumeError
 from relume.replacing import replacing
@@ -28,6 +28,18 @@ from relume.replacing import replacing
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 1 << 20
 _ID = re.compile(r"[0-9a-f]{16}")
+
+
+class Dated(Protocol):
+    """What every kind's record says of a thing."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def created(self) -> float: ...
+
+
+Entry = TypeVar("Entry", bound=Dated)
 
 
 def check_name(name: str) -> str:
@@ -108,6 +120,11 @@ class AssetStore:
     def paths(self, folder: Path) -> list[Path]:
         """Folders of all things in a folder."""
         return [path for path in folder.iterdir() if _ID.fullmatch(path.name)] if folder.is_dir() else []
+
+    def records(self, folder: Path, read: Callable[[Path, str], Entry]) -> list[Entry]:
+        """Records of all things in a folder, newest first. read: the record of one, by folder and id."""
+        found = [read(folder, path.name) for path in self.paths(folder)]
+        return sorted(found, key=lambda record: (-record.created, record.name))
 
     def path(self, folder: Path, identity: str) -> Path:
         """Folder of one thing. Raises NotFoundError."""

@@ -92,8 +92,7 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
 
 def records(folder: Path) -> list[BtfRecord]:
     """All BTFs of a folder, newest first."""
-    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
-    return sorted(found, key=lambda record: (-record.created, record.name))
+    return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> BtfRecord:

@@ -71,8 +71,7 @@ def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
 
 def records(folder: Path) -> list[EnvironmentRecord]:
     """All environments of a folder, newest first."""
-    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
-    return sorted(found, key=lambda record: (-record.created, record.name))
+    return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> EnvironmentRecord:

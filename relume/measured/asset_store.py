@@ -86,8 +86,7 @@ def keep(folder: Path, source: Path, name: str) -> MaterialRecord:
 
 def records(folder: Path) -> list[MaterialRecord]:
     """All materials of a folder, newest first."""
-    found = [get_record(folder, path.name) for path in STORE.paths(folder)]
-    return sorted(found, key=lambda record: (-record.created, record.name))
+    return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> MaterialRecord:
