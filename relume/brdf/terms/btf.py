@@ -59,7 +59,7 @@ MEASURED_BTF = Term(
     model="measured_btf",
     label="Measured texture (BTF)",
     parameters=(
-        Parameter("scale", "Repeats", 0.01, 1000.0, 1.0, "", "log", "How often it repeats along the texture's side."),
+        Parameter("scale", "Repeats", 0.1, 200.0, 1.0, "", "log", "How often it repeats along the texture's side."),
         Parameter("rotation", "Rotation", -180.0, 180.0, 0.0, "°", "linear", "Turns the texture on the surface."),
         Parameter(
             "components",
