@@ -49,7 +49,7 @@ _EYE = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as can be from 
 
 def measure(tiny: bool) -> list[Figure]:
     """Make the three, compress each for some bounds, and compare the first with its geometry."""
-    size, grid = (8, 1) if tiny else (128, 2)
+    size, grid = (8, 1) if tiny else (64, 2)
     with tempfile.TemporaryDirectory() as folder:
         curves = {}
         for name, geometry in GEOMETRIES.items():

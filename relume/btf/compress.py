@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from relume.btf.eigen import EigenBtf
 from relume.btf.rings import Rings
@@ -25,7 +26,7 @@ F64 = NDArray[np.float64]
 MOST_CLUSTERS, MOST_COMPONENTS = 64, 16
 MOST_TEXELS = 512 * 512
 _CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # among which the number is chosen
-_SPAN = 256  # R
+_SPAN = 1024  # R: clusters cannot tell what is outside the span of all
 _ROUNDS = 12  # of clustering
 _LEAST_IN_CLUSTER = 8  # texels
 _LARGEST = 127
@@ -46,7 +47,7 @@ class Images(Protocol):
 class _Span(NamedTuple):
     """X ≈ Z W. z: (texels, R). w: (R, views · lights · 3), orthonormal rows. energy: of X, the sum of squares."""
 
-    z: F64
+    z: F32
     w: F32
     energy: float
 
@@ -55,8 +56,8 @@ class _Clusters(NamedTuple):
     """of: each texel. mean: (K, R). components: orthonormal, the strongest first. (K, C, R)"""
 
     of: NDArray[np.intp]
-    mean: F64
-    components: F64
+    mean: F32
+    components: F32
 
 
 class _Values:
@@ -124,7 +125,7 @@ def _span(values: _Values, rng: np.random.Generator) -> _Span:
     strong = squares > 1e-12 * squares[-1]
     scale = vectors[:, strong] / np.sqrt(squares[strong])
     w = scale.T.astype(np.float32) @ w  # orthonormal rows
-    z = np.zeros((texels, len(w)))
+    z = np.zeros((texels, len(w)), np.float32)
     for view, rows in values.of_views(2):
         z += rows @ w[:, view * width : (view + 1) * width].T
     return _Span(z, w, energy)
@@ -151,61 +152,80 @@ def _choose(
     return best[2], best[3]
 
 
-def _cluster(z: F64, num_clusters: int, rng: np.random.Generator) -> _Clusters:
+def _cluster(z: F32, num_clusters: int, rng: np.random.Generator) -> _Clusters:
     """Cluster texels by how well each cluster's mean and components tell them; the nearest means are the start."""
     centres = _spread(z, num_clusters, rng)
     of = np.argmin(_apart(z, centres), axis=1)
     for trial in range(_ROUNDS):
         found = _components(z, of, len(centres))
         nearest = np.argmin(_apart(z, found.mean) if trial < _ROUNDS // 2 else _distances(z, found), axis=1)
-        if (nearest == of).all() and trial >= _ROUNDS // 2:
+        if (nearest == of).all() and (trial >= _ROUNDS // 2 or len(centres) == 1):
             break
         of = nearest
     return _components(z, of, len(centres))
 
 
-def _spread(z: F64, num: int, rng: np.random.Generator) -> F64:
+def _spread(z: F32, num: int, rng: np.random.Generator) -> F32:
     """Choose texels that are unlike each other (k-means++)."""
     chosen = [int(rng.integers(len(z)))]
     distance = ((z - z[chosen[0]]) ** 2).sum(axis=1)
     while len(chosen) < num and distance.max() > 0:
-        chosen.append(int(rng.choice(len(z), p=distance / distance.sum())))
+        chosen.append(int(rng.choice(len(z), p=distance / distance.sum(dtype=np.float64))))
         distance = np.minimum(distance, ((z - z[chosen[-1]]) ** 2).sum(axis=1))
     return z[chosen]
 
 
-def _components(z: F64, of: NDArray[np.intp], num_clusters: int) -> _Clusters:
+def _components(z: F32, of: NDArray[np.intp], num_clusters: int) -> _Clusters:
     """Mean and components of each cluster; one that is empty has those of all texels."""
     num = min(MOST_COMPONENTS, z.shape[1])
-    mean, components = np.empty((num_clusters, z.shape[1])), np.zeros((num_clusters, num, z.shape[1]))
+    mean = np.empty((num_clusters, z.shape[1]), np.float32)
+    components = np.zeros((num_clusters, num, z.shape[1]), np.float32)
     for k in range(num_clusters):
         rows = z[of == k] if (of == k).any() else z
         mean[k] = rows.mean(axis=0)
-        away = rows - mean[k]
-        components[k] = np.linalg.eigh(away.T @ away)[1][:, ::-1][:, :num].T
+        found = _strongest(rows - mean[k], num)
+        components[k, : len(found)] = found
     return _Clusters(of, mean, components)
 
 
-def _apart(z: F64, centres: F64) -> F64:
+def _strongest(rows: F32, num: int) -> F32:
+    """Find where rows (n, R) reach farthest, orthonormal, by the smaller of their two squares. (≤ num, R)"""
+    is_wide = len(rows) < rows.shape[1]
+    square = (rows @ rows.T if is_wide else rows.T @ rows).astype(np.float64)
+    last = len(square) - 1
+    values, vectors = eigh(square, subset_by_index=(max(0, last + 1 - num), last))
+    found = vectors[:, ::-1].T[values[::-1] > 1e-9 * max(float(values[-1]), 1e-30)].astype(np.float32)
+    if is_wide:
+        found = found @ rows
+        found /= np.linalg.norm(found, axis=1, keepdims=True)
+    return np.asarray(found)
+
+
+def _apart(z: F32, centres: F32) -> F32:
     """Squares of distances, but for what is the same for all centres. (texels, K)"""
     return np.asarray((centres**2).sum(axis=1) - 2 * z @ centres.T)
 
 
-def _distances(z: F64, found: _Clusters) -> F64:
+def _distances(z: F32, found: _Clusters) -> F32:
     """What means and components of each cluster miss of texels, squared. (texels, K)"""
-    out = np.empty((len(z), len(found.mean)))
+    out = np.empty((len(z), len(found.mean)), np.float32)
     for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
         away = z - mean
         out[:, k] = (away**2).sum(axis=1) - ((away @ components.T) ** 2).sum(axis=1)
     return out
 
 
+def _energy(rows: F32) -> float:
+    return float(np.einsum("nr,nr->", rows, rows, dtype=np.float64))
+
+
 def _errors(span: _Span, found: _Clusters) -> list[float]:
     """Relative RMS error by how many components are used, what the span misses included."""
-    away = span.z - found.mean[found.of]
-    told = np.einsum("nr,ncr->nc", away, found.components[found.of]) ** 2
-    missed = max(span.energy - float((span.z**2).sum()), 0.0)
-    left = missed + (away**2).sum() - np.concatenate([[0], np.cumsum(told.sum(axis=0))])
+    left = np.full(1 + found.components.shape[1], max(span.energy - _energy(span.z), 0.0))
+    for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
+        away = span.z[found.of == k] - mean
+        told = np.square(away @ components.T, dtype=np.float64).sum(axis=0)
+        left += _energy(away) - np.concatenate([[0], np.cumsum(told)])
     return [float(np.sqrt(max(one, 0.0) / span.energy)) for one in left]
 
 
@@ -221,7 +241,9 @@ def _kept(images: Images, span: _Span, found: _Clusters, num: int) -> EigenBtf:
         rows = z[start : start + 4096]
         of[start : start + 4096] = np.argmin(_distances(rows, found._replace(components=components)), axis=1)
         cluster = of[start : start + 4096]
-        weight[start : start + 4096] = np.einsum("nr,ncr->nc", rows - found.mean[cluster], components[cluster])
+        for k in np.unique(cluster):
+            mine = start + np.flatnonzero(cluster == k)
+            weight[mine] = (z[mine] - found.mean[k]) @ components[k].T
     average = np.maximum(span.z.mean(axis=0) @ span.w, 0).reshape(directions, directions, 3)
     return EigenBtf(
         rings=images.rings,
@@ -253,7 +275,7 @@ def _measured(values: _Values, energy: float, kept: EigenBtf) -> tuple[float, ..
     return tuple(float(np.sqrt(one / energy)) for one in left)
 
 
-def _levels(z: F64, size: tuple[int, int]) -> tuple[NDArray[np.int32], F64]:
+def _levels(z: F32, size: tuple[int, int]) -> tuple[NDArray[np.int32], F32]:
     """Average texels over 2 × 2, again and again, down to one: what a distant eye sees."""
     (height, width), rank = size, z.shape[1]
     image, levels, parts, first = z.reshape(height, width, rank), [], [], 0
