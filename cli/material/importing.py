@@ -25,9 +25,8 @@ def material_import(
     data: Data = None,
 ) -> None:
     """Import a measured material; print its name in looks, and how well it is kept."""
-    import json
-
     from cli.data_folder import open_settings
+    from cli.material.words import tell_terms
     from relume.asset_store import check_name
     from relume.measured.asset_store import keep
     from worker.paths import materials_path
@@ -37,8 +36,7 @@ def material_import(
         _import_btf(folder, file, called, error)
         return
     record = keep(materials_path(folder), file, called)
-    typer.echo(record.data)
-    typer.echo(f"  {json.dumps({'terms': record.terms()})}")
+    tell_terms(record)
     for model, errors in (
         ("measured_lv + measured_hd", record.lobes_error),
         ("measured_hf", record.homomorphic_error),

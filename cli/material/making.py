@@ -33,6 +33,7 @@ def material_make_btf(
     called = check_name(name or f"{geometry.capitalize()} (synthetic)")
     folder = btfs_path(open_settings(data).data)
     record = until_interrupted(
-        f"{geometry}, {size}×{size} texels", lambda tell, stopped: make_btf(folder, wanted, called, tell, stopped)
+        f"{geometry}, {size}×{size} texels",
+        lambda progress, stopped: make_btf(folder, wanted, called, progress, stopped),
     )
     tell(record)

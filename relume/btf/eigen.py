@@ -19,7 +19,7 @@ F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EigenBtf:
     """What is kept of a BTF of V view and L light directions, in K clusters with C components each.
 

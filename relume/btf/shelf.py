@@ -123,7 +123,7 @@ def _load(path: Path) -> EigenBtf:
     try:
         rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]])
         error = tuple(float(one) for one in document["error"])
-        arrays = {name: np.load(path / f"{name}.npy", allow_pickle=False) for name in _ARRAYS}
+        arrays = {name: _array(path, name) for name in _ARRAYS}
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
         raise STORE.damaged(path) from problem
     if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
@@ -132,6 +132,14 @@ def _load(path: Path) -> EigenBtf:
     if not _is_sound(found):
         raise STORE.damaged(path)
     return found
+
+
+def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
+    """One of them; the large one stays on the disk until tables are made of it, which lists do not need."""
+    found: np.ndarray[Any, Any] = np.load(
+        path / f"{name}.npy", mmap_mode="r" if name == "eigen" else None, allow_pickle=False
+    )
+    return found.view(np.ndarray)
 
 
 def _is_sound(found: EigenBtf) -> bool:

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.brdf.terms.btf import Texels
+from relume.btf.eigen import EigenBtf
 from relume.btf.rings import Rings, taps, taps_numpy
+from relume.moving.bumps import unit
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
@@ -35,21 +37,29 @@ _COMPONENTS = 6  # that are enough while the eye moves
 _AROUND, _DOWN = 180, 45  # directions that the sky's share of each light direction is summed over
 
 
-class Cover(NamedTuple):
-    """What covers a material.
+class LightTables(NamedTuple):
+    """Of a BTF, with as many components as are enough while the eye moves.
 
     Attributes:
-        texels: how. by_light: its tables, components and channels innermost. (K, V, L, (1 + C) · 3) float32
+        weights: of its texels. (texels, C) float32
+        by_light: its tables, components and channels innermost. (K, V, L, (1 + C) · 3) float32
         open_sky: the same under light from all sides. (K, V, (1 + C) · 3) float32
         mean: of all texels, from each side in light from each. (V, L, 3) float32
         mean_open: the same under light from all sides. (V, 3) float32
     """
 
-    texels: Texels
+    weights: F32
     by_light: F32
     open_sky: F32
     mean: F32
     mean_open: F32
+
+
+class Cover(NamedTuple):
+    """What covers a material, and how."""
+
+    texels: Texels
+    tables: LightTables
 
 
 def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[int, Cover]:
@@ -63,18 +73,18 @@ def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[int, Cov
         settled = (TERMS[term["model"]].settled(term).texels for term in terms)
         texels = next((one for one in settled if one is not None), None)
         if texels is not None:
-            found[index] = _cover(texels)
+            found[index] = Cover(texels, _light_tables(texels.btf))
     return found
 
 
 @lru_cache(maxsize=3)
-def _cover(texels: Texels) -> Cover:
-    share, average = _open_sky(texels.btf.rings), texels.btf.average
-    tables = texels.tables[:, :, : 1 + _COMPONENTS]
+def _light_tables(whole: EigenBtf) -> LightTables:
+    found, share, average = whole.with_components(_COMPONENTS), _open_sky(whole.rings), whole.average
+    tables = found.tables()
     clusters, views, _, _, lights = tables.shape
     by_light = np.ascontiguousarray(tables.transpose(0, 1, 4, 2, 3)).reshape(clusters, views, lights, -1)
-    open_sky = (tables @ share).reshape(clusters, views, -1)
-    return Cover(texels, by_light, open_sky, average, np.einsum("vlc,l->vc", average, share))
+    open_sky, mean_open = (tables @ share).reshape(clusters, views, -1), np.einsum("vlc,l->vc", average, share)
+    return LightTables(found.weight.astype(np.float32), by_light, open_sky, average, mean_open)
 
 
 def _open_sky(rings: Rings) -> F32:
@@ -97,12 +107,6 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _cross(a, b):  # type: ignore[no-untyped-def]
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _unit(v):  # type: ignore[no-untyped-def]
-    scale = np.float32(1) / math.sqrt(max(_dot(v, v), np.float32(1e-20)))
-    return scale * v[0], scale * v[1], scale * v[2]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -129,7 +133,7 @@ def _frame(p0, p1, p2, uvs, n):  # type: ignore[no-untyped-def]
         sign * (e2[2] * du1 - e1[2] * du2),
     )
     along = _dot(u, n)
-    x = _unit((u[0] - along * n[0], u[1] - along * n[1], u[2] - along * n[2]))
+    x = unit((u[0] - along * n[0], u[1] - along * n[1], u[2] - along * n[2]))
     y = _cross(n, x)
     side = np.float32(1) if _dot(_cross(n, u), v) < 0 else np.float32(-1)  # v runs down
     return x, (side * y[0], side * y[1], side * y[2]), area != 0
@@ -176,7 +180,7 @@ def _multiply(  # type: ignore[no-untyped-def]
             w, v = weight[ray, q], vertex[ray, q]
             nx, ny, nz = nx + w * normals[v, 0], ny + w * normals[v, 1], nz + w * normals[v, 2]
             lx, ly, lz = lx + w * towards[v, 0], ly + w * towards[v, 1], lz + w * towards[v, 2]
-        n = _unit((nx, ny, nz))
+        n = unit((nx, ny, nz))
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         for q in range(2):
             corner_uvs[0, q], corner_uvs[1, q], corner_uvs[2, q] = uvs[a, q], uvs[b, q], uvs[c, q]
@@ -201,7 +205,7 @@ def _multiply(  # type: ignore[no-untyped-def]
         u, up = turn[0] * u + turn[1] * up, turn[0] * up - turn[1] * u
         num = gather_texels(levels, cluster, weights, scale * u, -scale * up, scale * side, found, sums)
         taps(rings, -_dot(d, x), -_dot(d, y), -_dot(d, n), view, of_view)
-        to_light = _unit((lx, ly, lz))
+        to_light = unit((lx, ly, lz))
         high = max(_dot(to_light, n), np.float32(0))
         left = taps(rings, _dot(to_light, x), _dot(to_light, y), high, light, of_light)
         leaning = math.sqrt(max(np.float32(1) - high * high, np.float32(0)))
@@ -257,11 +261,11 @@ def show_texels(
     )  # fmt: skip
     hits = (face, seen.hits.uv, seen.hits.distance)
     for index, cover in covers.items():
-        texels, rows = cover.texels, np.flatnonzero(material == index)
+        (texels, tables), rows = cover, np.flatnonzero(material == index)
         turn = np.array([math.cos(texels.rotation), math.sin(texels.rotation)], np.float32)
-        of_texels = (texels.btf.levels, texels.btf.cluster, texels.btf.weight[:, :_COMPONENTS].astype(np.float32))
+        of_texels = (texels.btf.levels, texels.btf.cluster, tables.weights)
         args: tuple[Any, ...] = (
-            texels.btf.rings, cover.by_light, cover.open_sky, cover.mean, cover.mean_open, of_texels,
+            texels.btf.rings, tables.by_light, tables.open_sky, tables.mean, tables.mean_open, of_texels,
             np.float32(texels.scale), turn, np.float32(pixel_angle), of_surface, hits, seen.directions,
             seen.vertex, seen.weight, towards_light, rows, emission[index], eye,
         )  # fmt: skip

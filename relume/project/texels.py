@@ -196,7 +196,7 @@ def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receive
         _add_rays(rings, rays, receivers, covered.axes, start, stop, arriving)
     local = np.stack([(t * wo).sum(axis=1), (np.cross(n, t) * wo).sum(axis=1), (n * wo).sum(axis=1)], axis=1)
     out = np.empty((stop - start, 3), np.float32)
-    of_texels = found.levels, found.cluster, found.weight.astype(np.float32)
+    of_texels = found.levels, found.cluster, texels.weights
     _send(rings, texels.tables, of_texels, arriving, covered.axes, np.ascontiguousarray(local), covered.places, out)
     return out
 

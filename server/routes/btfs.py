@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 
-from relume.brdf.document import complete_term
 from relume.btf.shelf import STORE, BtfRecord, get_record, records
 from server.files.png import A_DAY, PngResponse
+from server.routes.materials import terms_of, thumbnail_of
 from server.services import Shared
 from server.wire.bodies import BtfBody, moment
 from server.wire.body import Id
@@ -34,15 +32,8 @@ def get_btf(material: Id, services: Shared) -> BtfBody:
 async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball that is covered with it."""
     record = get_record(btfs_path(services.settings.data), material)
-    png = await run_in_threadpool(_thumbnail, record)
+    png = await run_in_threadpool(thumbnail_of, record)
     return PngResponse(png, headers=A_DAY)
-
-
-@lru_cache(maxsize=256)
-def _thumbnail(record: BtfRecord) -> bytes:
-    from relume.balls.ball import ball_png  # loads compiled kernels
-
-    return ball_png([complete_term(("btf", k), term, None) for k, term in enumerate(record.terms())])
 
 
 @router.delete("/{material}", status_code=204)
@@ -58,7 +49,7 @@ def _body(record: BtfRecord) -> BtfBody:
         data=record.data,
         name=record.name,
         created=moment(record.created),
-        terms=[complete_term(("btf", k), term, None) for k, term in enumerate(record.terms())],
+        terms=terms_of(record),
         thumbnail=f"/api/materials/btf/{record.id}/thumbnail.png",
         synthetic=record.synthetic,
         size=record.size,

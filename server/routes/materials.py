@@ -12,6 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.asset_store import check_name
 from relume.brdf.document import complete_term
+from relume.btf.shelf import BtfRecord
 from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
@@ -60,15 +61,16 @@ def get_measured(material: Id, services: Shared) -> MeasuredBody:
 async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball of the material."""
     record = get_record(materials_path(services.settings.data), material)
-    png = await run_in_threadpool(_thumbnail, record)
+    png = await run_in_threadpool(thumbnail_of, record)
     return PngResponse(png, headers=A_DAY)
 
 
 @lru_cache(maxsize=256)
-def _thumbnail(record: MaterialRecord) -> bytes:
+def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
+    """A ball of a material, as a PNG."""
     from relume.balls.ball import ball_png  # loads compiled kernels
 
-    return ball_png(_terms(record))
+    return ball_png(terms_of(record))
 
 
 @router.delete("/{material}", status_code=204)
@@ -78,7 +80,8 @@ def delete_measured(material: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
-def _terms(record: MaterialRecord) -> list[dict[str, Any]]:
+def terms_of(record: MaterialRecord | BtfRecord) -> list[dict[str, Any]]:
+    """Its terms, complete."""
     return [complete_term(("measured", k), term, None) for k, term in enumerate(record.terms())]
 
 
@@ -88,7 +91,7 @@ def _body(record: MaterialRecord) -> MeasuredBody:
         data=record.data,
         name=record.name,
         created=moment(record.created),
-        terms=_terms(record),
+        terms=terms_of(record),
         thumbnail=f"/api/materials/measured/{record.id}/thumbnail.png",
         lobes_error=record.lobes_error,
         homomorphic_error=record.homomorphic_error,

@@ -40,7 +40,7 @@ def oracle(cover, d, to_light, place):
         from_one = left[0] * np.einsum("l,vlc->vc", of_light[0], table[view[0]][:, light[0]])
         return of_view[0] @ ((1 - leaning) * np.einsum("vlc,l->vc", table[view[0]], sky) + leaning * from_one)
 
-    return np.maximum(under(values), 0) / under(cover.mean.astype(np.float64))
+    return np.maximum(under(values), 0) / under(cover.tables.mean.astype(np.float64))
 
 
 def test_the_kernel_is_the_oracle(moving, small_btf):

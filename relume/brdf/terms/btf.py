@@ -26,12 +26,13 @@ class Texels:
     """How a surface is covered with a BTF.
 
     Attributes:
-        btf: with the components that are used. tables: of it, see `EigenBtf.tables`.
+        btf: with the components that are used. tables: of it, see `EigenBtf.tables`. weights: of it, for kernels.
         scale: how often it repeats along a unit of texture coordinates. rotation: counter-clockwise, radians.
     """
 
     btf: EigenBtf
     tables: F32
+    weights: F32
     scale: float
     rotation: float
 
@@ -41,17 +42,17 @@ def _without_data(*directions: object) -> NoReturn:
 
 
 @lru_cache(maxsize=3)
-def _tables(data: str, components: int) -> tuple[EigenBtf, F32]:
+def _tables(data: str, components: int) -> tuple[EigenBtf, F32, F32]:
     found = btf(data).with_components(components)
-    return found, found.tables()
+    return found, found.tables(), found.weight.astype(np.float32)
 
 
 def _settle(fixed: Mapping[str, Any]) -> dict[str, Any]:
-    found, tables = _tables(fixed["data"], int(fixed["components"]))
+    found, tables, weights = _tables(fixed["data"], int(fixed["components"]))
     rotation = float(np.radians(fixed["rotation"]))
     return {
         "quotient": partial(mean_brdf, found.rings, found.average, rotation),
-        "texels": Texels(found, tables, float(fixed["scale"]), rotation),
+        "texels": Texels(found, tables, weights, float(fixed["scale"]), rotation),
     }
 
 
