@@ -19,7 +19,8 @@ from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.pixels import Mirrored, Sent, combine
-from relume.moving.relief import Cover, covers_of, show_texels
+from relume.moving.relief.show import Sight, show_texels
+from relume.moving.relief.tables import Cover, covers_of
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import Light, emission_of
@@ -40,7 +41,7 @@ class Materials(NamedTuple):
     tables: Tables
     lobes: Lobes
     sends: NDArray[np.bool_]
-    covers: Mapping[int, Cover]
+    covers: Sequence[Cover]
 
     @classmethod
     def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]]) -> Self:
@@ -108,16 +109,17 @@ def _radiance(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Came
     broad = at_vertices(surface, seen.is_seen, sent_by_points)
     mirrored = Mirrored(lobes, sky, at_vertices(surface, seen.is_seen, glances))
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
-    pixel_angle, towards = camera.yfov / height, _towards_light(transfer, arriving, seen, is_covered=bool(covers))
+    pixel_angle, towards = camera.yfov / height, _towards_light(transfer, arriving, seen)
     out = combine(surface, seen, pixel_angle, Sent(broad, sends, towards), emission, mirrored)
-    show_texels(covers, surface, transfer.positions, seen, eye, pixel_angle, towards, emission, out)
+    sight = Sight(eye, pixel_angle, seen)
+    show_texels(covers, surface, transfer.positions, sight, arriving.total, emission, out)
     return out
 
 
-def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen, *, is_covered: bool) -> F32:
-    """Where the light of vertices comes from, which matters under normal maps and on BTFs alone. (vertices or 0, 3)"""
+def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:
+    """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
     surface = transfer.surface
-    if not (len(surface.tangents) or is_covered):
+    if not len(surface.tangents):
         return np.empty((0, 3), np.float32)
     return at_vertices(surface, seen.is_seen, towards_light(surface, arriving.total, seen.is_needed))
 

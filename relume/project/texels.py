@@ -100,12 +100,15 @@ def gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # typ
         x, y = u * width - np.float32(0.5), v * height - np.float32(0.5)
         left, upper = math.floor(x), math.floor(y)
         fx, fy = np.float32(x - left), np.float32(y - upper)
+        column, row = _folded(np.int64(left), width), _folded(np.int64(upper), height)
+        beside = column + 1 if column + 1 < width else 0
+        below = row + 1 if row + 1 < height else 0
         for corner in range(4):
             across, down = corner & 1, corner >> 1
             w = of_level * (fx if across == 1 else 1 - fx) * (fy if down == 1 else 1 - fy)
             if w <= 0:
                 continue
-            texel = first + _folded(np.int64(upper) + down, height) * width + _folded(np.int64(left) + across, width)
+            texel = first + (below if down == 1 else row) * width + (beside if across == 1 else column)
             slot = 0
             while slot < num and found[slot] != cluster[texel]:
                 slot += 1

@@ -1,0 +1,195 @@
+"""From the mean of all texels to each: what one sends over what all do on the mean, in the light that arrives there.
+
+    B(pixel) = B̄ · r,   r = Σ_k p_k(ωo, x) t_k / Σ_k p̄_k(ωo) t_k
+
+B̄ is what surfaces send by the mean of texels; shadows' edges and catchers are found for each pixel, and stay. Of
+a material with other terms, r counts for the share that the BTF has. At rest, each texel is summed over all light
+(`relume.project.texels`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.basis.zernike import ladder
+from relume.btf.rings import taps
+from relume.moving.bumps import unit
+from relume.moving.look_up import Seen
+from relume.moving.points.surface import Surface
+from relume.moving.relief.light import VertexLight, add_turned, light_about
+from relume.moving.relief.place import dot, place_of, row
+from relume.moving.relief.tables import DEGREE, WIDTH, Cover
+from relume.parallel import for_shares
+from relume.project.texels import gather_texels
+
+F32 = NDArray[np.float32]
+
+_MOST = np.float32(20)  # times the mean
+_LEAST = np.float32(1e-6)
+
+
+class Sight(NamedTuple):
+    """Whose picture it is.
+
+    Attributes:
+        eye: where it is. (3,) float32. pixel_angle: that a pixel spans, radians.
+        seen: by the rays.
+    """
+
+    eye: F32
+    pixel_angle: float
+    seen: Seen
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _blend(values, vertex, weight, ray):  # type: ignore[no-untyped-def]
+    """Interpolate vectors (vertices, 3) of the three vertices about a ray, to unit length."""
+    x = y = z = np.float32(0)
+    for q in range(3):
+        v, w = vertex[ray, q], weight[ray, q]
+        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
+    return unit((x, y, z))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _turn_about(rungs, light, about, x, y, side, corners):  # type: ignore[no-untyped-def]
+    """Turn the light vectors of three vertices into the frame of a texture. corners: (3, 3, F)"""
+    corners[:] = 0
+    for q in range(3):
+        v = about[q]
+        t = row(light.tangent, v)
+        add_turned(rungs, light.vectors, v, dot(t, x), dot(t, y), side, np.float32(1), corners[q])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _light_at(corners, w0, w1, w2, out):  # type: ignore[no-untyped-def]
+    """Interpolate between vertices. out: (3, F)"""
+    for channel in range(3):
+        for k in range(WIDTH):
+            out[channel, k] = w0 * corners[0, channel, k] + w1 * corners[1, channel, k] + w2 * corners[2, channel, k]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _texel_factors(factors, view, of_view, found, sums, num, out):  # type: ignore[no-untyped-def]
+    """Sum the out-factors of the clusters about a place, seen between four directions. out: (3 F,)"""
+    out[:] = 0
+    v0, v1, v2, v3 = view[0], view[1], view[2], view[3]
+    for slot in range(num):
+        k = found[slot]
+        for j in range(sums.shape[1]):
+            w = sums[slot, j]
+            w0, w1, w2, w3 = w * of_view[0], w * of_view[1], w * of_view[2], w * of_view[3]
+            for i in range(3 * WIDTH):
+                out[i] += (
+                    w0 * factors[k, v0, j, i]
+                    + w1 * factors[k, v1, j, i]
+                    + w2 * factors[k, v2, j, i]
+                    + w3 * factors[k, v3, j, i]
+                )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _mean_factors(mean, view, of_view, out):  # type: ignore[no-untyped-def]
+    """Do so for the mean of all texels. out: (3 F,)"""
+    v0, v1, v2, v3 = view[0], view[1], view[2], view[3]
+    w0, w1, w2, w3 = of_view[0], of_view[1], of_view[2], of_view[3]
+    for i in range(3 * WIDTH):
+        out[i] = w0 * mean[v0, i] + w1 * mean[v1, i] + w2 * mean[v2, i] + w3 * mean[v3, i]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _show(  # type: ignore[no-untyped-def]
+    rungs, rings, tables, texels, scale, turn, color, is_alone, pixel_angle, surface, normals, hits, directions,
+    vertex, weight, light, rows, emission, eye, start, stop, out,
+):  # fmt: skip
+    """Show what rays rows[start:stop] see. out: (rays, 3)"""
+    levels, cluster = texels
+    face, uv, distance = hits
+    view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
+    found, sums = np.empty(8, np.int32), np.empty((8, tables.factors.shape[2]), np.float32)
+    corners, arriving = np.zeros((3, 3, WIDTH), np.float32), np.empty((3, WIDTH), np.float32)
+    last, last_face = (vertex[0, 0], vertex[0, 0], vertex[0, 0]), face[0] - face[0] - 1
+    of_texel, of_mean = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
+    for index in range(start, stop):
+        ray = rows[index]
+        d, n = row(directions, ray), _blend(normals, vertex, weight, ray)
+        at = uv[ray, 0], uv[ray, 1]
+        x, y, side, u, v, footprint = place_of(surface, face[ray], at, distance[ray], d, eye, n, pixel_angle, turn)
+        num = gather_texels(levels, cluster, tables.weights, scale * u, scale * v, scale * footprint, found, sums)
+        taps(rings, -dot(d, x), -dot(d, y), -dot(d, n), view, of_view)
+        about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
+        if about != last or face[ray] != last_face:  # neighbours mostly share them, and the frame nearly
+            _turn_about(rungs, light, about, x, y, side, corners)
+            last, last_face = about, face[ray]
+        _light_at(corners, weight[ray, 0], weight[ray, 1], weight[ray, 2], arriving)
+        _texel_factors(tables.factors, view, of_view, found, sums, num, of_texel)
+        _mean_factors(tables.mean, view, of_view, of_mean)
+        for channel in range(3):
+            one = mean = np.float32(0)
+            for k in range(WIDTH):
+                one += of_texel[channel * WIDTH + k] * arriving[channel, k]
+                mean += of_mean[channel * WIDTH + k] * arriving[channel, k]
+            ratio = min(max(one, np.float32(0)) / max(mean, _LEAST), _MOST)
+            whole = out[ray, channel] - emission[channel]
+            share = np.float32(1)
+            if not is_alone:
+                share = min(max(color[channel] * mean, np.float32(0)) / max(whole, _LEAST), np.float32(1))
+            out[ray, channel] += share * (ratio - np.float32(1)) * whole
+
+
+def show_texels(
+    covers: Sequence[Cover],
+    surface: Surface,
+    positions: F32,
+    sight: Sight,
+    vectors: F32,
+    emission: F32,
+    out: F32,
+) -> None:
+    """Turn what rays see of the mean of texels into what each texel shows.
+
+    Args:
+        covers: what covers materials. surface: that is seen. positions: of its corners, metres. (corners, 3) float32
+        sight: of the eye. vectors: light vectors of the points. (points, 3, K) float32
+        emission: radiance of each material's own. (materials, 3) float32
+        out: radiance along the rays, written. (rays, 3) float32
+    """
+    seen, face = sight.seen, sight.seen.hits.face
+    if not covers:
+        return
+    material = np.where(face >= 0, surface.face_material[np.maximum(face, 0)], -1)
+    rows_of = [np.flatnonzero(material == cover.material) for cover in covers]
+    is_asked = np.zeros(len(seen.is_seen), np.uint8)
+    for rows in rows_of:
+        is_asked[seen.vertex[rows]] = 1
+    light = light_about(surface, vectors, is_asked)
+    for cover, rows in zip(covers, rows_of, strict=True):
+        _show_cover(cover, rows, light, surface, positions, sight, emission[cover.material], out)
+
+
+def _show_cover(
+    cover: Cover,
+    rows: NDArray[np.intp],
+    light: VertexLight,
+    surface: Surface,
+    positions: F32,
+    sight: Sight,
+    emission: F32,
+    out: F32,
+) -> None:
+    texels, seen = cover.texels, sight.seen
+    of_surface = (positions, surface.uvs, surface.faces, surface.face_normal, surface.uv_scale)
+    turn = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
+    args: tuple[Any, ...] = (
+        ladder(DEGREE), texels.btf.rings, cover.tables, (texels.btf.levels, texels.btf.cluster),
+        np.float32(texels.scale), turn, cover.color, cover.is_alone, np.float32(sight.pixel_angle), of_surface,
+        surface.vertices.normal, (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions, seen.vertex,
+        seen.weight, light, rows, emission, sight.eye,
+    )  # fmt: skip
+    for_shares(lambda start, stop: _show(*args, start, stop, out), len(rows))  # type: ignore[call-arg]
