@@ -1,8 +1,10 @@
-"""A compressed BTF: means and eigen-BRDFs of clusters of texels, and each texel's weights (Müller 2004, section 3).
+"""A compressed BTF: from each side, means and eigenvectors of clusters of texels, and each texel's weights.
 
-    B_x(v, l) ≈ M_k(v, l) + Σ_j α_j(x) E_kj(v, l),   k = k(x)
+    B_x(v, l) ≈ M_vk(l) + Σ_j α_vj(x) E_vkj(l),   k = k_v(x)
 
-Values are radiance towards v for light of one unit of irradiance across its direction l: the cosine is in them.
+Müller 2004, section 3: eigenvectors are over the light, for each view direction apart. Relief moves across texels from
+one side to the next; clusters of each view follow it. Values are radiance towards v for light of one unit of irradiance
+across its direction l: the cosine is in them.
 """
 
 from __future__ import annotations
@@ -19,19 +21,22 @@ F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 
 
+LARGEST = 127  # of what is kept in a byte
+
+
 @dataclass(frozen=True, eq=False)
 class EigenBtf:
-    """What is kept of a BTF of V view and L light directions, in K clusters with C components each.
+    """What is kept of a BTF of V view and L light directions, in K clusters with C components for each view.
 
     Attributes:
         rings: of both directions.
         levels: first texel, height, width of the texels and of their means over 2 × 2, over 4 × 4, and so on.
             (levels, 3) int32
-        cluster: of each texel of each level. (texels,) uint8
-        weight: α. (texels, C) float16
-        mean: M. (K, V, L, 3) float16
-        eigen: E, in steps of `step`. (K, C, V, L, 3) int8
-        step: (K, C) float32
+        cluster: of each texel of each level. (V, texels) uint8
+        weight: α, in steps that are in those of `step`. (V, texels, C) int8
+        mean: M. (V, K, L, 3) float16
+        eigen: E, in steps of `step`. (V, K, C, L, 3) int8
+        step: (V, K, C) float32
         average: of all texels. (V, L, 3) float32
         error: of the texels, relative RMS, by how many components are used, from none on. (C + 1,)
     """
@@ -39,7 +44,7 @@ class EigenBtf:
     rings: Rings
     levels: NDArray[np.int32]
     cluster: NDArray[np.uint8]
-    weight: NDArray[np.float16]
+    weight: I8
     mean: NDArray[np.float16]
     eigen: I8
     step: F32
@@ -54,13 +59,12 @@ class EigenBtf:
     @property
     def num_components(self) -> int:
         """C."""
-        return int(self.weight.shape[1])
+        return int(self.weight.shape[2])
 
     @property
     def num_bytes(self) -> int:
         """What is kept, the coarser levels left out, which files of measurements do not have either."""
-        texels = self.size[0] * self.size[1]
-        of_texels = texels * (1 + self.weight.itemsize * self.num_components)
+        of_texels = self.rings.num_directions * self.size[0] * self.size[1] * (1 + self.num_components)
         return of_texels + self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
 
     @property
@@ -74,21 +78,22 @@ class EigenBtf:
         kept = max(0, min(num, self.num_components))
         return replace(
             self,
-            weight=self.weight[:, :kept],
-            eigen=self.eigen[:, :kept],
-            step=self.step[:, :kept],
+            weight=np.ascontiguousarray(self.weight[..., :kept]),
+            eigen=self.eigen[:, :, :kept],
+            step=self.step[..., :kept],
             error=self.error[: kept + 1],
         )
 
     def tables(self) -> F32:
-        """Means and components for sums over light: (K, V, 1 + C, 3, L) float32."""
-        components = self.eigen.astype(np.float32) * self.step[:, :, None, None, None]
-        both = np.concatenate([self.mean[:, None].astype(np.float32), components], axis=1)
-        return np.ascontiguousarray(both.transpose(0, 2, 1, 4, 3))
+        """Means and components for sums over light: (V, K, 1 + C, 3, L) float32."""
+        components = self.eigen.astype(np.float32) * self.step[..., None, None]
+        both = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
+        return np.ascontiguousarray(both.swapaxes(-1, -2))
 
     def texel(self, number: int) -> F64:
         """The BRDF times cosine of a texel. (V, L, 3)"""
-        k = int(self.cluster[number])
-        components = self.eigen[k].astype(np.float64) * self.step[k][:, None, None, None]
-        told = np.tensordot(self.weight[number].astype(np.float64), components, 1)
-        return np.asarray(self.mean[k].astype(np.float64) + told)
+        every = np.arange(self.rings.num_directions)
+        k = self.cluster[:, number]
+        weight = self.weight[:, number].astype(np.float64) * self.step[every, k]
+        told = np.einsum("vj,vjlc->vlc", weight, self.eigen[every, k].astype(np.float64))
+        return np.asarray(self.mean[every, k].astype(np.float64) + told)

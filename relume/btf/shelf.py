@@ -24,7 +24,7 @@ from relume.errors import MaterialError
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
 _ARRAYS = {
-    "levels": np.int32, "cluster": np.uint8, "weight": np.float16, "mean": np.float16, "eigen": np.int8,
+    "levels": np.int32, "cluster": np.uint8, "weight": np.int8, "mean": np.float16, "eigen": np.int8,
     "step": np.float32, "average": np.float32,
 }  # fmt: skip
 
@@ -104,7 +104,7 @@ def get_record(folder: Path, identity: str) -> BtfRecord:
         raise STORE.damaged(path)
     return BtfRecord(
         identity, document["name"], document["created"], synthetic, found.size, found.rings.num_directions,
-        len(found.mean), found.num_components, found.error, ratio,
+        found.mean.shape[1], found.num_components, found.error, ratio,
     )  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
 def _is_sound(found: EigenBtf) -> bool:
     """Whether its arrays fit each other: kernels read them without looking."""
     directions = found.rings.num_directions
-    clusters, components = len(found.mean), len(found.error) - 1
+    components, clusters = len(found.error) - 1, found.mean.shape[1] if found.mean.ndim == 4 else 0
     if not (1 <= clusters <= MOST_CLUSTERS and 0 <= components <= MOST_COMPONENTS):
         return False
     if found.levels.ndim != 2 or found.levels.shape[1] != 3 or not 1 <= len(found.levels) <= 32:
@@ -158,12 +158,12 @@ def _is_sound(found: EigenBtf) -> bool:
         and (width > 0).all()
         and height[0] * width[0] <= MOST_TEXELS
         and (first == ends).all()
-        and found.cluster.shape == (texels,)
+        and found.cluster.shape == (directions, texels)
         and int(found.cluster.max()) < clusters
-        and found.weight.shape == (texels, components)
-        and found.mean.shape == (clusters, directions, directions, 3)
-        and found.eigen.shape == (clusters, components, directions, directions, 3)
-        and found.step.shape == (clusters, components)
+        and found.weight.shape == (directions, texels, components)
+        and found.mean.shape == (directions, clusters, directions, 3)
+        and found.eigen.shape == (directions, clusters, components, directions, 3)
+        and found.step.shape == (directions, clusters, components)
         and found.average.shape == (directions, directions, 3)
-        and all(np.isfinite(array).all() for array in (found.weight, found.mean, found.step, found.average))
+        and all(np.isfinite(array).all() for array in (found.mean, found.step, found.average))
     )

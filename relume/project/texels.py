@@ -1,6 +1,6 @@
 """What surfaces send whose every texel has a BRDF of its own: the sum over light, texel by texel.
 
-    L(x, ωo) = Σ_j α_j(x) Σ_l E_kj(ωo, l) a_l(x),   a_l = Σ_s w_s hat_l(ω_s)
+    L(x, ωo) = Σ_v hat_v(ωo) Σ_j α_vj(x) Σ_l E_vkj(l) a_l(x),   a_l = Σ_s w_s hat_l(ω_s)
 
 where a is all light that arrives at a place, shared out to the directions l in which the BTF is known: its values are
 linear between these (`relume.btf.rings`), so that the sum over light is exact for what is known. The weights w have no
@@ -76,27 +76,27 @@ def _folded(i, count):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # type: ignore[no-untyped-def]
-    """Find the texels about a place, of the two levels about a footprint, as sums of each cluster's weights.
+def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-untyped-def]
+    """Find the texels about a place, of the two levels about a footprint.
 
     Args:
-        levels, cluster, weight: of the BTF. u, v: the place, in repeats. footprint: side of it, in repeats.
-        found: clusters, written. (8,) int32. sums: of their means' and components' weights, written. (8, 1 + C)
+        levels: of the BTF. u, v: the place, in repeats. footprint: side of it, in repeats.
+        texel: their numbers, written. (8,) int32. share: of each, written. (8,) float32
     Returns:
-        How many clusters there are.
+        How many there are.
     """
     finest = max(levels[0, 1], levels[0, 2])
     place = math.log2(max(footprint * finest, np.float32(1)))
     coarsest = levels.shape[0] - 1
     level: Any = min(place, np.float32(coarsest))
     lower: Any = min(np.int64(level), max(coarsest - 1, 0))
-    share = np.float32(level - lower)
+    between = np.float32(level - lower)
     num = 0
     for step in range(2):
-        of_level = share if step == 1 else np.float32(1) - share
+        of_level = between if step == 1 else np.float32(1) - between
         if of_level <= 0 or lower + step > coarsest:
             continue
-        first, height, width = levels[lower + step]
+        first, height, width = levels[lower + step, 0], levels[lower + step, 1], levels[lower + step, 2]
         x, y = u * width - np.float32(0.5), v * height - np.float32(0.5)
         left, upper = math.floor(x), math.floor(y)
         fx, fy = np.float32(x - left), np.float32(y - upper)
@@ -104,22 +104,40 @@ def gather_texels(levels, cluster, weight, u, v, footprint, found, sums):  # typ
         beside = column + 1 if column + 1 < width else 0
         below = row + 1 if row + 1 < height else 0
         for corner in range(4):
-            across, down = corner & 1, corner >> 1
-            w = of_level * (fx if across == 1 else 1 - fx) * (fy if down == 1 else 1 - fy)
-            if w <= 0:
-                continue
-            texel = first + (below if down == 1 else row) * width + (beside if across == 1 else column)
-            slot = 0
-            while slot < num and found[slot] != cluster[texel]:
-                slot += 1
-            if slot == num:
-                found[slot] = cluster[texel]
-                sums[slot, :] = 0
+            w = of_level * (fx if corner & 1 else 1 - fx) * (fy if corner >> 1 else 1 - fy)
+            if w > 0:
+                texel[num] = first + (below if corner >> 1 else row) * width + (beside if corner & 1 else column)
+                share[num] = w
                 num += 1
-            sums[slot, 0] += w
-            for j in range(weight.shape[1]):
-                sums[slot, 1 + j] += w * weight[texel, j]
     return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type: ignore[no-untyped-def]
+    """Sum the weights of texels, seen from one side, by their clusters.
+
+    Args:
+        cluster, weight: of the BTF. view: the side. texel, share: see `texels_about`. num: of them.
+        found: clusters, written. (8,) int32. sums: of their means' and components' weights, written. (8, ≥ 1 + C)
+    Returns:
+        How many clusters there are.
+    """
+    num_found = 0
+    for k in range(num):
+        at, w = texel[k], share[k]
+        of = cluster[view, at]
+        slot = 0
+        while slot < num_found and found[slot] != of:
+            slot += 1
+        if slot == num_found:
+            found[slot] = of
+            for j in range(sums.shape[1]):
+                sums[slot, j] = 0
+            num_found += 1
+        sums[slot, 0] += w
+        for j in range(min(weight.shape[2], sums.shape[1] - 1)):
+            sums[slot, 1 + j] += w * weight[view, at, j]
+    return num_found
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -132,6 +150,7 @@ def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: igno
     """
     levels, cluster, weight = texels
     index, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
+    texel, share = np.empty(8, np.int32), np.empty(8, np.float32)
     found, sums = np.empty(8, np.int32), np.empty((8, tables.shape[2]), np.float32)
     for p in range(arriving.shape[0]):
         out[p, :] = 0
@@ -139,12 +158,13 @@ def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: igno
             continue
         vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
         taps(rings, vx, vy, wo[p, 2], index, of_view)
-        num = gather_texels(levels, cluster, weight, places[p, 0], places[p, 1], places[p, 2], found, sums)
-        for slot in range(num):
-            for tap in range(4):
-                if of_view[tap] <= 0:
-                    continue
-                of_cluster = tables[found[slot], index[tap]]
+        num = texels_about(levels, places[p, 0], places[p, 1], places[p, 2], texel, share)
+        for tap in range(4):
+            if of_view[tap] <= 0:
+                continue
+            num_found = sum_weights(cluster, weight, index[tap], texel, share, num, found, sums)
+            for slot in range(num_found):
+                of_cluster = tables[index[tap], found[slot]]
                 for j in range(tables.shape[2]):
                     factor = of_view[tap] * sums[slot, j]
                     for channel in range(3):
@@ -199,7 +219,7 @@ def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receive
         _add_rays(rings, rays, receivers, covered.axes, start, stop, arriving)
     local = np.stack([(t * wo).sum(axis=1), (np.cross(n, t) * wo).sum(axis=1), (n * wo).sum(axis=1)], axis=1)
     out = np.empty((stop - start, 3), np.float32)
-    of_texels = found.levels, found.cluster, texels.weights
+    of_texels = found.levels, found.cluster, found.weight
     _send(rings, texels.tables, of_texels, arriving, covered.axes, np.ascontiguousarray(local), covered.places, out)
     return out
 
@@ -226,8 +246,8 @@ def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place
     column, row = int(np.floor(place[0])), int(np.floor(place[1]))
     value = np.zeros((found.rings.num_directions,) * 2 + (3,))
     for down, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        share = abs(1 - across - (place[0] - column)) * abs(1 - down - (place[1] - row))
-        value += share * found.texel((row + down) % height * width + (column + across) % width)
+        near = abs(1 - across - (place[0] - column)) * abs(1 - down - (place[1] - row))
+        value += near * found.texel((row + down) % height * width + (column + across) % width)
     light, of_light, left = taps_numpy(found.rings, directions)
     view, of_view, _ = taps_numpy(found.rings, wo[None])
     seen = np.einsum("a,alc->lc", of_view[0], value[view[0]])

@@ -93,6 +93,25 @@ def test_values_that_are_none_are_refused(value, said):
         kept(images)
 
 
+def test_one_side_may_be_black():
+    images = Facets(kinds=3)
+    good = images.seen_from
+    images.seen_from = lambda view: good(view) * (view != 0)
+    found = kept(images)
+    assert found.error[-1] < 0.015
+    assert not found.texel(7)[0].any()
+
+
+def test_what_is_no_smaller_is_not_kept_however_near():
+    """Noise has no components: a bound that cannot be met does not keep all of it."""
+    images, rng = Facets(kinds=3, size=(16, 16)), np.random.default_rng(3)
+    noise = rng.uniform(size=(81, 256, 3)).astype(np.float32)
+    images.seen_from = lambda view: noise
+    found = kept(images, 0.001)
+    assert found.num_bytes * 2.4 < found.measured_bytes
+    assert found.error[-1] > 0.1
+
+
 def test_a_black_btf_and_one_that_is_too_large_are_refused():
     images = Facets(kinds=3)
     images.seen_from = lambda view: np.zeros((81, 120, 3), np.float32)

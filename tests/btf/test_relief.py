@@ -45,7 +45,7 @@ def terms_of(look_of):
 
 def oracle(cover, d, place):
     """r of a ray on the floor, in plain NumPy: its texture's x to the right, y away from the eye."""
-    turn, found = np.radians(ROTATION), cover.texels.btf.with_components(tables._COMPONENTS)
+    turn, found = np.radians(ROTATION), cover.texels.btf.with_components(tables.COMPONENTS)
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
     axes, (height, width) = np.array([across, up, [0, 1, 0]]), found.size

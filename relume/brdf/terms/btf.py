@@ -26,13 +26,12 @@ class Texels:
     """How a surface is covered with a BTF.
 
     Attributes:
-        btf: with the components that are used. tables: of it, see `EigenBtf.tables`. weights: of it, for kernels.
+        btf: with the components that are used. tables: of it, see `EigenBtf.tables`.
         scale: how often it repeats along a unit of texture coordinates. rotation: counter-clockwise, radians.
     """
 
     btf: EigenBtf
     tables: F32
-    weights: F32
     scale: float
     rotation: float
 
@@ -42,17 +41,17 @@ def _without_data(*directions: object) -> NoReturn:
 
 
 @lru_cache(maxsize=3)
-def _tables(data: str, components: int) -> tuple[EigenBtf, F32, F32]:
+def _tables(data: str, components: int) -> tuple[EigenBtf, F32]:
     found = btf(data).with_components(components)
-    return found, found.tables(), found.weight.astype(np.float32)
+    return found, found.tables()
 
 
 def _settle(fixed: Mapping[str, Any]) -> dict[str, Any]:
-    found, tables, weights = _tables(fixed["data"], int(fixed["components"]))
+    found, tables = _tables(fixed["data"], int(fixed["components"]))
     rotation = float(np.radians(fixed["rotation"]))
     return {
         "quotient": partial(mean_brdf, found.rings, found.average, rotation),
-        "texels": Texels(found, tables, weights, float(fixed["scale"]), rotation),
+        "texels": Texels(found, tables, float(fixed["scale"]), rotation),
     }
 
 
@@ -75,7 +74,7 @@ MEASURED_BTF = Term(
     ),
     curves=(),
     quotient=_without_data,
-    source="Müller 2004: B ≈ M + Σ α E",
+    source="Müller 2004: B_v ≈ M_v + Σ α_v E_v",
     texture="diffuse",
     help="A texture that looks different from every side and in every light: cloth, pebbles, leather.",
     fixed=("scale", "rotation", "components"),

@@ -24,9 +24,9 @@ from relume.moving.look_up import Seen
 from relume.moving.points.surface import Surface
 from relume.moving.relief.light import VertexLight, add_turned, light_about
 from relume.moving.relief.place import dot, place_of, row
-from relume.moving.relief.tables import DEGREE, WIDTH, Cover
+from relume.moving.relief.tables import COMPONENTS, DEGREE, WIDTH, Cover
 from relume.parallel import for_shares
-from relume.project.texels import gather_texels
+from relume.project.texels import sum_weights, texels_about
 
 F32 = NDArray[np.float32]
 
@@ -76,27 +76,24 @@ def _light_at(corners, w0, w1, w2, out):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _texel_factors(factors, view, of_view, found, sums, num, out):  # type: ignore[no-untyped-def]
-    """Sum the out-factors of the clusters about a place, seen between four directions. out: (3 F,)"""
-    out[:] = 0
-    v0, v1, v2, v3 = view[0], view[1], view[2], view[3]
-    for slot in range(num):
-        k = found[slot]
-        for j in range(sums.shape[1]):
-            w = sums[slot, j]
-            w0, w1, w2, w3 = w * of_view[0], w * of_view[1], w * of_view[2], w * of_view[3]
-            for i in range(3 * WIDTH):
-                out[i] += (
-                    w0 * factors[k, v0, j, i]
-                    + w1 * factors[k, v1, j, i]
-                    + w2 * factors[k, v2, j, i]
-                    + w3 * factors[k, v3, j, i]
-                )
+def _add_factors(factors, view, cluster, share, sums, slot, out):  # type: ignore[no-untyped-def]
+    """Add the out-factors of a cluster from one side, all its components at once. out: (3 F,)"""
+    s0, s1, s2 = share * sums[slot, 0], share * sums[slot, 1], share * sums[slot, 2]
+    s3, s4, s5 = share * sums[slot, 3], share * sums[slot, 4], share * sums[slot, 5]
+    for i in range(3 * WIDTH):
+        out[i] += (
+            s0 * factors[view, cluster, 0, i]
+            + s1 * factors[view, cluster, 1, i]
+            + s2 * factors[view, cluster, 2, i]
+            + s3 * factors[view, cluster, 3, i]
+            + s4 * factors[view, cluster, 4, i]
+            + s5 * factors[view, cluster, 5, i]
+        )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _mean_factors(mean, view, of_view, out):  # type: ignore[no-untyped-def]
-    """Do so for the mean of all texels. out: (3 F,)"""
+    """Sum the out-factors of the mean of all texels between four sides. out: (3 F,)"""
     v0, v1, v2, v3 = view[0], view[1], view[2], view[3]
     w0, w1, w2, w3 = of_view[0], of_view[1], of_view[2], of_view[3]
     for i in range(3 * WIDTH):
@@ -109,10 +106,11 @@ def _show(  # type: ignore[no-untyped-def]
     vertex, weight, light, rows, emission, eye, start, stop, out,
 ):  # fmt: skip
     """Show what rays rows[start:stop] see. out: (rays, 3)"""
-    levels, cluster = texels
+    levels, cluster, weights = texels
     face, uv, distance = hits
     view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
-    found, sums = np.empty(8, np.int32), np.empty((8, tables.factors.shape[2]), np.float32)
+    texel, share_of = np.empty(8, np.int32), np.empty(8, np.float32)
+    found, sums = np.empty(8, np.int32), np.empty((8, 1 + COMPONENTS), np.float32)
     corners, arriving = np.zeros((3, 3, WIDTH), np.float32), np.empty((3, WIDTH), np.float32)
     last, last_face = (vertex[0, 0], vertex[0, 0], vertex[0, 0]), face[0] - face[0] - 1
     of_texel, of_mean = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
@@ -121,14 +119,18 @@ def _show(  # type: ignore[no-untyped-def]
         d, n = row(directions, ray), _blend(normals, vertex, weight, ray)
         at = uv[ray, 0], uv[ray, 1]
         x, y, side, u, v, footprint = place_of(surface, face[ray], at, distance[ray], d, eye, n, pixel_angle, turn)
-        num = gather_texels(levels, cluster, tables.weights, scale * u, scale * v, scale * footprint, found, sums)
+        num = texels_about(levels, scale * u, scale * v, scale * footprint, texel, share_of)
         taps(rings, -dot(d, x), -dot(d, y), -dot(d, n), view, of_view)
         about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
         if about != last or face[ray] != last_face:  # neighbours mostly share them, and the frame nearly
             _turn_about(rungs, light, about, x, y, side, corners)
             last, last_face = about, face[ray]
         _light_at(corners, weight[ray, 0], weight[ray, 1], weight[ray, 2], arriving)
-        _texel_factors(tables.factors, view, of_view, found, sums, num, of_texel)
+        of_texel[:] = 0
+        for tap in range(4):
+            num_found = sum_weights(cluster, weights, view[tap], texel, share_of, num, found, sums)
+            for slot in range(num_found):
+                _add_factors(tables.factors, view[tap], found[slot], of_view[tap], sums, slot, of_texel)
         _mean_factors(tables.mean, view, of_view, of_mean)
         for channel in range(3):
             one = mean = np.float32(0)
@@ -187,7 +189,7 @@ def _show_cover(
     of_surface = (positions, surface.uvs, surface.faces, surface.face_normal, surface.uv_scale)
     turn = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
     args: tuple[Any, ...] = (
-        ladder(DEGREE), texels.btf.rings, cover.tables, (texels.btf.levels, texels.btf.cluster),
+        ladder(DEGREE), texels.btf.rings, cover.tables, (texels.btf.levels, texels.btf.cluster, texels.btf.weight),
         np.float32(texels.scale), turn, cover.color, cover.is_alone, np.float32(sight.pixel_angle), of_surface,
         surface.vertices.normal, (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions, seen.vertex,
         seen.weight, light, rows, emission, sight.eye,

@@ -1,6 +1,6 @@
 """The out-factors of texels: what each sends to the eye of each function of the in-basis (Müller 2004).
 
-    p_k(ωo, x) = Σ_j α_j(x) ∫ E_j(ωo, ωi) h_k(ωi) dωi
+    p_k(ωo, x) = Σ_v hat_v(ωo) Σ_j α_vj(x) ∫ E_vj(ωi) h_k(ωi) dωi
 
 E holds the cosine, by which light vectors are weighed, so that B(x, ωo) = Σ_k p_k(ωo, x) t_k as of other materials.
 Values of E are linear between the directions that it is known in; so are their integrals.
@@ -27,7 +27,7 @@ F64 = NDArray[np.float64]
 DEGREE = 4  # of the in-basis, as of harmonics in the paper: a BTF tells no light apart that is much narrower
 NUM_FUNCTIONS = num_functions(DEGREE)
 WIDTH = 16  # F: with nothing behind them, so that kernels' loops are as long as a processor's vectors
-_COMPONENTS = 8  # that are enough while the eye moves
+COMPONENTS = 5  # C: that are enough while the eye moves
 _AROUND, _DOWN = 180, 90  # directions of the quadrature
 
 
@@ -35,13 +35,11 @@ class ReliefTables(NamedTuple):
     """The out-factors of a BTF, with as many components as are enough while the eye moves.
 
     Attributes:
-        weights: of its texels. (texels, C) float32
-        factors: of each cluster from each side: the mean, then each component; channels outermost.
-            (K, V, 1 + C, 3 F) float32
+        factors: from each side of each cluster: the mean, then each component, nothing where there are fewer; channels
+            outermost. (V, K, 1 + C, 3 F) float32
         mean: of all texels. (V, 3 F) float32
     """
 
-    weights: F32
     factors: F32
     mean: F32
 
@@ -79,14 +77,12 @@ def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
 
 @lru_cache(maxsize=3)
 def _tables_of(whole: EigenBtf) -> ReliefTables:
-    found, integrals = whole.with_components(_COMPONENTS), hat_factors(whole.rings).astype(np.float32)
+    found, integrals = whole.with_components(COMPONENTS), hat_factors(whole.rings).astype(np.float32)
     tables = found.tables() @ integrals
-    clusters, views, rows = tables.shape[:3]
-    return ReliefTables(
-        found.weight.astype(np.float32),
-        tables.reshape(clusters, views, rows, -1),
-        np.ascontiguousarray(np.einsum("vlc,lk->vck", whole.average, integrals).reshape(views, -1)),
-    )
+    factors = np.zeros((*tables.shape[:2], 1 + COMPONENTS, 3 * WIDTH), np.float32)
+    factors[:, :, : tables.shape[2]] = tables.reshape(*tables.shape[:3], -1)
+    mean = np.einsum("vlc,lk->vck", whole.average, integrals)
+    return ReliefTables(factors, np.ascontiguousarray(mean.reshape(len(mean), -1)))
 
 
 def hat_factors(rings: Rings) -> F64:

@@ -1,0 +1,97 @@
+"""Local PCA: rows in clusters, a mean and a few components for each (Kambhatla 1997; Müller 2003)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_ROUNDS = 12
+
+
+class Clusters(NamedTuple):
+    """Clusters of rows (n, R).
+
+    Attributes:
+        of: which of K each row is in. (n,)
+        mean: (K, R) float32. components: orthonormal, the strongest first; nothing where there are no more. (K, C, R)
+    """
+
+    of: NDArray[np.intp]
+    mean: F32
+    components: F32
+
+
+def cluster(rows: F32, num_clusters: int, num_components: int, rng: np.random.Generator) -> Clusters:
+    """Cluster rows by how well each cluster's mean and components tell them; the nearest means are the start.
+
+    Args:
+        rows: (n, R) float32. num_clusters: at most. num_components: C of each.
+        rng: chooses the first means.
+    """
+    centres = _spread(rows, num_clusters, rng)
+    of = np.argmin(_apart(rows, centres), axis=1)
+    for trial in range(_ROUNDS):
+        found = _components(rows, of, len(centres), num_components)
+        nearest = np.argmin(_apart(rows, found.mean) if trial < _ROUNDS // 2 else distances(rows, found), axis=1)
+        if (nearest == of).all() and (trial >= _ROUNDS // 2 or len(centres) == 1):
+            break
+        of = nearest
+    return _components(rows, of, len(centres), num_components)
+
+
+def _spread(rows: F32, num: int, rng: np.random.Generator) -> F32:
+    """Choose rows that are unlike each other (k-means++)."""
+    chosen = [int(rng.integers(len(rows)))]
+    distance = ((rows - rows[chosen[0]]) ** 2).sum(axis=1)
+    while len(chosen) < num and distance.max() > 0:
+        chosen.append(int(rng.choice(len(rows), p=distance / distance.sum(dtype=np.float64))))
+        distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(axis=1))
+    return rows[chosen]
+
+
+def _components(rows: F32, of: NDArray[np.intp], num_clusters: int, num: int) -> Clusters:
+    """Mean and components of each cluster; one that is empty has those of all rows."""
+    mean = np.empty((num_clusters, rows.shape[1]), np.float32)
+    components = np.zeros((num_clusters, num, rows.shape[1]), np.float32)
+    for k in range(num_clusters):
+        mine = rows[of == k] if (of == k).any() else rows
+        mean[k] = mine.mean(axis=0)
+        found = strongest(mine - mean[k], num)
+        components[k, : len(found)] = found
+    return Clusters(of, mean, components)
+
+
+def strongest(rows: F32, num: int) -> F32:
+    """Find where rows (n, R) reach farthest, orthonormal. (≤ num, R)"""
+    values, vectors = np.linalg.eigh((rows.T @ rows).astype(np.float64))
+    kept = vectors[:, ::-1][:, :num].T[values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)]
+    return np.ascontiguousarray(kept, np.float32)
+
+
+def _apart(rows: F32, centres: F32) -> F32:
+    """Squares of distances, but for what is the same for all centres. (n, K)"""
+    return np.asarray((centres**2).sum(axis=1) - 2 * rows @ centres.T)
+
+
+def distances(rows: F32, found: Clusters) -> F32:
+    """What means and components of each cluster miss of rows, squared. (n, K)"""
+    out = np.empty((len(rows), len(found.mean)), np.float32)
+    for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
+        away = rows - mean
+        out[:, k] = (away**2).sum(axis=1) - ((away @ components.T) ** 2).sum(axis=1)
+    return out
+
+
+def missed(rows: F32, found: Clusters) -> F64:
+    """What clusters miss of all rows, squared, by how many components are used, from none on. (C + 1,)"""
+    left = np.zeros(1 + found.components.shape[1])
+    for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
+        away = rows[found.of == k] - mean
+        told = np.square(away @ components.T, dtype=np.float64).sum(axis=0)
+        left += np.square(away, dtype=np.float64).sum() - np.concatenate([[0], np.cumsum(told)])
+    return np.maximum(left, 0)
