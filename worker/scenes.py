@@ -16,6 +16,7 @@ from relume.errors import NotFoundError
 from relume.remarks import Remark, remark_of
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
+from relume.scene.projected import are_projected
 from worker.ledger import Ledger
 from worker.models import CameraRow, SceneRow
 from worker.paths import bake_path, scene_path, staging_path
@@ -28,7 +29,8 @@ class SceneRecord:
     Attributes:
         created: seconds since 1970.
         views: camera names, in order.
-        materials: {"name", "terms", "catcher"} each, in the order of material ids; old ones lack the last.
+        materials: {"name", "terms", "catcher", "is_projected"} each, in the order of material ids; old ones lack the
+            last two.
         variants: partial looks that the file brought, by name.
         lights: names of the scene's own.
     """
@@ -57,8 +59,13 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
     summary = {
         "views": [camera.name for camera in scene.cameras],
         "materials": [
-            {"name": material.name, "terms": list(material.terms), "catcher": material.catcher}
-            for material in scene.materials
+            {
+                "name": material.name,
+                "terms": list(material.terms),
+                "catcher": material.catcher,
+                "is_projected": is_projected,
+            }
+            for material, is_projected in zip(scene.materials, are_projected(scene), strict=True)
         ],
         "warnings": [remark.document() for remark in scene.warnings],
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),

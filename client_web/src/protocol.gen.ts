@@ -539,11 +539,12 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. */
+/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
   catcher: boolean;
+  is_projected: boolean;
 }
 
 /** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */

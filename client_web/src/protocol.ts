@@ -74,4 +74,4 @@ export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 export type ShareBody = Omit<gen.ShareBody, "look"> & { look: Look };
 
 /** A scene, its default terms in look-document form. */
-export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: { name: string; terms: Term[]; catcher: boolean }[] };
+export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: (Omit<gen.SceneMaterial, "terms"> & { terms: Term[] })[] };

@@ -26,6 +26,7 @@ from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
+_OF_OLD_ROWS = {"catcher": False, "is_projected": False}  # which do not say it
 DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
 SceneFile = Annotated[
     UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
@@ -149,7 +150,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
             for names, is_placed in ((record.views, False), (placed, True))
             for name in names
         ],
-        materials=[SceneMaterial(**{"catcher": False, **material}) for material in record.materials],
+        materials=[SceneMaterial(**{**_OF_OLD_ROWS, **material}) for material in record.materials],
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=list(record.warnings),

@@ -34,11 +34,12 @@ class SceneView(Body):
 
 class SceneMaterial(Body):
     """A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its
-    shadows alone."""
+    shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection."""
 
     name: str
     terms: list[dict[str, Any]]
     catcher: bool
+    is_projected: bool
 
 
 class SceneVariant(Body):

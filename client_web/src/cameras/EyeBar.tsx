@@ -1,6 +1,7 @@
 /** Over a picture whose eye moves: what hands can do, as buttons, and keeping the camera. */
 import { useState } from "preact/hooks";
 import { chooseDrawnBy, drawnBy, drawsHere, type Draws } from "../live/drawing";
+import { hasTexels } from "../state/look";
 import { scene } from "../state/scene";
 import { viewName, views } from "../state/views";
 import { attempt, note } from "../ui/toasts";
@@ -20,13 +21,14 @@ async function keep(eye: Eye): Promise<void> {
   });
 }
 
+const HERE = "This browser draws while the eye moves: nothing goes over the network for it";
+const SENT = "The server draws while the eye moves, and sends each picture";
 const CHOICES: Record<Draws, string> = { auto: "automatic", browser: "this browser", server: "the server" };
 
 /** Who draws while the eye moves. */
 function DrawnBy() {
-  const title = drawsHere.value
-    ? "This browser draws while the eye moves: nothing goes over the network for it"
-    : "The server draws while the eye moves, and sends each picture";
+  const there = hasTexels.value ? "The server draws while the eye moves: it shows textures from all sides" : SENT;
+  const title = drawsHere.value ? HERE : there;
   return (
     <label class="drawn-by" title={title}>
       Drawn by

@@ -2,7 +2,10 @@
 import { useEffect, useState } from "preact/hooks";
 import { getInOut } from "../net/api";
 import type { InOutBody, Term } from "../protocol";
+import { scene } from "../state/scene";
 import { moves } from "../state/views";
+import { isTexels } from "../state/look";
+import { drawsHere } from "../live/drawing";
 
 const AFTER_MS = 250; // a slider that moves asks once, when it rests
 
@@ -13,9 +16,22 @@ function words({ functions, missed, needed, is_mirror }: InOutBody): string {
   return `While the eye moves: ${functions} terms, which miss ${percent}${enough}.`;
 }
 
-export function InMotion({ term }: { term: Term }) {
+/** How a texture that looks different from every side lies on a material, and who can draw it. */
+function Cover({ material }: { material: string }) {
+  const isProjected = scene.value?.materials.find(({ name }) => name === material)?.is_projected === true;
+  const motion = drawsHere.value ? "While the eye moves: the mean of all texels, as this browser draws." : null;
+  if (!isProjected && !(moves.value && motion)) return null;
+  return (
+    <p class="in-motion">
+      {isProjected && "The object has no places in textures: it is projected along the world’s axes, a metre for each repeat. "}
+      {moves.value && motion}
+    </p>
+  );
+}
+
+export function InMotion({ term, material }: { term: Term; material: string }) {
   const [told, setTold] = useState<InOutBody | null>(null);
-  const isCover = term.model === "measured_btf";
+  const isCover = isTexels(term);
   const asked = moves.value && !isCover ? JSON.stringify(term) : null;
   useEffect(() => {
     if (asked === null) return undefined;
@@ -31,9 +47,7 @@ export function InMotion({ term }: { term: Term }) {
       clearTimeout(timer);
     };
   }, [asked]);
-  if (moves.value && isCover) {
-    return <p class="in-motion">While the eye moves: its texels in simplified light; where this browser draws, their mean.</p>;
-  }
+  if (isCover) return <Cover material={material} />;
   if (asked === null || told === null) return null;
   return (
     <p class="in-motion" title="In-out factorisation of this term, cosine-weighted RMS. Where the eye rests it is exact.">

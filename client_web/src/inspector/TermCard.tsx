@@ -145,7 +145,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             />
           ))}
           {model !== undefined && <Curves model={model} term={term} index={index} />}
-          <InMotion term={term} />
+          <InMotion term={term} material={material} />
         </>
       )}
     </section>

@@ -8,6 +8,7 @@ import { getJson, request } from "../net/api";
 import type { Frame } from "../net/binaryFrame";
 import { MAX_EYE_PIXELS, type FrameHeader, type SurfaceBody } from "../protocol";
 import { noteDrawnHere } from "../state/latency";
+import { hasTexels } from "../state/look";
 import { views } from "../state/views";
 import { note } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
@@ -35,6 +36,8 @@ let here: Here | null = null;
 let loading: BakeConnection | null = null;
 /** Bakes that this browser has failed to draw. */
 const refused = new WeakSet<BakeConnection>();
+/** Whether the choice is left to us, and the server shows what this browser cannot. */
+const isServers = (): boolean => drawnBy.peek() === "auto" && hasTexels.peek();
 const eyes = new Map<string, number>();
 const away = new Set<string>();
 const dirty = new Set<string>();
@@ -169,14 +172,14 @@ function giveUp(reason: string | null): void {
 /** A picture of a view is shown: from now on this browser may draw it. */
 async function offer(of: BakeConnection, view: string): Promise<void> {
   const isFree = of.hello?.views.find(({ name }) => name === view)?.eye === "free";
-  if (!isFree || of !== connections.shown || drawnBy.peek() === "server" || refused.has(of)) return;
+  if (!isFree || of !== connections.shown || drawnBy.peek() === "server" || isServers() || refused.has(of)) return;
   if (here?.of === of) return tellWhereNeeded(here);
   if (loading === of) return;
   loading = of;
   try {
     const made = await load(of);
     if (made === null) return;
-    if (of !== connections.shown || drawnBy.peek() === "server") return made.evaluator.release();
+    if (of !== connections.shown || drawnBy.peek() === "server" || isServers()) return made.evaluator.release();
     here?.evaluator.release();
     here = made;
     durations = [];
@@ -219,7 +222,7 @@ async function load(of: BakeConnection): Promise<Here | null> {
 effect(() => {
   const choice = drawnBy.value;
   const { shown } = connections;
-  if (choice === "server") giveUp(null);
+  if (choice === "server" || (choice === "auto" && hasTexels.value)) giveUp(null);
   if (shown === null) return;
   if (choice !== "server") refused.delete(shown);
   for (const view of shown.hello?.views ?? []) if (shown.arrivals.isShown(view.name)) void offer(shown, view.name);

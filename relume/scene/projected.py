@@ -1,0 +1,19 @@
+"""Materials of triangles that have no place in textures: what covers them is projected along the world's axes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relume.scene.model import Scene
+
+
+def are_projected(scene: Scene) -> list[bool]:
+    """Tell, of each material, whether most of its triangles have no place in textures."""
+    faces, without = np.zeros((2, len(scene.materials)), np.int64)
+    for mesh in scene.meshes:
+        corners = mesh.uvs[mesh.faces]
+        along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+        faces[mesh.material] += len(area)
+        without[mesh.material] += np.count_nonzero(area == 0)
+    return [bool(one) for one in 2 * without > faces]

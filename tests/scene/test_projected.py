@@ -1,0 +1,25 @@
+"""Which materials take a projection, because their triangles have no place in textures."""
+
+from dataclasses import replace
+
+import numpy as np
+from tiny_scenes import looking, quad, scene_of
+
+from relume.scene.projected import are_projected
+
+CORNERS = [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]]
+CAMERA = looking("front", [0, 2, 2], [0, 0, 0], 0.8)
+
+
+def mesh(name, material, is_mapped):
+    places = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    return replace(quad(name, CORNERS, material), uvs=places if is_mapped else np.zeros_like(places))
+
+
+def test_most_triangles_decide():
+    def found(*meshes):
+        return are_projected(scene_of(*meshes, camera=CAMERA))
+
+    assert found(mesh("bare", 0, False), mesh("mapped", 1, True)) == [True, False]
+    mixed = [mesh("bare", 1, False), mesh("mapped", 1, True), mesh("again", 1, True)]
+    assert found(mesh("first", 0, True), *mixed) == [False, False]
