@@ -1,170 +1,162 @@
-"""btf.*: how well BTFs are kept, and how near they are to what they stand for.
+"""btf.*: how well BTFs are kept, how near they are to what they stand for, how quickly they are shown.
 
-`btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is a fiftieth of a byte
-for each channel of each image; the worst of the three synthetic BTFs, between the bounds that were measured. `ratio`
-and `error` of the context are the curve. The norm: √Σ(kept − made)² ÷ √Σ made²; `of_range` divides by √mean square of
-the brightest thousandth instead, as errors of 8-bit images are often told. `btf.compression_ratio`: at an error of 5 %.
+`btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is at most a fiftieth of
+a byte for each channel of each image; the worst of the three synthetic BTFs. `points` of the context is the curve:
+ratio and error of what was kept for two bounds, with fewer and fewer of its components. The norm:
+√Σ(kept − made)² ÷ √Σ made²; `of_range` divides by √mean square of the brightest thousandth instead, as errors of 8-bit
+images are often told; `delta_e` is the mean colour difference (CIE 1976) of texels in full light at that ratio.
+`btf.compression_ratio`: at an error of 5 %. `btf.compression_s`: what the slowest of the three takes to 5 %.
 
 `btf.geometry_rmse`: a plane that is covered with the woven BTF, under a sky, against Mitsuba's paths through the real
 small geometry on the same place, seen from between the directions that the BTF was made for. Its noise is taken off.
+`btf.table_rmse`: the same plane's view samples against sums over all values before compression.
+
+`btf.view_fps`, `btf.light_ms`: the still life at 400×400, every surface covered with the weave: frames while the eye
+moves, and from a turned environment to the frame, all bounces, followed roughly.
 """
 
 from __future__ import annotations
 
 import tempfile
+import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.figure import Figure, skipped
-from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, render
-from bench.standard_error import over_passes
-from relume.bake import Recipe
+from bench.btf_pictures import against_geometry, against_table
+from bench.figure import Figure
+from bench.moving_scene import MovingScene, rotated
+from bench.timing import percentiles
 from relume.btf.compress import compress
+from relume.btf.eigen import EigenBtf
 from relume.btf.rings import ubo_rings
-from relume.btf.shelf import STORE, keep
+from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.values import Values
-from relume.environments.model import Environment
-from relume.environments.studio import studio
-from relume.look import validate
-from relume.memory import Memory
-from relume.methods.registry import METHODS, open_bake
-from relume.render.image import render_image
-from relume.scene.archive import make_scene
-from relume.scene.demo.still_life import look_at
-from relume.scene.model import Material, Mesh, Scene
-from relume.store import bake_here
 from relume.synthetic.make import GEOMETRIES
 from relume.synthetic.render import SmallGeometry
-from relume.synthetic.tile import levelled, repeated
 
-_BOUNDS = (0.04, 0.08, 0.16)
+_BOUNDS = (0.05, 0.2)
+_FINE = 0.02  # of what is compared with all values
 _AT_RATIO, _AT_ERROR = 50.0, 0.05
-_SEEN = 1.5  # periods across the picture
-_REACH = 5  # periods of the geometry on each side
-_EYE = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as can be from all directions of the BTF
+_SOME_TEXELS = 200
+_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])  # ITU-R BT.709-6
+
+
+class _Curve(NamedTuple):
+    """Of one BTF: ratios and errors of what may be kept; seconds to the first bound; of_range: see the module."""
+
+    points: list[tuple[float, float]]
+    seconds: float
+    of_range: float
+    delta_e: float
+
+    @property
+    def error(self) -> float:
+        return min((error for ratio, error in self.points if ratio >= _AT_RATIO), default=1.0)
+
+    @property
+    def ratio(self) -> float:
+        return max((ratio for ratio, error in self.points if error <= _AT_ERROR), default=1.0)
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make the three, compress each for some bounds, and compare the first with its geometry."""
-    size, grid = (8, 1) if tiny else (64, 2)
+    """Make the three, compress each for some bounds, and compare and show the first."""
+    size, grid = (8, 1) if tiny else (128, 2)
     with tempfile.TemporaryDirectory() as folder:
-        curves = {}
-        for name, geometry in GEOMETRIES.items():
-            values = Values(Path(folder) / name, ubo_rings(), (size, size))
-            small = SmallGeometry(geometry(), ubo_rings(), (size, size), grid, 1)
-            values.fill(small.seen_from, lambda share: None, lambda: False)
-            curves[name] = _curve(values, _BOUNDS[:2] if tiny else _BOUNDS)
-        context = {"texels": f"{size}×{size}", "places_a_texel": grid**2, "curves": curves}
-        error = max(_between(curve["ratio"], curve["error"], _AT_RATIO) for curve in curves.values())
-        ratio = min(_between(curve["error"], curve["ratio"], _AT_ERROR) for curve in curves.values())
-        return [
-            Figure("btf.compression_error", 100 * error, "%", context),
-            Figure("btf.compression_ratio", ratio, "× smaller", context),
-            _geometry(Values(Path(folder) / "weave", ubo_rings(), (size, size)), Path(folder), tiny),
-        ]
+        at = Path(folder)
+        made = {name: _made(name, at / name, size, grid) for name in GEOMETRIES}
+        curves = {name: _curve(values) for name, values in made.items()}
+        context = {"texels": f"{size}×{size}", "places_a_texel": grid**2, "curves": _told(curves)}
+        with STORE.at(at / "btfs"):
+            record = _kept(at, made["weave"], _BOUNDS[0])
+            return [
+                Figure("btf.compression_error", 100 * max(one.error for one in curves.values()), "%", context),
+                Figure("btf.compression_ratio", min(one.ratio for one in curves.values()), "× smaller", context),
+                Figure("btf.compression_s", max(one.seconds for one in curves.values()), "s", context),
+                against_geometry(record, at, tiny),
+                against_table(_kept(at, made["weave"], _FINE), made["weave"], at, tiny),
+                *_shown(record, at, tiny),
+            ]
 
 
-def _curve(values: Values, bounds: tuple[float, ...]) -> dict[str, list[float]]:
-    """Ratios and errors for some bounds."""
-    found = [compress(values, bound, lambda share: None, lambda: False) for bound in bounds]
+def _made(name: str, folder: Path, size: int, grid: int) -> Values:
+    values = Values(folder, ubo_rings(), (size, size))
+    small = SmallGeometry(GEOMETRIES[name](), ubo_rings(), (size, size), grid, 1)
+    values.fill(small.seen_from, lambda share: None, lambda: False)
+    return values
+
+
+def _compressed(values: Values, bound: float) -> EigenBtf:
+    return compress(values, bound, lambda share: None, lambda: False)
+
+
+def _kept(folder: Path, values: Values, bound: float) -> BtfRecord:
+    source = folder / "weave.json"
+    source.write_text(str(bound))
+    return keep(folder / "btfs", source, "Weave", "weave", lambda: _compressed(values, bound))
+
+
+def _curve(values: Values) -> _Curve:
+    points, began, seconds = [], time.perf_counter(), 0.0
+    smallest: tuple[float, EigenBtf] | None = None
+    for bound in _BOUNDS:
+        whole = _compressed(values, bound)
+        seconds = seconds or time.perf_counter() - began
+        for num in range(whole.num_components + 1):
+            fewer = whole.with_components(num)
+            ratio = fewer.measured_bytes / fewer.num_bytes
+            points.append((ratio, fewer.error[-1]))
+            if ratio >= _AT_RATIO and (smallest is None or fewer.error[-1] < smallest[0]):
+                smallest = fewer.error[-1], fewer
     sample = np.concatenate([values.seen_from(view).ravel()[::7] for view in range(0, 81, 8)]).astype(np.float64)
     brightest = np.sort(sample)[-max(1, len(sample) // 1000) :]
     to_range = float(np.sqrt(np.mean(sample**2)) / np.sqrt(np.mean(brightest**2)))
+    return _Curve(points, seconds, to_range, float("nan") if smallest is None else _delta_e(values, smallest[1]))
+
+
+def _delta_e(values: Values, kept: EigenBtf) -> float:
+    """Mean colour difference of some texels from all sides, where white is a matt white surface in the same light."""
+    chosen = np.linspace(0, kept.levels[0, 1] * kept.levels[0, 2] - 1, _SOME_TEXELS).astype(int)
+    found = np.stack([kept.texel(texel) for texel in chosen], axis=2)
+    made = np.stack([values.seen_from(view)[:, chosen] for view in range(len(found))])
+    return float(np.linalg.norm(_lab(found) - _lab(made), axis=-1).mean())
+
+
+def _lab(values: NDArray[Any]) -> NDArray[np.float64]:
+    """CIE L*a*b* of linear Rec. 709 radiance; white is what a matt white surface sends. (..., 3)"""
+    of_white = np.pi * np.maximum(values, 0).astype(np.float64) @ (_TO_XYZ / _TO_XYZ.sum(axis=1, keepdims=True)).T
+    x, y, z = np.moveaxis(np.where(of_white > 216 / 24389, np.cbrt(of_white), of_white * 841 / 108 + 4 / 29), -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def _told(curves: dict[str, _Curve]) -> dict[str, Any]:
     return {
-        "ratio": [one.measured_bytes / one.num_bytes for one in found],
-        "error": [one.error[-1] for one in found],
-        "of_range": [one.error[-1] * to_range for one in found],
-        "clusters": [len(one.mean) for one in found],
-        "components": [one.num_components for one in found],
+        name: {
+            "points": [f"1:{ratio:.0f} {error:.1%}" for ratio, error in sorted(one.points)],
+            "of_range": one.error * one.of_range,
+            "delta_e": one.delta_e,
+        }
+        for name, one in curves.items()
     }
 
 
-def _between(x: list[float], y: list[float], at: float) -> float:
-    """Interpolate in logarithms, straight on beyond the ends' values."""
-    order = np.argsort(x)
-    return float(np.exp(np.interp(np.log(at), np.log(np.array(x)[order]), np.log(np.array(y)[order]))))
+def _shown(record: BtfRecord, folder: Path, tiny: bool) -> list[Figure]:
+    still = MovingScene("interior" if tiny else "still_life", folder, (40, 40) if tiny else (400, 400), tiny)
 
+    def covered(document: dict[str, Any]) -> None:
+        for material in document["materials"].values():
+            material["terms"] = [{**record.terms()[0], "params": {"scale": 4.0}}]
 
-def _geometry(values: Values, folder: Path, tiny: bool) -> Figure:
-    name = "btf.geometry_rmse"
-    if (why := missing()) is not None:
-        return skipped((name,), "%", why)[0]
-    size, spp = ((16, 16), 2) if tiny else ((96, 96), 64)
-    source = folder / "weave.json"
-    source.write_text("{}")
-    tile = GEOMETRIES["weave"]()
-    errors = []
-    with STORE.at(folder / "btfs"):
-        record = keep(
-            folder / "btfs",
-            source,
-            "Weave",
-            "weave",
-            lambda: compress(values, _BOUNDS[0], lambda share: None, lambda: False),
-        )
-        for k, (theta, phi) in enumerate(_EYE):
-            plane, real = _scenes(tile, theta, phi)
-            recipe = Recipe("direct", ("eye",), size, 60 if tiny else 2000)
-            opened = open_bake(bake_here(METHODS["direct"], plane, recipe, folder / f"{k}.zarr"), Memory(2 << 30))
-            term = {**record.terms()[0], "color": [1.0, 1.0, 1.0]}
-            look = validate({"materials": {"Cloth": {"terms": [term]}}}, opened.default_look)
-            ours = render_image(opened, "eye", look)[..., :3]
-            to = folder / f"peer{k}"
-            to.mkdir()
-            integrator = {"type": "path", "max_depth": 8, "rr_depth": 8}
-            job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(tile.terms)], "integrator": integrator}
-            render(real, size, job, to)
-            theirs = np.load(to / "passes.npy", allow_pickle=False)
-            errors.append(over_passes(ours.astype(np.float64), theirs))
-    worst = max(errors, key=lambda one: one.error.value)
-    context: dict[str, Any] = {
-        "from": [f"θ {theta}°, φ {phi}°" for theta, phi in _EYE],
-        "errors": [one.error.value for one in errors], "biases": [one.bias.value for one in errors],
-        "kept_to": record.error[-1], "noise": worst.noise, "spp": PASSES * spp, "size": list(size),
-    }  # fmt: skip
-    return Figure(name, 100 * worst.error.value, "%", context, 100 * worst.error.standard_error)
+    def turned(document: dict[str, Any], share: float) -> None:
+        covered(document)
+        rotated(document, share)
 
-
-def _scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
-    """A plane to be covered, and the geometry itself, both y-up, seen from far away."""
-    t, p = np.radians([theta, phi])
-    towards = np.array([np.sin(t) * np.cos(p), np.cos(t), -np.sin(t) * np.sin(p)])
-    far = 60.0
-    camera = look_at("eye", tuple(far * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _SEEN / far)))
-    radiance = np.array(studio().radiance)
-    radiance[len(radiance) // 2 :] = 0  # a BTF knows no light from below, which holes of the geometry would let through
-    sky = Environment("sky", radiance)
-    material = (Material("Cloth", tuple(tile.terms)),)
-    return tuple(  # type: ignore[return-value]
-        make_scene(name, [mesh], material, [camera], sky)
-        for name, mesh in (("plane", _plane()), ("geometry", _real(tile)))
-    )
-
-
-def _plane() -> Mesh:
-    """Texture coordinates are metres: u along x, v along z."""
-    half = float(_REACH)
-    places = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]], np.float32)
-    return _mesh(places, np.tile([0.0, 1, 0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]), places[:, [0, 2]])
-
-
-def _real(tile: Any) -> Mesh:
-    around = repeated(levelled(tile), _REACH)
-    turned = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # the texture's (x, y, z) to (x, z, −y)
-    return _mesh(around.positions @ turned.T, around.normals @ turned.T, around.faces, None)
-
-
-def _mesh(positions: Any, normals: Any, faces: Any, uvs: Any) -> Mesh:
-    count = len(positions)
-    return Mesh(
-        "cloth",
-        np.ascontiguousarray(positions, np.float32),
-        np.ascontiguousarray(normals, np.float32),
-        np.tile(np.array([1, 0, 0, 1], np.float32), (count, 1)),
-        np.zeros((count, 2), np.float32) if uvs is None else np.ascontiguousarray(uvs, np.float32),
-        np.ascontiguousarray(faces, np.uint32),
-        0,
-    )
+    frames = 3 if tiny else 40
+    eye, light = still.eye_s(frames, covered), still.edits_s(frames, turned, is_watched=True)
+    context = {"size": "400×400", "points": still.num_points, "every_surface": "woven"}
+    return [
+        Figure("btf.view_fps", 1 / float(np.median(eye)), "frames/s", context),
+        Figure("btf.light_ms", 1e3 * percentiles(light)[0], "ms", {**context, "bounces": "all"}),
+    ]

@@ -89,7 +89,18 @@ GROUPS = (
     Group("bench.surface_truth", ("surface.rmse_diffuse", "surface.rmse_glossy_0.5", "surface.rmse_glossy_0.3")),
     Group("bench.resting", ("surface.rest_s",)),
     Group("bench.canvas_moving", ("surface.canvas_fps",)),
-    Group("bench.btf", ("btf.compression_error", "btf.compression_ratio", "btf.geometry_rmse")),
+    Group(
+        "bench.btf",
+        (
+            "btf.compression_error",
+            "btf.compression_ratio",
+            "btf.compression_s",
+            "btf.geometry_rmse",
+            "btf.table_rmse",
+            "btf.view_fps",
+            "btf.light_ms",
+        ),
+    ),
     Group("bench.in_out", ("in_out.phong_terms_per_exponent", "in_out.torrance_sparrow_terms_sigma2")),
     Group(
         "bench.surface",

@@ -173,7 +173,14 @@ def arriving(transfer, view: View, index, look):
     lights, reflected = transfer.lights_in(look.environment.key), None
     if light.paths.reflect:
         reflecting = transfer.cells.reflecting(light.reflectances)
-        on_cells = LightOnCells(transfer.cells, transfer.local, transfer.lights_in, transfer.memory, transfer.key)
+        on_cells = LightOnCells(
+            transfer.cells,
+            transfer.local,
+            transfer.lights_in,
+            transfer.preview_lights_in,
+            transfer.memory,
+            transfer.key,
+        )
         every = light._replace(environment_gain=look.environment.gain)
         arrived = on_cells.arrived(every, reflecting, is_preview=False)
         reflected = sent_between(transfer.cells, reflecting, arrived, light.paths.first, light.paths.last)

@@ -28,6 +28,7 @@ class LightOnCells:
 
     Args:
         cells: that it comes to. local: local lights. lights_in: finds the triangles of an environment.
+        preview_lights_in: finds them quickly.
         memory: of all that is made from the bake. key: of the bake in it.
     """
 
@@ -36,10 +37,12 @@ class LightOnCells:
         cells: CellLight,
         local: LocalLights,
         lights_in: Callable[[EnvironmentKey], TriangleLights],
+        preview_lights_in: Callable[[EnvironmentKey], TriangleLights],
         memory: Memory,
         key: str,
     ) -> None:
-        self._cells, self._local, self._lights_in = cells, local, lights_in
+        self._cells, self._local = cells, local
+        self._lights_in, self._preview_lights_in = lights_in, preview_lights_in
         self._memory, self._key = memory, key
 
     def arrived(self, light: Light, reflecting: Reflecting, *, is_preview: bool) -> Arrived:
@@ -47,7 +50,7 @@ class LightOnCells:
 
         Args:
             light: all that shines. reflecting: tells which cells ask where light comes from.
-            is_preview: local lights by few samples, directions roughly.
+            is_preview: local lights by few samples, large environments by small maps, directions roughly.
         """
         out = Arrived(
             np.zeros((self._cells.num_cells, 3), np.float32),
@@ -56,7 +59,7 @@ class LightOnCells:
         of_local = self._local.preview_irradiance if is_preview else self._local.irradiance
         if light.is_environment_lit:
             gain = np.array(light.environment_gain, np.float32)
-            out.irradiance[:] += gain * self._irradiance(light.environment)
+            out.irradiance[:] += gain * self._irradiance(light.environment, is_preview)
             out.vectors[:] += gain[:, None] * self._vectors(light.environment, reflecting, is_preview)
         for geometry, of_light in light.local:
             gain = np.array(of_light, np.float32)
@@ -64,16 +67,20 @@ class LightOnCells:
             out.vectors[:] += gain[:, None] * self._local_vectors(geometry, reflecting, is_preview)
         return out
 
-    def _irradiance(self, environment: EnvironmentKey) -> F32:
+    def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
         key = self._key, "environment on cells", environment
-        return self._memory.keep(key, lambda: self._cells.irradiance(self._lights_in(environment)))
+        if not is_preview or self._memory.holds(key):
+            return self._memory.keep(key, lambda: self._cells.irradiance(self._lights_in(environment)))
+        quick = *key, "for a preview"
+        return self._memory.passing.keep(quick, lambda: self._cells.irradiance(self._preview_lights_in(environment)))
 
     def _vectors(self, environment: EnvironmentKey, reflecting: Reflecting, is_preview: bool) -> F32:
-        degree = _PREVIEW_DEGREE if is_preview else SENT_DEGREE
+        if is_preview:
+            degree, lights_in, kept = _PREVIEW_DEGREE, self._preview_lights_in, self._memory.passing
+        else:
+            degree, lights_in, kept = SENT_DEGREE, self._lights_in, self._memory
         key = self._key, "environment on cells, by direction", environment, reflecting.has_lobe, degree
-        return self._memory.keep(
-            key, lambda: self._cells.vectors(reflecting.rows, self._lights_in(environment), degree)
-        )
+        return kept.keep(key, lambda: self._cells.vectors(reflecting.rows, lights_in(environment), degree))
 
     def _local_vectors(self, geometry: LightGeometry, reflecting: Reflecting, is_preview: bool) -> F32:
         """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""

@@ -113,8 +113,8 @@ class BakedViews:
         return _shown(self.lights_in(light.environment), light)
 
     def preview_lights_of(self, light: Light) -> TriangleLights:
-        """The same from a map of at most 512 texels' width: weighing a large one takes seconds."""
-        return _shown(self._weighed_for_preview(light.environment), light)
+        """The same, found quickly."""
+        return _shown(self.preview_lights_in(light.environment), light)
 
     def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
         def weighed() -> TriangleLights:
@@ -122,7 +122,9 @@ class BakedViews:
 
         return self.memory.keep((self.key, "lights", environment), weighed)
 
-    def _weighed_for_preview(self, environment: EnvironmentKey) -> TriangleLights:
+    def preview_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+        """The triangles of an environment from a map of at most 512 texels' width: a large one takes seconds."""
+
         def weighed() -> TriangleLights:
             radiance = self.radiance_of(environment.map)
             if radiance.shape[1] > _PREVIEW_WIDTH:
@@ -261,7 +263,7 @@ class BouncedViews(BakedViews):
     @cached_property
     def reflected(self) -> Reflected:
         """Light that gather cells send out."""
-        on_cells = LightOnCells(self.cells, self.local, self.lights_in, self.memory, self.key)
+        on_cells = LightOnCells(self.cells, self.local, self.lights_in, self.preview_lights_in, self.memory, self.key)
         return Reflected(self.cells, on_cells, self.memory, self.key)
 
     def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
