@@ -91,7 +91,11 @@ class MovingScene:
     def edits_s(
         self, frames: int, change: Callable[[dict[str, Any], float], None], *, is_watched: bool = False
     ) -> list[float]:
-        """Seconds from a look to its encoded frame, each once."""
+        """Seconds from a look to its encoded frame, each once.
+
+        Args:
+            frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
+        """
         looks = [
             self.look(lambda document, k=k: change(document, k / frames))  # type: ignore[misc]
             for k in range(frames + 1)

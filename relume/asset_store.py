@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import re
 import shutil
@@ -24,6 +25,8 @@ from typing import Any, Protocol, TypeVar
 
 from relume.errors import NotFoundError, ParameterError, RelumeError
 from relume.replacing import replacing
+
+log = logging.getLogger(__name__)
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 1 << 20
@@ -122,8 +125,19 @@ class AssetStore:
         return [path for path in folder.iterdir() if _ID.fullmatch(path.name)] if folder.is_dir() else []
 
     def records(self, folder: Path, read: Callable[[Path, str], Entry]) -> list[Entry]:
-        """Records of all things in a folder, newest first. read: the record of one, by folder and id."""
-        found = [read(folder, path.name) for path in self.paths(folder)]
+        """Records of all things in a folder, newest first; one that is damaged, which the log names, hides no others.
+
+        Args:
+            folder: of the store. read: the record of one, by folder and id.
+        """
+        found = []
+        for path in self.paths(folder):
+            try:
+                found.append(read(folder, path.name))
+            except self.problem as problem:
+                log.warning("left out of a list: %s", problem)
+            except NotFoundError:  # deleted meanwhile
+                continue
         return sorted(found, key=lambda record: (-record.created, record.name))
 
     def path(self, folder: Path, identity: str) -> Path:

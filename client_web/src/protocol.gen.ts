@@ -441,7 +441,7 @@ export interface ModelBody {
   curves: CurveBody[];
 }
 
-/** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. */
+/** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values are multiples of `step`, where it is given. */
 export interface ParameterBody {
   name: string;
   label: string;
@@ -451,6 +451,7 @@ export interface ParameterBody {
   unit: string;
   scale: "linear" | "log";
   help: string;
+  step: number | null;
   fixed: boolean;
 }
 

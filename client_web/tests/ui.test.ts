@@ -107,6 +107,7 @@ describe("terms", () => {
       unit: "",
       scale: "linear",
       help: "",
+      step: null,
       fixed: false,
     })),
     curves: [],

@@ -49,6 +49,7 @@ class Parameter:
     Attributes:
         unit: "" where the number has none.
         scale: how a slider moves, "linear" or "log".
+        step: values are multiples of it, where it is given.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Parameter:
     unit: str
     scale: str
     help: str
+    step: float | None = None
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,8 @@ class BuiltInBody(Body):
 class ParameterBody(Body):
     """A number that generates curves; `scale` says how a slider moves.
 
-    One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze.
+    One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values
+    are multiples of `step`, where it is given.
     """
 
     name: str
@@ -100,6 +101,7 @@ class ParameterBody(Body):
     unit: str
     scale: Literal["linear", "log"]
     help: str
+    step: float | None
     fixed: bool
 
 

@@ -60,6 +60,14 @@ def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
         get_record(tmp_path, small_btf.record.id)
 
 
+def test_a_damaged_one_hides_no_others_from_lists(small_btf, tmp_path, caplog):
+    for name in (small_btf.record.id, "0123456789abcdef"):
+        shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / name)
+    (tmp_path / "0123456789abcdef" / "step.npy").unlink()
+    assert records(tmp_path) == [small_btf.record]
+    assert "0123456789abcdef is damaged" in caplog.text
+
+
 def test_making_goes_on_where_it_was_and_gives_the_same(small_btf, tmp_path):
     asked = []
 

@@ -157,7 +157,7 @@ BOUNDED = {
     "moving/basis/out_factors.py",
     "basis/zernike.py",
     "moving/bumps.py",
-    "moving/relief.py",
+    "moving/relief/tables.py",
     "operators/nodes.py",
     "picture/light.py",
     "project/sent.py",

@@ -23,7 +23,7 @@ function mean(value: ParamValue): number {
 
 export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
   const parted = typeof value !== "number";
-  const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit };
+  const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit, ...(info.step === null ? {} : { step: info.step }) };
   const toggle = () => onChange(parted ? mean(value) : [value, value, value]);
   const link = (
     <IconButton

@@ -70,6 +70,7 @@ MEASURED_BTF = Term(
             "",
             "linear",
             "Components that are summed for each texel: fewer are quicker, and nearer to the mean.",
+            step=1.0,
         ),
     ),
     curves=(),
