@@ -88,6 +88,11 @@ export const materialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/m
 /** Of a library material, whose id is "table/material". */
 export const materialThumbnail = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
+/** Of what was measured, by its name in looks: "btf:id", "merl:id". */
+export const measuredThumbnail = (data: string) => {
+  const [kind, id = ""] = data.split(":");
+  return `/api/materials/${kind === "btf" ? "btf" : "measured"}/${encodeURIComponent(id)}/thumbnail.png`;
+};
 export const listEnvironments = () => getJson<EnvironmentBody[]>("/api/environments");
 export async function deleteEnvironment(id: string): Promise<void> {
   await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });

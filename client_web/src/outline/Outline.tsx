@@ -2,6 +2,7 @@
 import { toHex } from "../color/color";
 import { isSame } from "../document/difference";
 import { LightsPanel } from "../lights/LightsPanel";
+import { measuredThumbnail } from "../net/api";
 import type { MaterialLook } from "../protocol";
 import { solo, toggleMaterialSolo } from "../seen/solo";
 import { defaultLook, look } from "../state/look";
@@ -13,9 +14,11 @@ import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
 
-/** A ball in the material's colours: body from its diffuse term, highlight from the rest. */
+/** A ball in the material's colours: body from its diffuse term, highlight from the rest. Of what was measured its picture. */
 function Swatch({ material }: { material: MaterialLook | undefined }) {
   const terms = material?.terms ?? [];
+  const measured = terms.find((term) => term.data != null)?.data;
+  if (measured != null) return <span class="swatch" style={{ background: `url(${measuredThumbnail(measured)}) center / 130%` }} />;
   const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
   const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
   const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);
