@@ -1,8 +1,9 @@
 """btf.*: how well BTFs are kept, how near they are to what they stand for, how quickly they are shown.
 
-`btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is at most a fiftieth of
-a byte for each channel of each image; the worst of the three synthetic BTFs. `points` of the context is the curve:
-ratio and error of what was kept for two bounds, with fewer and fewer of its components. The norm:
+`btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is a fiftieth of a byte
+for each channel of each image; the worst of the three synthetic BTFs. `points` of the context is the curve: ratio and
+error of what was kept for two bounds, with fewer and fewer of its components; between the best of them, logarithms are
+linear. The norm:
 √Σ(kept − made)² ÷ √Σ made²; `of_range` divides by √mean square of the brightest thousandth instead, as errors of 8-bit
 images are often told; `delta_e` is the mean colour difference (CIE 1976) of texels in full light at that ratio.
 `btf.compression_ratio`: at an error of 5 %. `btf.compression_s`: what the slowest of the three takes to 5 %.
@@ -53,12 +54,23 @@ class _Curve(NamedTuple):
     delta_e: float
 
     @property
+    def _best(self) -> NDArray[np.float64]:
+        """Points that no other is better than in both, logarithms, ratios and errors rising. (2, n)"""
+        best: list[tuple[float, float]] = []
+        for ratio, error in sorted(self.points, reverse=True):
+            if not best or error < best[-1][1]:
+                best.append((ratio, error))
+        return np.asarray(np.log(best[::-1]).T)
+
+    @property
     def error(self) -> float:
-        return min((error for ratio, error in self.points if ratio >= _AT_RATIO), default=1.0)
+        ratio, error = self._best
+        return float(np.exp(np.interp(np.log(_AT_RATIO), ratio, error)))
 
     @property
     def ratio(self) -> float:
-        return max((ratio for ratio, error in self.points if error <= _AT_ERROR), default=1.0)
+        ratio, error = self._best
+        return float(np.exp(np.interp(np.log(_AT_ERROR), error, ratio)))
 
 
 def measure(tiny: bool) -> list[Figure]:

@@ -84,7 +84,19 @@ def document_of(name: str) -> str:
     return (
         "accuracy.md"
         if name.startswith(
-            ("accuracy.", "truth.", "paper.", "pca.", "gather.rmse", "gather.full", "lights.rmse", "btf.")
+            (
+                "accuracy.",
+                "truth.",
+                "paper.",
+                "pca.",
+                "gather.rmse",
+                "gather.full",
+                "lights.rmse",
+                "btf.compression_error",
+                "btf.compression_ratio",
+                "btf.geometry",
+                "btf.table",
+            )
         )
         or name == "frame.incremental_rmse"
         else "performance.md"

@@ -85,7 +85,7 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
     Returns:
         How many there are.
     """
-    finest = max(levels[0, 1], levels[0, 2])
+    finest = np.float32(max(levels[0, 1], levels[0, 2]))
     place = math.log2(max(footprint * finest, np.float32(1)))
     coarsest = levels.shape[0] - 1
     level: Any = min(place, np.float32(coarsest))
@@ -97,7 +97,8 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
         if of_level <= 0 or lower + step > coarsest:
             continue
         first, height, width = levels[lower + step, 0], levels[lower + step, 1], levels[lower + step, 2]
-        x, y = u * width - np.float32(0.5), v * height - np.float32(0.5)
+        x: Any = u * np.float32(width) - np.float32(0.5)
+        y: Any = v * np.float32(height) - np.float32(0.5)
         left, upper = math.floor(x), math.floor(y)
         fx, fy = np.float32(x - left), np.float32(y - upper)
         column, row = _folded(np.int64(left), width), _folded(np.int64(upper), height)
@@ -136,7 +137,7 @@ def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type:
             num_found += 1
         sums[slot, 0] += w
         for j in range(min(weight.shape[2], sums.shape[1] - 1)):
-            sums[slot, 1 + j] += w * weight[view, at, j]
+            sums[slot, 1 + j] += w * np.float32(weight[view, at, j])
     return num_found
 
 

@@ -32,6 +32,7 @@ F32 = NDArray[np.float32]
 
 _MOST = np.float32(20)  # times the mean
 _LEAST = np.float32(1e-6)
+_ALIKE = np.float32(0.999)  # cosine of tangents that azimuths about a ray may be counted from together
 
 
 class Sight(NamedTuple):
@@ -58,21 +59,24 @@ def _blend(values, vertex, weight, ray):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _turn_about(rungs, light, about, x, y, side, corners):  # type: ignore[no-untyped-def]
-    """Turn the light vectors of three vertices into the frame of a texture. corners: (3, 3, F)"""
-    corners[:] = 0
+def _light_in(rungs, light, about, shares, x, y, side, blended, out):  # type: ignore[no-untyped-def]
+    """Interpolate the light vectors of three vertices, in the frame of a texture. blended: (1, 3, F). out: (3, F)"""
+    out[:] = 0
+    a, b, c = about
+    t = row(light.tangent, a)
+    if min(dot(t, row(light.tangent, b)), dot(t, row(light.tangent, c))) > _ALIKE:
+        for channel in range(3):
+            for k in range(WIDTH):
+                blended[0, channel, k] = (
+                    shares[0] * light.vectors[a, channel, k]
+                    + shares[1] * light.vectors[b, channel, k]
+                    + shares[2] * light.vectors[c, channel, k]
+                )
+        add_turned(rungs, blended, 0, dot(t, x), dot(t, y), side, np.float32(1), out)
+        return
     for q in range(3):
-        v = about[q]
-        t = row(light.tangent, v)
-        add_turned(rungs, light.vectors, v, dot(t, x), dot(t, y), side, np.float32(1), corners[q])
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _light_at(corners, w0, w1, w2, out):  # type: ignore[no-untyped-def]
-    """Interpolate between vertices. out: (3, F)"""
-    for channel in range(3):
-        for k in range(WIDTH):
-            out[channel, k] = w0 * corners[0, channel, k] + w1 * corners[1, channel, k] + w2 * corners[2, channel, k]
+        t = row(light.tangent, about[q])
+        add_turned(rungs, light.vectors, about[q], dot(t, x), dot(t, y), side, shares[q], out)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -111,8 +115,7 @@ def _show(  # type: ignore[no-untyped-def]
     view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
     texel, share_of = np.empty(8, np.int32), np.empty(8, np.float32)
     found, sums = np.empty(8, np.int32), np.empty((8, 1 + COMPONENTS), np.float32)
-    corners, arriving = np.zeros((3, 3, WIDTH), np.float32), np.empty((3, WIDTH), np.float32)
-    last, last_face = (vertex[0, 0], vertex[0, 0], vertex[0, 0]), face[0] - face[0] - 1
+    blended, arriving = np.empty((1, 3, WIDTH), np.float32), np.empty((3, WIDTH), np.float32)
     of_texel, of_mean = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
     for index in range(start, stop):
         ray = rows[index]
@@ -122,10 +125,8 @@ def _show(  # type: ignore[no-untyped-def]
         num = texels_about(levels, scale * u, scale * v, scale * footprint, texel, share_of)
         taps(rings, -dot(d, x), -dot(d, y), -dot(d, n), view, of_view)
         about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
-        if about != last or face[ray] != last_face:  # neighbours mostly share them, and the frame nearly
-            _turn_about(rungs, light, about, x, y, side, corners)
-            last, last_face = about, face[ray]
-        _light_at(corners, weight[ray, 0], weight[ray, 1], weight[ray, 2], arriving)
+        shares = weight[ray, 0], weight[ray, 1], weight[ray, 2]
+        _light_in(rungs, light, about, shares, x, y, side, blended, arriving)
         of_texel[:] = 0
         for tap in range(4):
             num_found = sum_weights(cluster, weights, view[tap], texel, share_of, num, found, sums)
