@@ -83,6 +83,12 @@ class AssetStore:
         finally:
             self._folders.remove(folder)
 
+    @staticmethod
+    def identity_of(source: Path) -> str:
+        """The id of what a file holds."""
+        with source.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
     def keep(self, folder: Path, source: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> str:
         """Keep what a file holds under the file's hash, and return its id; what is here already takes the new name.
 
@@ -93,8 +99,7 @@ class AssetStore:
         Raises:
             self.problem: the store is full. And what `fill` raises; then nothing is kept.
         """
-        with source.open("rb") as file:
-            identity = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        identity = self.identity_of(source)
         target = folder / identity
         if not target.exists():
             if len(self.paths(folder)) >= self.max_entries:

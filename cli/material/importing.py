@@ -47,16 +47,12 @@ def material_import(
 def _import_btf(folder: Path, file: Path, name: str, bound: float) -> None:
     from cli.interrupts import until_interrupted
     from cli.material.words import tell
-    from relume.btf.compress import compress
-    from relume.btf.shelf import keep
-    from relume.btf.zips import ZippedBtf
+    from relume.btf.importing import import_zip
     from worker.paths import btfs_path
 
     tell(
         until_interrupted(
             file.name,
-            lambda progress, cancelled: keep(
-                btfs_path(folder), file, name, None, lambda: compress(ZippedBtf(file), bound, progress, cancelled)
-            ),
+            lambda progress, cancelled: import_zip(btfs_path(folder), file, name, bound, progress, cancelled),
         )
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_ROUNDS = 12
+_ROUNDS = 6  # by means alone, then with components
 
 
 class Clusters(NamedTuple):
@@ -34,14 +34,20 @@ def cluster(rows: F32, num_clusters: int, num_components: int, rng: np.random.Ge
         rng: chooses the first means.
     """
     centres = _spread(rows, num_clusters, rng)
+    num = len(centres)
     of = np.argmin(_apart(rows, centres), axis=1)
-    for trial in range(_ROUNDS):
-        found = _components(rows, of, len(centres), num_components)
-        nearest = np.argmin(_apart(rows, found.mean) if trial < _ROUNDS // 2 else distances(rows, found), axis=1)
-        if (nearest == of).all() and (trial >= _ROUNDS // 2 or len(centres) == 1):
+    if num == 1:
+        return _components(rows, of, num, num_components)
+    for _ in range(_ROUNDS):
+        of = np.argmin(_apart(rows, _means(rows, of, num)), axis=1)
+    found = _components(rows, of, num, num_components)
+    for _ in range(_ROUNDS):
+        nearest = np.argmin(distances(rows, found), axis=1)
+        if (nearest == of).all():
             break
         of = nearest
-    return _components(rows, of, len(centres), num_components)
+        found = _components(rows, of, num, num_components)
+    return found
 
 
 def _spread(rows: F32, num: int, rng: np.random.Generator) -> F32:
@@ -54,13 +60,18 @@ def _spread(rows: F32, num: int, rng: np.random.Generator) -> F32:
     return rows[chosen]
 
 
+def _means(rows: F32, of: NDArray[np.intp], num_clusters: int) -> F32:
+    """Mean of each cluster, of all rows where it is empty. (K, R)"""
+    every = rows.mean(axis=0)
+    return np.stack([rows[of == k].mean(axis=0) if (of == k).any() else every for k in range(num_clusters)])
+
+
 def _components(rows: F32, of: NDArray[np.intp], num_clusters: int, num: int) -> Clusters:
     """Mean and components of each cluster; one that is empty has those of all rows."""
-    mean = np.empty((num_clusters, rows.shape[1]), np.float32)
+    mean = _means(rows, of, num_clusters)
     components = np.zeros((num_clusters, num, rows.shape[1]), np.float32)
     for k in range(num_clusters):
         mine = rows[of == k] if (of == k).any() else rows
-        mean[k] = mine.mean(axis=0)
         found = strongest(mine - mean[k], num)
         components[k, : len(found)] = found
     return Clusters(of, mean, components)

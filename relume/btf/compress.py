@@ -8,11 +8,13 @@ bound is found from some of the views. The error that is told is that of what wa
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.btf.begun import Arrays, Begun
 from relume.btf.clusters import Clusters, cluster, distances, missed, strongest
 from relume.btf.eigen import LARGEST, EigenBtf
 from relume.btf.rings import Rings
@@ -24,6 +26,7 @@ F64 = NDArray[np.float64]
 MOST_CLUSTERS, MOST_COMPONENTS = 64, 16
 MOST_TEXELS = 512 * 512
 _CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # among which the number is chosen
+_SEED = 0  # of the first clusters
 _SPAN = 64  # R: numbers that a texel's row is brought to
 _LOOKED_AT = 5  # views that numbers are chosen by
 _OF_CHOOSING = 0.2  # of the time, about
@@ -53,7 +56,7 @@ class _Span(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """What is kept from one side: that view of `EigenBtf`'s arrays, and squares missed by how many components."""
+    """What is kept from one side: a view of `EigenBtf`'s arrays; squares of all, and missed by how many components."""
 
     cluster: NDArray[np.uint8]
     weight: NDArray[np.int8]
@@ -61,6 +64,7 @@ class _Part(NamedTuple):
     eigen: NDArray[np.int8]
     step: F32
     average: F32
+    energy: NDArray[np.float64]
     missed: F64
 
 
@@ -69,14 +73,14 @@ def compress(
     bound: float,
     progress: Callable[[float], object],
     cancelled: Callable[[], bool],
-    seed: int = 0,
+    begun: Begun | None = None,
 ) -> EigenBtf:
     """Choose clusters and components so that no more is kept than an error bound needs.
 
     Args:
         images: the BTF. bound: relative RMS that is allowed.
         progress: called with the share done. cancelled: asked before each view.
-        seed: of the first clusters.
+        begun: parts that were found before, which are not found again; new ones are put there.
     Raises:
         MaterialError: values are not finite, or negative, or the BTF is black. CancelledError: `cancelled` said so.
     """
@@ -91,24 +95,41 @@ def compress(
         progress(share)
         return _rows(images, view)
 
+    chosen = _known(begun, "choice", lambda: _choice(images, bound, rows_of))
+    num_clusters, num = int(chosen["clusters"]), int(chosen["components"])
+    parts = []
+    for view in range(views):
+        rows = partial(rows_of, view, _OF_CHOOSING + (1 - _OF_CHOOSING) * view / views)
+        parts.append(
+            _Part(**_known(begun, f"view-{view}", partial(_found, rows, images.size, num_clusters, num, view)))
+        )
+    energy = float(sum(part.energy for part in parts))
+    if energy <= 0:
+        raise MaterialError("the BTF is black")
+    kept = _joined(images, parts, energy)
+    return kept.with_components(next((j for j, one in enumerate(kept.error) if one <= bound), num))
+
+
+def _known(begun: Begun | None, name: str, find: Callable[[], Arrays]) -> Arrays:
+    """What was found before, else find it now."""
+    found = None if begun is None else begun.take(name)
+    if found is None:
+        found = find()
+        if begun is not None:
+            begun.put(name, found)
+    return found
+
+
+def _choice(images: Images, bound: float, rows_of: Callable[[int, float], F32]) -> Arrays:
+    """Choose clusters and components by some of the views."""
+    views = images.rings.num_directions
     looked_at = np.unique(np.linspace(0, views - 1, _LOOKED_AT).round().astype(int))
     some = [
         _span(rows_of(view, _OF_CHOOSING * number / len(looked_at)))
         for number, view in enumerate(looked_at)
     ]  # fmt: skip
-    num_clusters, least = _choose(some, bound, seed)
-    num = min(least + _MORE, MOST_COMPONENTS)
-    parts, energy = [], 0.0
-    for view in range(views):
-        rows = rows_of(view, _OF_CHOOSING + (1 - _OF_CHOOSING) * view / views)
-        rng = np.random.default_rng((seed, view))
-        span = _span(rows)
-        parts.append(_part(rows, span, images.size, num_clusters, num, rng))
-        energy += span.energy
-    if energy <= 0:
-        raise MaterialError("the BTF is black")
-    kept = _joined(images, parts, energy)
-    return kept.with_components(next((j for j, one in enumerate(kept.error) if one <= bound), num))
+    num_clusters, least = _choose(some, bound)
+    return {"clusters": np.array(num_clusters), "components": np.array(min(least + _MORE, MOST_COMPONENTS))}
 
 
 def _rows(images: Images, view: int) -> F32:
@@ -133,7 +154,7 @@ def _energy(rows: F32) -> float:
     return float(np.einsum("nr,nr->", rows, rows, dtype=np.float64))
 
 
-def _choose(some: list[_Span], bound: float, seed: int) -> tuple[int, int]:
+def _choose(some: list[_Span], bound: float) -> tuple[int, int]:
     """Find the clusters and components that keep some views to a bound in the least space, else what errs least."""
     best: tuple[float, float, int, int] | None = None
     texels = len(some[0].z)
@@ -142,7 +163,7 @@ def _choose(some: list[_Span], bound: float, seed: int) -> tuple[int, int]:
     for num_clusters in _CLUSTERS:
         left = np.zeros(MOST_COMPONENTS + 1)
         for span in some:
-            rng = np.random.default_rng(seed)
+            rng = np.random.default_rng(_SEED)
             left += span.lost + missed(span.z, cluster(span.z, num_clusters, MOST_COMPONENTS, rng))
         for num, error in enumerate(np.sqrt(left / energy)):
             size = num_clusters * (2 + num) * values + texels * (1 + num)
@@ -152,10 +173,10 @@ def _choose(some: list[_Span], bound: float, seed: int) -> tuple[int, int]:
     return (1, 0) if best is None else best[2:]
 
 
-def _part(
-    rows: F32, span: _Span, size: tuple[int, int], num_clusters: int, num: int, rng: np.random.Generator
-) -> _Part:
-    """Cluster the texels of one view, and round what tells them."""
+def _found(rows_of: Callable[[], F32], size: tuple[int, int], num_clusters: int, num: int, view: int) -> Arrays:
+    """Cluster the texels of one view, and round what tells them: a `_Part`."""
+    rows, rng = rows_of(), np.random.default_rng((_SEED, view))
+    span = _span(rows)
     found = cluster(span.z, num_clusters, num, rng)
     z = np.concatenate([level.reshape(-1, span.z.shape[1]) for level in levels_of(span.z, size)])
     of, weight = _told(z, found)
@@ -169,9 +190,10 @@ def _part(
     by_light = (len(mean), -1, 3)
     part = _Part(
         of.astype(np.uint8), weight.astype(np.int8), mean.reshape(by_light),
-        eigen.astype(np.int8).reshape(*step.shape, -1, 3), step, span.centre.reshape(-1, 3), np.zeros(0),
+        eigen.astype(np.int8).reshape(*step.shape, -1, 3), step, span.centre.reshape(-1, 3),
+        np.array(span.energy), np.zeros(0),
     )  # fmt: skip
-    return part._replace(missed=_missed(rows, part))
+    return part._replace(missed=_missed(rows, part))._asdict()
 
 
 def _told(z: F32, found: Clusters) -> tuple[NDArray[np.intp], F32]:

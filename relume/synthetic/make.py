@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from relume.btf.begun import Begun
 from relume.btf.compress import MOST_TEXELS, compress
 from relume.btf.eigen import EigenBtf
 from relume.btf.rings import ubo_rings
@@ -84,7 +85,8 @@ def make_btf(
         small = SmallGeometry(GEOMETRIES[wanted.geometry](), ubo_rings(), size, wanted.grid, _SEED)
         values.fill(small.seen_from, lambda share: progress(_OF_RENDERING * share), cancelled)
         rest = 1 - _OF_RENDERING
-        return compress(values, wanted.bound, lambda share: progress(_OF_RENDERING + rest * share), cancelled)
+        begun = Begun(making / "compressed", {"bound": wanted.bound})
+        return compress(values, wanted.bound, lambda share: progress(_OF_RENDERING + rest * share), cancelled, begun)
 
     record = keep(folder, recipe, name, wanted.geometry, make)
     shutil.rmtree(making)

@@ -311,7 +311,18 @@ def test_description_is_json_for_every_term():
         ("theta_o", "theta_o", 64, True),
     ]
     roughness = ggx["parameters"][0]
-    assert set(roughness) == {"name", "label", "minimum", "maximum", "default", "unit", "scale", "help", "fixed"}
+    assert set(roughness) == {
+        "name",
+        "label",
+        "minimum",
+        "maximum",
+        "default",
+        "unit",
+        "scale",
+        "step",
+        "help",
+        "fixed",
+    }
     assert not roughness["fixed"]
     fixed = {(entry["model"], p["name"]) for entry in listed for p in entry["parameters"] if p["fixed"]}
     assert ("oren_nayar", "sigma") in fixed

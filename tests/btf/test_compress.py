@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from relume.btf.begun import Begun
 from relume.btf.compress import MOST_COMPONENTS, compress
 from relume.btf.rings import directions, ubo_rings
 from relume.errors import CancelledError, MaterialError
@@ -29,8 +30,8 @@ class Facets:
         return ((lit * seen[:, None]).T[..., None] * self._gain).astype(np.float32)
 
 
-def kept(images, bound=0.01, **others):
-    return compress(images, bound, others.get("progress", lambda share: None), others.get("cancelled", lambda: False))
+def kept(images, bound=0.01, progress=lambda share: None, cancelled=lambda: False, begun=None):
+    return compress(images, bound, progress, cancelled, begun)
 
 
 def whole(images):
@@ -75,6 +76,29 @@ def test_progress_rises_to_the_end_and_a_cancelled_one_stops():
     assert shares[-1] > 0.9
     with pytest.raises(CancelledError):
         kept(Facets(kinds=3), cancelled=lambda: len(shares) > 0)
+
+
+def counted(images):
+    """Count how often each view is read, in a list that is returned."""
+    read, seen_from = [], images.seen_from
+    images.seen_from = lambda view: read.append(view) or seen_from(view)
+    return read
+
+
+def test_one_that_was_stopped_goes_on_and_finds_the_same(tmp_path):
+    images, asked = Facets(kinds=9), []
+    expected = kept(images)
+    with pytest.raises(CancelledError):
+        kept(images, cancelled=lambda: asked.append(0) or len(asked) > 40, begun=Begun(tmp_path / "a", {"bound": 0.01}))
+    (tmp_path / "a" / "view-3.npz").write_bytes(b"PK\x03\x04 half written")
+    read = counted(images)
+    found = kept(images, begun=Begun(tmp_path / "a", {"bound": 0.01}))
+    assert read == [3, *range(35, 81)]  # five were read to choose by, then 35
+    for name in ("cluster", "weight", "mean", "eigen", "step", "average", "error"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    read.clear()
+    kept(images, 0.2, begun=Begun(tmp_path / "a", {"bound": 0.2}))
+    assert len(read) == 5 + 81  # what was found for another bound does not count
 
 
 @pytest.mark.parametrize(("value", "said"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])

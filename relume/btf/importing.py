@@ -1,0 +1,37 @@
+"""BTFs of files: read, compressed, kept. One that was begun goes on."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from relume.btf.begun import Begun
+from relume.btf.compress import compress
+from relume.btf.shelf import STORE, BtfRecord, keep
+from relume.btf.zips import ZippedBtf
+
+
+def import_zip(
+    folder: Path,
+    file: Path,
+    name: str,
+    bound: float,
+    progress: Callable[[float], object],
+    cancelled: Callable[[], bool],
+) -> BtfRecord:
+    """Import a zip of images; the same again is the same BTF.
+
+    Args:
+        folder: of the asset store. file: the zip. name: what people call it. bound: relative RMS that may be missed.
+        progress: called with the share done. cancelled: asked now and then.
+    Raises:
+        MaterialError: it is no such file, or the store is full. CancelledError: `cancelled` said so; what was found
+            stays.
+    """
+    images = ZippedBtf(file)
+    making = folder / "making" / STORE.identity_of(file)
+    begun = Begun(making, {"bound": bound})
+    record = keep(folder, file, name, None, lambda: compress(images, bound, progress, cancelled, begun))
+    shutil.rmtree(making, ignore_errors=True)
+    return record
