@@ -198,9 +198,7 @@ def _found(rows_of: Callable[[], F32], size: tuple[int, int], num_clusters: int,
 
 def _told(z: F32, found: Clusters) -> tuple[NDArray[np.intp], F32]:
     """Which cluster tells each row best, and by which weights. (n,), (n, C)"""
-    of, weight = np.empty(len(z), np.intp), np.empty((len(z), found.components.shape[1]), np.float32)
-    for start in range(0, len(z), 4096):
-        of[start : start + 4096] = np.argmin(distances(z[start : start + 4096], found), axis=1)
+    of, weight = np.argmin(distances(z, found), axis=1), np.empty((len(z), found.components.shape[1]), np.float32)
     for k in np.unique(of):
         weight[of == k] = (z[of == k] - found.mean[k]) @ found.components[k].T
     return of, weight

@@ -73,7 +73,7 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _blend(values, vertex, weight):  # type: ignore[no-untyped-def]
+def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors (vertices, 3) of the three vertices about a pixel."""
     x = y = z = np.float32(0)
     for k in range(3):
@@ -83,11 +83,17 @@ def _blend(values, vertex, weight):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
+def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Find the place in textures of a place in a triangle."""
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
     return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def footprint_of(distance, pixel_angle, metre, along):  # type: ignore[no-untyped-def]
+    """Find the side of what a pixel sees in a texture, a metre of which is `metre` long, under a slant's cosine."""
+    return distance * pixel_angle * metre / math.sqrt(max(abs(along), _LEAST_SLANT))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -128,18 +134,18 @@ def _combine(  # type: ignore[no-untyped-def]
         lobe, row, share, ratio = lobes.of[material], 0, np.float32(0), np.float32(1)
         d = directions[p, 0], directions[p, 1], directions[p, 2]
         along = outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2]
-        footprint = distance[p] * pixel_angle * uv_scale[f] / math.sqrt(max(abs(along), _LEAST_SLANT))
-        place = _in_texture(uvs, corners, at)
+        footprint = footprint_of(distance[p], pixel_angle, uv_scale[f], along)
+        place = in_texture(uvs, corners, at)
         is_mapped = textures.of_material[material, NORMAL_MAP] >= 0
         n = d
         if is_mapped or lobe >= 0:
-            n = unit(_blend(normals, about, shares))
+            n = unit(blend(normals, about, shares))
         if is_mapped:
             leant = _lean(
                 textures, textures.of_material[material, NORMAL_MAP], place, footprint, tangents, corners, at,
                 n, outward, along > 0, texture_value,
             )  # fmt: skip
-            ratio = shading_ratio(_blend(towards_light, about, shares), n, leant)
+            ratio = shading_ratio(blend(towards_light, about, shares), n, leant)
             n = leant
         if lobe >= 0:
             row, share = _mirror(mirrored, about, shares, d, outward, lobe, n, light)

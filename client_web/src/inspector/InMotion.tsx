@@ -19,12 +19,12 @@ function words({ functions, missed, needed, is_mirror }: InOutBody): string {
 /** How a texture that looks different from every side lies on a material, and who can draw it. */
 function Cover({ material }: { material: string }) {
   const isProjected = scene.value?.materials.find(({ name }) => name === material)?.is_projected === true;
-  const motion = drawsHere.value ? "While the eye moves: the mean of all texels, as this browser draws." : null;
-  if (!isProjected && !(moves.value && motion)) return null;
+  const isMean = moves.value && drawsHere.value;
+  if (!isProjected && !isMean) return null;
   return (
     <p class="in-motion">
       {isProjected && "The object has no places in textures: it is projected along the world’s axes, a metre for each repeat. "}
-      {moves.value && motion}
+      {isMean && "While the eye moves: the mean of all texels, as this browser draws."}
     </p>
   );
 }

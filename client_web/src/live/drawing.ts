@@ -1,7 +1,7 @@
 /** Moving views that this browser draws itself: nothing goes over the network for an eye that moves. The server says
  * what a look makes (frames of kind "tables"), and sends exact pictures as ever; where it has not caught up, or the
  * browser cannot draw, it sends all pictures. */
-import { effect, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import { Evaluator } from "../evaluator/evaluator";
 import { isSoftware } from "../evaluator/software";
 import { getJson, request } from "../net/api";
@@ -36,8 +36,8 @@ let here: Here | null = null;
 let loading: BakeConnection | null = null;
 /** Bakes that this browser has failed to draw. */
 const refused = new WeakSet<BakeConnection>();
-/** Whether the choice is left to us, and the server shows what this browser cannot. */
-const isServers = (): boolean => drawnBy.peek() === "auto" && hasTexels.peek();
+/** Whether the server draws: it was chosen, or the choice is left to us and it shows what this browser cannot. */
+const isServers = computed(() => drawnBy.value === "server" || (drawnBy.value === "auto" && hasTexels.value));
 const eyes = new Map<string, number>();
 const away = new Set<string>();
 const dirty = new Set<string>();
@@ -172,14 +172,14 @@ function giveUp(reason: string | null): void {
 /** A picture of a view is shown: from now on this browser may draw it. */
 async function offer(of: BakeConnection, view: string): Promise<void> {
   const isFree = of.hello?.views.find(({ name }) => name === view)?.eye === "free";
-  if (!isFree || of !== connections.shown || drawnBy.peek() === "server" || isServers() || refused.has(of)) return;
+  if (!isFree || of !== connections.shown || isServers.peek() || refused.has(of)) return;
   if (here?.of === of) return tellWhereNeeded(here);
   if (loading === of) return;
   loading = of;
   try {
     const made = await load(of);
     if (made === null) return;
-    if (of !== connections.shown || drawnBy.peek() === "server" || isServers()) return made.evaluator.release();
+    if (of !== connections.shown || isServers.peek()) return made.evaluator.release();
     here?.evaluator.release();
     here = made;
     durations = [];
@@ -222,7 +222,7 @@ async function load(of: BakeConnection): Promise<Here | null> {
 effect(() => {
   const choice = drawnBy.value;
   const { shown } = connections;
-  if (choice === "server" || (choice === "auto" && hasTexels.value)) giveUp(null);
+  if (isServers.value) giveUp(null);
   if (shown === null) return;
   if (choice !== "server") refused.delete(shown);
   for (const view of shown.hello?.views ?? []) if (shown.arrivals.isShown(view.name)) void offer(shown, view.name);

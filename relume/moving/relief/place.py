@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numba as nb
 import numpy as np
 
 from relume.moving.bumps import unit
+from relume.moving.pixels import footprint_of, in_texture
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -90,16 +89,15 @@ def place_of(surface, face, uv, distance, d, eye, n, pixel_angle, turn):  # type
     outward = row(face_normal, face)
     along = dot(outward, d)
     if has_place:
-        w0 = np.float32(1) - uv[0] - uv[1]
-        u, up = w0 * uv0[0] + uv[0] * uv1[0] + uv[1] * uv2[0], -(w0 * uv0[1] + uv[0] * uv1[1] + uv[1] * uv2[1])
-        metre = uv_scale[face]
+        u, down = in_texture(uvs, (a, b, c), uv)
+        up, metre = -down, uv_scale[face]
         y = side * y[0], side * y[1], side * y[2]
     else:
         away = np.float32(-1) if along > 0 else np.float32(1)
         x, y = _projected((away * outward[0], away * outward[1], away * outward[2]))
         place = eye[0] + distance * d[0], eye[1] + distance * d[1], eye[2] + distance * d[2]
         u, up, metre, side = dot(place, x), dot(place, y), np.float32(1), np.float32(1)
-    footprint = distance * pixel_angle * metre / math.sqrt(max(abs(along), np.float32(0.05)))
+    footprint = footprint_of(distance, pixel_angle, metre, along)
     c, s = turn
     x, y = (
         (c * x[0] + s * y[0], c * x[1] + s * y[1], c * x[2] + s * y[2]),

@@ -21,6 +21,7 @@ from relume.basis.zernike import ladder
 from relume.btf.rings import taps
 from relume.moving.bumps import unit
 from relume.moving.look_up import Seen
+from relume.moving.pixels import blend
 from relume.moving.points.surface import Surface
 from relume.moving.relief.light import VertexLight, add_turned, light_about
 from relume.moving.relief.place import dot, place_of, row
@@ -46,16 +47,6 @@ class Sight(NamedTuple):
     eye: F32
     pixel_angle: float
     seen: Seen
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _blend(values, vertex, weight, ray):  # type: ignore[no-untyped-def]
-    """Interpolate vectors (vertices, 3) of the three vertices about a ray, to unit length."""
-    x = y = z = np.float32(0)
-    for q in range(3):
-        v, w = vertex[ray, q], weight[ray, q]
-        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
-    return unit((x, y, z))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -119,13 +110,13 @@ def _show(  # type: ignore[no-untyped-def]
     of_texel, of_mean = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
     for index in range(start, stop):
         ray = rows[index]
-        d, n = row(directions, ray), _blend(normals, vertex, weight, ray)
+        about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
+        shares = weight[ray, 0], weight[ray, 1], weight[ray, 2]
+        d, n = row(directions, ray), unit(blend(normals, about, shares))
         at = uv[ray, 0], uv[ray, 1]
         x, y, side, u, v, footprint = place_of(surface, face[ray], at, distance[ray], d, eye, n, pixel_angle, turn)
         num = texels_about(levels, scale * u, scale * v, scale * footprint, texel, share_of)
         taps(rings, -dot(d, x), -dot(d, y), -dot(d, n), view, of_view)
-        about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
-        shares = weight[ray, 0], weight[ray, 1], weight[ray, 2]
         _light_in(rungs, light, about, shares, x, y, side, blended, arriving)
         of_texel[:] = 0
         for tap in range(4):

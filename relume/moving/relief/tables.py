@@ -27,7 +27,7 @@ F64 = NDArray[np.float64]
 DEGREE = 4  # of the in-basis, as of harmonics in the paper: a BTF tells no light apart that is much narrower
 NUM_FUNCTIONS = num_functions(DEGREE)
 WIDTH = 16  # F: with nothing behind them, so that kernels' loops are as long as a processor's vectors
-COMPONENTS = 5  # C: that are enough while the eye moves
+COMPONENTS = 5  # C: that are enough while the eye moves; `relume.moving.relief.show` sums them in one line
 _AROUND, _DOWN = 180, 90  # directions of the quadrature
 
 
