@@ -92,7 +92,12 @@ def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def footprint_of(distance, pixel_angle, metre, along):  # type: ignore[no-untyped-def]
-    """Find the side of what a pixel sees in a texture, a metre of which is `metre` long, under a slant's cosine."""
+    """Find the side of what a pixel sees of a texture.
+
+    Args:
+        distance: from the eye, metres. pixel_angle: that a pixel spans, radians.
+        metre: side in the texture of a metre of the surface. along: cosine of the slant, of either sign.
+    """
     return distance * pixel_angle * metre / math.sqrt(max(abs(along), _LEAST_SLANT))
 
 
