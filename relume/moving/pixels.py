@@ -74,7 +74,11 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
-    """Interpolate vectors (vertices, 3) of the three vertices about a pixel."""
+    """Interpolate vectors between the three vertices about a pixel.
+
+    Args:
+        values: of all vertices. (vertices, 3). vertex: the three, a tuple. weight: of each, a tuple.
+    """
     x = y = z = np.float32(0)
     for k in range(3):
         v, w = vertex[k], weight[k]
@@ -84,7 +88,11 @@ def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
-    """Find the place in textures of a place in a triangle."""
+    """Find the place in textures of a place in a triangle.
+
+    Args:
+        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: the place in it, of two of them.
+    """
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
     return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
