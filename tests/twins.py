@@ -249,3 +249,25 @@ def full_evaluation(transfer, view_name, look):
     """The picture of a look, nothing incremental, frozen or cached. (height, width, 3) float64"""
     view = transfer.views[view_name]
     return resolve(view, radiance_of(transfer, view, look))
+
+
+def opacity_at(alpha, wrap, uv):
+    """Opacity between four texels of an image of bytes, at places (n, 2), v from the top. (n,)"""
+
+    def wrapped(index, size, how):
+        index = np.asarray(index, int)
+        if how == "clamp":
+            return np.clip(index, 0, size - 1)
+        if how == "mirror":
+            return np.minimum(index % (2 * size), 2 * size - 1 - index % (2 * size))
+        return index % size
+
+    height, width = alpha.shape
+    x, y = np.asarray(uv, float).T * [[width], [height]] - 0.5
+    (x0, fx), (y0, fy) = ((np.floor(v), v - np.floor(v)) for v in (x, y))
+    total = np.zeros(len(x))
+    for dy in (0, 1):
+        for dx in (0, 1):
+            texel = alpha[wrapped(y0 + dy, height, wrap[1]), wrapped(x0 + dx, width, wrap[0])]
+            total += np.abs(1 - dx - fx) * np.abs(1 - dy - fy) * texel
+    return total / 255

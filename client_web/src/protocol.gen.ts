@@ -597,13 +597,14 @@ export interface StatusMessage {
   progress: number;
 }
 
-/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. */
+/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
 export interface SurfaceBody {
   functions: number;
   rows: number;
   columns: number;
   ladder: LadderBody;
   expansions: number[][];
+  has_holes: boolean;
   arrays: string[];
 }
 

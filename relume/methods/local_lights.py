@@ -13,7 +13,7 @@ from relume.bake import StoreReader
 from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
 from relume.look import LightGeometry
 from relume.memory import Memory
-from relume.methods.store_io import read_gather_samples
+from relume.methods.store_io import read_gather_samples, read_holes
 from relume.picture.light import Light, Source
 from relume.points import Points
 from relume.project.receivers import LocalRays
@@ -65,7 +65,7 @@ class LocalLights:
     @cached_property
     def embree(self) -> EmbreeScene:
         """Their search tree."""
-        return EmbreeScene.build(self.positions, self.faces)
+        return EmbreeScene.build(self.positions, self.faces, read_holes(self._store, self.faces))
 
     @cached_property
     def _off_surface(self) -> float:

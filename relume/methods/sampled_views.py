@@ -4,6 +4,7 @@ The bake keeps rays, not answers: per view sample one visibility bit a light tri
 triangles, and each view's samples), then "visibility" (rows of each view).
 
     scene/positions, faces, face_material                    triangles, for shadows of lights that looks add
+    scene/uvs, cutouts/…                                     where some have holes: relume.trace.cutouts.Cutouts
     lights/environment                                       radiance, to weigh it again
     lights/tiles                                             relume.light.tiles.Tiles
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
@@ -105,6 +106,7 @@ class SampledViews:
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
+            "has_holes": any(material.opacity is not None for material in scene.materials),
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -192,7 +194,11 @@ def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 
 def triangles_of(geometry: Geometry) -> dict[str, NDArray[Any]]:
     """A scene's triangles, as arrays of a store."""
-    return {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+    arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+    holes = geometry.embree.holes
+    if holes is not None:
+        arrays |= {"scene/uvs": holes.uvs, **{f"cutouts/{k}": array for k, array in holes.cutouts._asdict().items()}}
+    return arrays
 
 
 def read_targets(store: StoreReader) -> Targets:

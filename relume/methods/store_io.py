@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.brdf.albedo import TEXTURES
-from relume.errors import StoreError
+from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
@@ -16,6 +16,8 @@ from relume.points import Points
 from relume.trace.cell_tree import CellTree
 from relume.trace.cells import gather_samples_of
 from relume.trace.coherent import RayCounts
+from relume.trace.cutout_filter import Holes
+from relume.trace.cutouts import Cutouts, check_cutouts
 
 F32 = NDArray[np.float32]
 
@@ -66,6 +68,25 @@ def read_cells(store: StoreReader) -> CellLight:
         material,
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
     )
+
+
+def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
+    """Where triangles of a store have holes; None where all are whole.
+
+    Args:
+        store: an open one. faces: its triangles. (num_faces, 3) uint32
+    Raises:
+        ChunkDamagedError: what says so does not fit the triangles.
+    """
+    if not store.attributes.get("has_holes"):
+        return None
+    names = store.attributes["materials"]
+    cutouts = check_cutouts({name: store.read(f"cutouts/{name}") for name in Cutouts._fields}, len(names))
+    uvs, material = store.read("scene/uvs"), store.read("scene/face_material")
+    corner, last = int(faces.max(initial=0)), int(material.max(initial=0))
+    if corner >= len(uvs) or len(material) != len(faces) or not 0 <= material.min(initial=0) <= last < len(names):
+        raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
+    return Holes.of(faces, uvs, material, cutouts)
 
 
 def read_rays(store: StoreReader) -> RayCounts:

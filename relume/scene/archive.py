@@ -20,13 +20,14 @@ from relume.errors import SceneError
 from relume.remarks import Remark, remark_of
 from relume.replacing import replacing
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Light, Material, Mesh, Scene, Texture
+from relume.scene.model import Camera, Light, Material, Mesh, Opacity, Scene, Texture
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
 MAX_ARRAY_BYTES = 16 << 30
 MESH_ARRAYS = ("positions", "normals", "tangents", "uvs", "faces")
 REMEDY = "import the scene again"
+_STORED = (np.dtype("<f4"), np.dtype("<u4"), np.dtype("|u1"))
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -129,6 +130,8 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         arrays |= {f"mesh{i}_{key}": getattr(mesh, key) for key in MESH_ARRAYS}
     for i, material in enumerate(scene.materials):
         arrays |= {f"material{i}_{channel}": texture.pixels for channel, texture in _textures(material)}
+        if material.opacity is not None:
+            arrays[f"material{i}_opacity"] = material.opacity.alpha
     document = {
         "format": FORMAT_VERSION,
         "name": scene.name,
@@ -139,7 +142,9 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "terms": list(material.terms),
                 "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
                 "double_sided": material.double_sided,
-                **({"catcher": True} if material.catcher else {}),  # ids of scenes without one stay what they were
+                # ids of scenes without these stay what they were
+                **({"catcher": True} if material.catcher else {}),
+                **({"opacity": _described_opacity(material.opacity)} if material.opacity else {}),
             }
             for material in scene.materials
         ],
@@ -152,6 +157,10 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     if scene.lights:
         document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
     return document, arrays
+
+
+def _described_opacity(opacity: Opacity) -> dict[str, Any]:
+    return {"wrap": list(opacity.wrap), "cutoff": opacity.cutoff}
 
 
 def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
@@ -184,7 +193,14 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
     normal_map = textures.pop("normal_map", None)
     terms = tuple(dict(term) for term in document["terms"])
     double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
-    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher)
+    opacity = _assemble_opacity(document["opacity"], arrays[f"material{i}_opacity"]) if "opacity" in document else None
+    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher, opacity)
+
+
+def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
+    wrap_u, wrap_v = document["wrap"]
+    cutoff = document["cutoff"]
+    return Opacity(alpha, (str(wrap_u), str(wrap_v)), None if cutoff is None else float(cutoff))
 
 
 def _cameras(document: dict[str, Any]) -> list[Camera]:
@@ -222,7 +238,7 @@ def _read_array(file: BinaryIO, size_bytes: int) -> NDArray[Any]:
         raise SceneError(f"arrays.npz was not written by relume; {REMEDY}")
     shape, fortran_order, dtype = npy_format.read_array_header_1_0(file)
     needed_bytes = math.prod(shape) * dtype.itemsize
-    if fortran_order or dtype not in (np.dtype("<f4"), np.dtype("<u4")) or not 0 <= needed_bytes <= size_bytes:
+    if fortran_order or dtype not in _STORED or not 0 <= needed_bytes <= size_bytes:
         raise SceneError(f"arrays.npz holds an array that relume does not write; {REMEDY}")
     data = file.read(needed_bytes)
     return np.frombuffer(bytearray(data), dtype).reshape(shape)

@@ -34,6 +34,18 @@ def check_mesh(mesh: Mesh, num_materials: int) -> None:
         raise SceneError(f"mesh {mesh.name!r} names material {mesh.material}, which there is not; export it again")
 
 
+def check_opacity(material: Material) -> None:
+    """Raises SceneError where opacity is not an image of bytes, or cuts at no share."""
+    opacity = material.opacity
+    if opacity is None:
+        return
+    is_image = opacity.alpha.ndim == 2 and opacity.alpha.size > 0 and opacity.alpha.dtype == np.uint8
+    if not is_image or not set(opacity.wrap) <= {"repeat", "mirror", "clamp"}:
+        raise SceneError(f"the opacity of material {material.name!r} is not an image of bytes; import the scene again")
+    if opacity.cutoff is not None and not 0 < opacity.cutoff <= 1:
+        raise SceneError(f"material {material.name!r} is cut at {opacity.cutoff}; give a share above 0, at most 1")
+
+
 def check_camera(camera: Camera) -> None:
     """Raises SceneError unless the frame is rigid and finite and the field of view lies between 0 and 180°."""
     to_world = camera.to_world
@@ -74,7 +86,7 @@ def check_scene(
 
     Args:
         meshes: their shapes, indices and values are checked, and that they have at most `MAX_TRIANGLES` together.
-        materials: checked to have names of their own.
+        materials: checked to have names of their own, and opacity that is an image.
         cameras: checked to be rigid and to have names of their own.
         environment: its size and values are checked.
         lights: their number and names are checked; their fields are the look's to check.
@@ -95,6 +107,8 @@ def check_scene(
             raise SceneError(f"the names of the {kind} are empty or not unique; give each its own")
     for mesh in meshes:
         check_mesh(mesh, len(materials))
+    for material in materials:
+        check_opacity(material)
     for camera in cameras:
         check_camera(camera)
     check_environment(environment)

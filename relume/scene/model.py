@@ -32,6 +32,21 @@ class Texture:
 
 
 @dataclass(frozen=True)
+class Opacity:
+    """Where a surface is there.
+
+    Attributes:
+        alpha: 255 where it is. Top row first. (height, width) uint8
+        wrap: as that of a texture.
+        cutoff: share of 255 from which it is there; None where it is there for as many rays as alpha says.
+    """
+
+    alpha: NDArray[np.uint8]
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    cutoff: float | None = None
+
+
+@dataclass(frozen=True)
 class Mesh:
     """Triangles of one material, node transforms applied.
 
@@ -64,6 +79,7 @@ class Material:
         normal_map: tangent-space normals in [-1, 1], already scaled; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         catcher: it is a ground that looks may show by its shadows alone, and the default look does.
+        opacity: where it has holes; None where it is whole.
     """
 
     name: str
@@ -72,6 +88,7 @@ class Material:
     normal_map: Texture | None = None
     double_sided: bool = True
     catcher: bool = False
+    opacity: Opacity | None = None
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from numba.core import types
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.trace.cutout_filter import FILTER, Holes
 
 _POINTER, _WORD = ctypes.c_void_p, ctypes.c_uint64
 _TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9003
@@ -57,6 +58,10 @@ _set_buffer = _function(
     "rtcSetNewGeometryBuffer",
     _POINTER, _POINTER, ctypes.c_int, ctypes.c_uint, ctypes.c_int, ctypes.c_size_t, ctypes.c_size_t,
 )  # fmt: skip
+_set_user_data = _function("rtcSetGeometryUserData", None, _POINTER, _POINTER)
+_set_filters = [
+    _function(f"rtcSetGeometry{call}FilterFunction", None, _POINTER, _POINTER) for call in ("Intersect", "Occluded")
+]
 _commit_geometry = _function("rtcCommitGeometry", None, _POINTER)
 _attach_geometry = _function("rtcAttachGeometry", ctypes.c_uint, _POINTER, _POINTER)
 _commit_scene = _function("rtcCommitScene", None, _POINTER)
@@ -92,39 +97,62 @@ def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
     return words
 
 
+_LEFT_OUT = 0xFFFFFFFF  # a corner that no scene has: Embree passes over the triangle, and others keep their numbers
+
+
 @dataclass(frozen=True)
 class EmbreeScene:
     """Committed triangles; `handle` goes to the kernels. Released with the object."""
 
     handle: int
+    holes: Holes | None = None
 
     @classmethod
-    def build(cls, positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> EmbreeScene:
+    def build(
+        cls, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None
+    ) -> EmbreeScene:
         """Build the acceleration structure.
 
         Args:
             positions: (num_vertices, 3) float32, finite. faces: (num_faces, 3) uint32.
+            holes: of triangles that are not everywhere; None where all are.
         Raises:
             SceneError: Embree refused the geometry.
         """
         scene = _new_scene(_device)
         _set_quality(scene, _BUILD_QUALITY_MEDIUM)
-        geometry = _new_geometry(_device, _TRIANGLE)
-        for kind, layout, rows in (
-            (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
-            (_INDEX_BUFFER, _UINT3, np.ascontiguousarray(faces, np.uint32)),
-        ):
-            memory = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
-            if not memory:
-                raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
-            ctypes.memmove(memory, rows.ctypes.data, rows.nbytes)
-        _commit_geometry(geometry)
-        _attach_geometry(scene, geometry)
-        _release_geometry(geometry)
+        if holes is None:
+            _attach(scene, positions, faces)
+        else:
+            has_holes = holes.image[:, None] >= 0
+            _attach(scene, positions, np.where(has_holes, np.uint32(_LEFT_OUT), faces))
+            _attach(scene, positions, np.where(has_holes, faces, np.uint32(_LEFT_OUT)), holes)
         _commit_scene(scene)
         if error := _device_error(_device):
             raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
-        return cls(scene)
+        return cls(scene, holes)
 
     def __post_init__(self) -> None:
         weakref.finalize(self, _release_scene, self.handle).atexit = False
+
+
+def _attach(
+    scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None
+) -> None:
+    """Add triangles to a scene, asking what `holes` says about each hit. Raises SceneError."""
+    geometry = _new_geometry(_device, _TRIANGLE)
+    for kind, layout, rows in (
+        (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
+        (_INDEX_BUFFER, _UINT3, np.ascontiguousarray(faces, np.uint32)),
+    ):
+        memory = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
+        if not memory:
+            raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
+        ctypes.memmove(memory, rows.ctypes.data, rows.nbytes)
+    if holes is not None:
+        _set_user_data(geometry, holes.addresses.ctypes.data)
+        for set_filter in _set_filters:
+            set_filter(geometry, FILTER)
+    _commit_geometry(geometry)
+    _attach_geometry(scene, geometry)
+    _release_geometry(geometry)

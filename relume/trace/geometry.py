@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.model import Scene
+from relume.trace.cutout_filter import Holes
+from relume.trace.cutouts import cutouts_of
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import trace_from
 
@@ -87,14 +89,17 @@ def merge(scene: Scene) -> Geometry:
         [mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)]
     )
     counts = [len(mesh.faces) for mesh in scene.meshes]
+    face_material = np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32)
+    uvs, cutouts = np.concatenate([mesh.uvs for mesh in scene.meshes]), cutouts_of(scene.materials)
+    holes = None if cutouts is None else Holes.of(faces, uvs, face_material, cutouts)
     return Geometry(
         positions=positions,
         normals=np.concatenate([mesh.normals for mesh in scene.meshes]),
         tangents=np.concatenate([mesh.tangents for mesh in scene.meshes]),
-        uvs=np.concatenate([mesh.uvs for mesh in scene.meshes]),
+        uvs=uvs,
         faces=faces,
-        face_material=np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32),
+        face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
-        embree=EmbreeScene.build(positions, faces),
+        embree=EmbreeScene.build(positions, faces, holes),
         epsilon=off_surface(positions),
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 LANES = 16
 FAR = np.float32(1e30)  # where shadow rays end that no light's surface ends
 # rows of RTCRayHit16, sixteen words each; an origin and a direction take three
-_ORIGIN, _DIRECTION, _FAR, _MASK = 0, 4, 8, 9
+_ORIGIN, _DIRECTION, _CHANCE, _FAR, _MASK = 0, 4, 7, 8, 9
 _U, _V, _PRIMITIVE, _GEOMETRY, _INSTANCE = 15, 16, 17, 18, 19
 _ROWS = 21
 _NOTHING = 0xFFFFFFFF
@@ -76,6 +76,12 @@ def aim(packet, lane, x, y, z, far):  # type: ignore[no-untyped-def]
     packet.rays[(_DIRECTION + 1) * LANES + lane] = y
     packet.rays[(_DIRECTION + 2) * LANES + lane] = z
     packet.rays[_FAR * LANES + lane] = far
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def take_chance(packet, lane, chance):  # type: ignore[no-untyped-def]
+    """Give the ray of a `lane` of a `packet` a chance at surfaces that blend: `relume.trace.cutout_filter`."""
+    packet.rays[_CHANCE * LANES + lane] = chance
 
 
 @nb.njit(nogil=True, cache=True, inline="always")

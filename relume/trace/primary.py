@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from relume.parallel import for_ranges
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene, intersect16, packet_arguments
-from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, trace_hits, uv_of
+from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
 
 F32 = NDArray[np.float32]
 
 _RAYS_A_RANGE = 8192
+_BY_PLACE = np.zeros(1, np.float32)  # the chance of rays that are given none
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ class Hits:
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(intersect, scene, arguments, origins, directions, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
-    """Trace rays [start, stop). origins: (n, 3), or (1, 3) where all rays come from one point."""
-    last_origin = origins.shape[0] - 1
+def _trace(intersect, scene, arguments, origins, directions, chance, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+    """Trace rays [start, stop). origins, chance: of n rays, or one of all."""
+    last_origin, last_chance = origins.shape[0] - 1, chance.shape[0] - 1
     packet = new_packet(scene, arguments)
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
@@ -46,6 +47,7 @@ def _trace(intersect, scene, arguments, origins, directions, start, stop, face, 
             o = min(r, last_origin)
             set_origin(packet, k, origins[o, 0], origins[o, 1], origins[o, 2])
             aim(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
+            take_chance(packet, k, chance[min(r, last_chance)])
         trace_hits(intersect, packet)
         for k in range(width):
             r = first + k
@@ -53,11 +55,12 @@ def _trace(intersect, scene, arguments, origins, directions, start, stop, face, 
             uv[r, 0], uv[r, 1] = uv_of(packet, k)
 
 
-def trace_from(scene: EmbreeScene, origin: F32, directions: F32) -> Hits:
+def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 = _BY_PLACE) -> Hits:
     """Find the first hits of rays from one point, or from a point each.
 
     Args:
         scene: the triangles. origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
+        chance: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) or (1,) float32
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
@@ -66,7 +69,7 @@ def trace_from(scene: EmbreeScene, origin: F32, directions: F32) -> Hits:
     arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(
-            intersect16, scene.handle, arguments.ctypes.data, origins, directions, start, stop,
+            intersect16, scene.handle, arguments.ctypes.data, origins, directions, chance, start, stop,
             hits.face, hits.uv, hits.distance,
         ),
         n,

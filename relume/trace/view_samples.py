@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
 from relume.scene.model import Scene
+from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, camera_directions, trace_from
 from relume.trace.surface import Surface, surface_at
@@ -28,6 +29,7 @@ POSITIONS_A_PIXEL = len(_POSITIONS)
 _COS_EDGE = np.cos(np.radians(20.0))  # a crease
 _COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
 _DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
+_GOLDEN = (5**0.5 - 1) / 2
 _MOST_TURNING = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
 
 
@@ -136,6 +138,21 @@ def _merge(
     )
 
 
+def _is_partly_there(geometry: Geometry, origin: F32, directions: F32) -> NDArray[np.bool_]:
+    """Find rays that meet a surface that blends. origin: (3,). directions: (n, 3). (n,)"""
+    at_least, wholly = (
+        trace_from(geometry.embree, origin, directions, np.full(1, chance)).face for chance in (ANYWHERE, EVERYWHERE)
+    )
+    return np.asarray(at_least != wholly)
+
+
+def _shared_chances(pixel: NDArray[np.int64]) -> F32:
+    """Chances of the eight rays of pixels, an eighth apart: a surface that blends has its share of them. (8n,)"""
+    places = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
+    offset = (pixel[:, None] * _GOLDEN) % 1  # eighths alone would be seen as steps
+    return np.asarray((places + offset) / POSITIONS_A_PIXEL + 1e-6, np.float32).ravel()
+
+
 def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:
     """Choose of each group the position next to their mean: any other would shift what it shows to one side.
 
@@ -168,12 +185,14 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
         seen, surface.points.normal.reshape(*shape, 3), hits.distance.reshape(shape), directions.reshape(*shape, 3)
     )
     edge = (differs | _turning(differs, cosine, seen)).ravel()
+    if geometry.embree.holes is not None:
+        edge |= _is_partly_there(geometry, origin, directions)
 
     edge_pixel = np.nonzero(edge)[0]
     more_x = (x[edge_pixel, None] + _POSITIONS[:, 0]).astype(np.float32).ravel()
     more_y = (y[edge_pixel, None] + _POSITIONS[:, 1]).astype(np.float32).ravel()
     more_directions = camera_directions(camera, size, more_x, more_y)
-    more = trace_from(geometry.embree, origin, more_directions)
+    more = trace_from(geometry.embree, origin, more_directions, _shared_chances(edge_pixel))
     chosen, owner, share = _merge(geometry, more, more_directions, len(edge_pixel))
 
     inner = np.nonzero(~edge)[0]

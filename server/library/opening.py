@@ -67,7 +67,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         render_small=render_small,
         reference=reference,
         finder=finder,
-        shader_arrays=lambda transfer: (constants(), arrays_of(transfer)),
+        shader_arrays=lambda transfer: (constants(transfer), arrays_of(transfer)),
         held_bytes=memory.held,
         cache_used_bytes=lambda: memory.used_bytes,
         shrink_cache=lambda stores: memory.shrink(floor_bytes, {str(store.resolve()) for store in stores}),

@@ -19,11 +19,13 @@ class LadderBody(Body):
 
 class SurfaceBody(Body):
     """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
-    `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives."""
+    `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not
+    everywhere, which the arrays do not say: pictures of the server show it."""
 
     functions: int
     rows: int
     columns: int
     ladder: LadderBody
     expansions: list[list[float]]
+    has_holes: bool
     arrays: list[str]

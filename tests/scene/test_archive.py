@@ -14,7 +14,7 @@ from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.remarks import simplified
 from relume.scene.archive import load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Light, Material, Mesh, Scene, Texture
+from relume.scene.model import Camera, Light, Material, Mesh, Opacity, Scene, Texture
 
 
 def small_scene(**changes: object) -> Scene:
@@ -173,3 +173,34 @@ def test_make_scene_refuses_parts_that_do_not_fit() -> None:
 def test_lights_without_usable_names_or_too_many_make_no_scene(lights: list[Light], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         small_scene(lights=lights)
+
+
+def test_opacity_is_kept_and_changes_the_id(tmp_path: Path) -> None:
+    alpha = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    ids = {small_scene().id}
+    for cutoff in (None, 0.5, 0.25):
+        material = dataclasses.replace(small_scene().materials[0], opacity=Opacity(alpha, ("clamp", "mirror"), cutoff))
+        scene = small_scene(materials=[material])
+        save_scene(scene, tmp_path)
+        kept = load_scene(tmp_path).materials[0].opacity
+        assert kept is not None
+        np.testing.assert_array_equal(kept.alpha, alpha)
+        assert (kept.wrap, kept.cutoff) == (("clamp", "mirror"), cutoff)
+        ids.add(scene.id)
+    assert len(ids) == 4
+
+
+@pytest.mark.parametrize(
+    "opacity",
+    [
+        Opacity(np.zeros((0, 4), np.uint8)),
+        Opacity(np.zeros((2, 2), np.float32)),
+        Opacity(np.zeros((2, 2, 1), np.uint8)),
+        Opacity(np.zeros((2, 2), np.uint8), ("repeat", "never")),
+        Opacity(np.zeros((2, 2), np.uint8), cutoff=0.0),
+        Opacity(np.zeros((2, 2), np.uint8), cutoff=float("nan")),
+    ],
+)
+def test_opacity_that_is_no_image_of_bytes_is_refused(opacity: Opacity) -> None:
+    with pytest.raises(SceneError, match=r"opacity|cut at"):
+        small_scene(materials=[dataclasses.replace(small_scene().materials[0], opacity=opacity)])

@@ -111,7 +111,10 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0])
     assert scene.materials[0].terms[0] == {"model": "lambert", "color": [1.0, 1.0, 1.0], "texture": "diffuse"}
     assert scene.lights == (Light("a", {"kind": "mesh", "material": "a", "emission": [1.0, 1.0, 1.0]}),)
-    assert len(scene.warnings) == 2
+    opacity = scene.materials[0].opacity
+    assert opacity is not None
+    assert opacity.alpha.tolist() == [[128]]
+    assert len(scene.warnings) == 1
 
 
 def shining(tmp_path: Path, library: str, faces: str) -> Scene:

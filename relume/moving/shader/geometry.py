@@ -19,11 +19,15 @@ Texels = NDArray[Any]
 MOST_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, finest first
 
 
-def constants() -> dict[str, Any]:
-    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables."""
+def constants(transfer: MovingTransfer) -> dict[str, Any]:
+    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables.
+
+    `has_holes` says that surfaces have some, which shaders do not know of.
+    """
     rungs = {name: field.tolist() for name, field in ladder()._asdict().items()}
     sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
-    return {**sizes, "ladder": rungs, "expansions": expansions().tolist()}
+    has_holes = transfer.embree.holes is not None
+    return {**sizes, "ladder": rungs, "expansions": expansions().tolist(), "has_holes": has_holes}
 
 
 def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:

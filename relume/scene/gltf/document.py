@@ -108,6 +108,7 @@ class Material(Part):
     emissiveTexture: TextureInfo | None = None  # noqa: N815
     emissiveFactor: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
     alphaMode: str = "OPAQUE"  # noqa: N815
+    alphaCutoff: Annotated[Number, Field(ge=0)] = 0.5  # noqa: N815
     doubleSided: bool = False  # noqa: N815
 
 

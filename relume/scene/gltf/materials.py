@@ -22,7 +22,8 @@ from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
-from relume.scene.model import Material, Texture
+from relume.scene.model import Material, Opacity, Texture
+from relume.scene.opacity import is_nowhere, make_opacity
 
 MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
 
@@ -70,8 +71,29 @@ class MaterialReader:
             self._warnings.append(
                 simplified(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
             )
-        made = Material(name, make_terms(surface, over), surface.textures, normal_map, material.doubleSided)
+        made = Material(
+            name,
+            make_terms(surface, over),
+            surface.textures,
+            normal_map,
+            material.doubleSided,
+            opacity=self._opacity(material, what),
+        )
         return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
+
+    def _opacity(self, material: GltfMaterial, what: str) -> Opacity | None:
+        """Where the material has holes; alpha that is not asked for is not looked at."""
+        if material.alphaMode not in ("MASK", "BLEND"):
+            return None
+        pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
+        if pbr.baseColorTexture is not None:
+            pixels, wrap = self._images.texture(pbr.baseColorTexture.index, f"the base colour texture of {what}")
+            alpha = pixels[..., 3]
+        cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
+        opacity = make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff)
+        if opacity is not None and is_nowhere(opacity):
+            self._warnings.append(wrong(f"{what} is transparent everywhere, as the file says; nothing of it is seen"))
+        return opacity
 
     def _emission(self, material: GltfMaterial, layers: Layers, what: str) -> tuple[float, float, float]:
         factor = np.maximum(material.emissiveFactor, 0) * layers.emissive_strength.emissiveStrength
@@ -207,8 +229,6 @@ class MaterialReader:
             raise SceneError(f"the scene needs more than {MAX_TEXTURE_TEXELS:,} texels; scale its textures down")
 
     def _warn_of_the_rest(self, material: GltfMaterial, what: str) -> None:
-        if material.alphaMode != "OPAQUE":
-            self._warnings.append(wrong(f"{what} is see-through ({material.alphaMode[:20]!r}); it is opaque here"))
         if material.occlusionTexture is not None:
             self._warnings.append(unused(f"the occlusion texture of {what} is not used; relume traces occlusion"))
 

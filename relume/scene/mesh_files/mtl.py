@@ -17,10 +17,11 @@ from relume.brdf.registry import TERMS
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, wrong
 from relume.scene.companions import Companions
-from relume.scene.gltf.images import Decoder, to_linear
+from relume.scene.gltf.images import U8, Decoder, to_linear
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, make_terms
-from relume.scene.model import Material, Texture
+from relume.scene.model import Material, Opacity, Texture
+from relume.scene.opacity import is_nowhere, make_opacity
 
 F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
@@ -93,7 +94,7 @@ class MaterialMaker:
         self._warnings = warnings
         self._decoder = Decoder()
         self._names: dict[str, int] = {}
-        self._pixels: dict[str, Any] = {}
+        self._pixels: dict[str, U8 | None] = {}
 
     def make(self, name: str, described: Described | None) -> Material:
         """One material under a name of its own; grey where nothing is known of it. Raises SceneError."""
@@ -104,7 +105,22 @@ class MaterialMaker:
         textures = self._textures(described, what)
         self._warn_of_the_rest(described, what)
         normal_map = self._image(described, "norm", f"the normal map of {what}", _normals)
-        return Material(own_name, _terms(described, textures), textures, normal_map)
+        opacity = self._opacity(described, what)
+        return Material(own_name, _terms(described, textures), textures, normal_map, opacity=opacity)
+
+    def _opacity(self, described: Described, what: str) -> Opacity | None:
+        """Where the material has holes: d, or 1 − Tr, times map_d."""
+        numbers = described.numbers
+        share = min(1.0, numbers["d"][0] if "d" in numbers else 1 - min(1.0, numbers.get("Tr", [0.0])[0]))
+        if share == 0 and "map_d" in described.maps:
+            share = 1.0  # exporters write zeros where they mean the image
+        pixels = self._decoded(described, "map_d", f"map_d of {what}")
+        # grey, or the picture that map_Kd names as well, with the holes in its alpha
+        alpha = None if pixels is None else pixels[..., 3 if np.ptp(pixels[..., 3]) else 0]
+        opacity = make_opacity(alpha, ("repeat", "repeat"), share, None)
+        if opacity is not None and is_nowhere(opacity):
+            self._warnings.append(wrong(f"{what} is transparent everywhere, as the file says; nothing of it is seen"))
+        return opacity
 
     def emission(self, material: Material, described: Described | None) -> F64:
         """Radiance of the surfaces of a material that was made: Ke times the mean of map_Ke. (3,) Raises SceneError."""
@@ -128,6 +144,11 @@ class MaterialMaker:
         return textures
 
     def _image(self, described: Described, keyword: str, what: str, convert: Callable[[Any], Any]) -> Texture | None:
+        pixels = self._decoded(described, keyword, what)
+        return None if pixels is None else Texture(np.ascontiguousarray(convert(pixels[..., :3]), np.float32))
+
+    def _decoded(self, described: Described, keyword: str, what: str) -> U8 | None:
+        """The bytes of an image, RGBA. (height, width, 4)"""
         name = described.maps.get(keyword)
         if not name:
             return None
@@ -136,20 +157,15 @@ class MaterialMaker:
             data = self._companions.read(path, what)
             if data is None and described.folder and not name.startswith(".."):
                 data = self._companions.read(name, what)  # some exporters name it as the scene sees it
-            self._pixels[path] = None if data is None else self._decoder.decode(data, what)[..., :3]
+            self._pixels[path] = None if data is None else self._decoder.decode(data, what)
         if self._pixels[path] is None:
             shown = name[:60].encode("ascii", "replace").decode()
             self._warnings.append(wrong(f"{what} ({shown!r}) is not beside the scene; it is left out"))
-            return None
-        return Texture(np.ascontiguousarray(convert(self._pixels[path]), np.float32))
+        return self._pixels[path]
 
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
-        numbers = described.numbers
-        if numbers.get("d", [1.0])[0] < 1 or numbers.get("Tr", [0.0])[0] > 0:
-            self._warnings.append(wrong(f"{what} is see-through; it is opaque here"))
-        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "norm"}):
-            say = wrong if keyword == "map_d" else simplified  # it cuts holes
-            self._warnings.append(say(f"{keyword[:40]} of {what} is not used"))
+        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "map_d", "norm"}):
+            self._warnings.append(simplified(f"{keyword[:40]} of {what} is not used"))
 
 
 def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str, Any], ...]:

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 FACES = "usemtl Wall\nf 1/1 2/2 3/3\nl 1 2\nf 2/1 4/2 3/3\n"
 ROOM = f"mtllib looks/room.mtl\n{TRIANGLE}v 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n{FACES}"
-LOOKS = "newmtl Wall\nKd 1 1 1\nmap_Kd ../images/wall.png\nd 0.5\n"
+LOOKS = "newmtl Wall\nKd 1 1 1\nmap_Kd ../images/wall.png\nmap_Ks ../images/gone.png\n"
 GLTF = {
     "asset": {"version": "2.0"},
     "buffers": [{"uri": "far%20away.bin", "byteLength": 36}],
@@ -76,7 +76,9 @@ def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_
     start.get_by_role("button", name="Import", exact=True).click()
     dialog = start.get_by_role("region", name="Bake room")
     seen = dialog.get_by_role("region", name="Looks other than in the file")
-    expect(seen).to_contain_text("material 'Wall' is see-through; it is opaque here")
+    expect(seen).to_contain_text(
+        "map_Ks of material 'Wall' ('../images/gone.png') is not beside the scene; it is left out"
+    )
     expect(dialog.get_by_role("region", name="Not used")).to_contain_text("lines of kind 'l'")
     own = dialog.get_by_role("group", name="Size and lights of your own bake")
     own.get_by_label("Height").fill("16385")
@@ -96,9 +98,13 @@ def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_
     assert (recipes[0]["size"], recipes[0]["lights"], recipes[0]["relightable"]) == ([60, 200], 40, True)
     mark = start.get_by_role("button", name="What the import says: 1 wrong, 1 unused")
     mark.click()
-    expect(start.get_by_text("material 'Wall' is see-through; it is opaque here")).to_be_visible()
+    expect(
+        start.get_by_text("map_Ks of material 'Wall' ('../images/gone.png') is not beside the scene; it is left out")
+    ).to_be_visible()
     start.keyboard.press("Escape")
-    expect(start.get_by_text("material 'Wall' is see-through; it is opaque here")).to_have_count(0)
+    expect(
+        start.get_by_text("map_Ks of material 'Wall' ('../images/gone.png') is not beside the scene; it is left out")
+    ).to_have_count(0)
 
 
 @pytest.mark.slow

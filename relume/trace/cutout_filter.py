@@ -1,0 +1,163 @@
+"""What Embree asks while it traces: is the surface there, where a ray meets a triangle with holes?
+
+One function for all triangles with holes of a scene; Embree calls it with a packet's hits and takes back which of them
+count. A surface that blends is there for the share of rays that its opacity says. Which rays those are, their chance
+decides: a number that the caller gives an eye's rays, so that those of a pixel share out the opacity evenly; of others
+it follows from their direction: the same ray finds the same, in any packet.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from relume.trace.cutouts import Cutouts
+
+F32 = NDArray[np.float32]
+U32 = NDArray[np.uint32]
+
+_DIRECTION, _TIME = 4, 7  # rows of RTCRayN; triangles that do not move have no other use for the time
+_U, _V, _PRIMITIVE = 3, 4, 5  # rows of RTCHitN
+_CLAMP, _MIRROR = 2, 1  # of WRAPS
+# chances of rays that are stopped by whatever is there a little, and of those that only what is wholly there stops
+ANYWHERE, EVERYWHERE = np.float32(-1), np.float32(2)
+
+
+class Holes(NamedTuple):
+    """What the filter reads, kept for as long as the scene that it belongs to.
+
+    Attributes:
+        addresses: of the arrays below and of those of the cut-outs. (6,) int64
+        image: row of `Cutouts.images` of each triangle, −1 where it has no holes. (faces,) int32
+        faces: corners. (faces, 3) uint32. uvs: places of corners in textures. (corners, 2) float32
+        cutouts: the images.
+    """
+
+    addresses: NDArray[np.int64]
+    image: NDArray[np.int32]
+    faces: U32
+    uvs: F32
+    cutouts: Cutouts
+
+    @classmethod
+    def of(cls, faces: U32, uvs: F32, face_material: NDArray[np.int32], cutouts: Cutouts) -> Holes:
+        """Gather what the filter reads.
+
+        Args:
+            faces: (num_faces, 3) uint32 into `uvs`. uvs: (num_vertices, 2) float32
+            face_material: (num_faces,) int32 into `cutouts.of_material`. cutouts: the images.
+        """
+        image = np.ascontiguousarray(cutouts.of_material[face_material], np.int32)
+        faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
+        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.bounds)
+        return cls(np.array([array.ctypes.data for array in read], np.int64), image, faces, uvs, cutouts)
+
+
+def _cast(typing_context, address):  # type: ignore[no-untyped-def]
+    def make(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), make
+
+
+_at: Any = intrinsic(_cast)  # makes an address (int64) a pointer
+_array: Any = nb.carray  # type: ignore[attr-defined]  # an array over the memory at a pointer
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _texel(index, size, wrap):  # type: ignore[no-untyped-def]
+    if wrap == _CLAMP:
+        return min(max(index, 0), size - 1)
+    if wrap == _MIRROR:
+        folded = index % (2 * size)
+        return min(folded, 2 * size - 1 - folded)
+    return index % size
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
+    """Look opacity up, between four texels. image: of `Cutouts.images`. u, v: v from the top"""
+    height, width = image[1], image[2]
+    x, y = u * np.float32(width) - np.float32(0.5), v * np.float32(height) - np.float32(0.5)
+    x0, y0 = np.floor(x), np.floor(y)
+    fx, fy = x - x0, y - y0
+    total = np.float32(0)
+    for k in range(4):
+        dx, dy = k & 1, k >> 1
+        weight = (fx if dx else np.float32(1) - fx) * (fy if dy else np.float32(1) - fy)
+        row, column = _texel(np.int64(y0) + dy, height, image[4]), _texel(np.int64(x0) + dx, width, image[3])
+        total += weight * np.float32(texels[image[0] + row * width + column])
+    return total / np.float32(255)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _hashed(word):  # type: ignore[no-untyped-def]
+    """Mix the bits of a word (the finaliser of MurmurHash3). uint32"""
+    word = np.uint32((word ^ (word >> np.uint32(16))) * np.uint32(0x85EBCA6B))  # a product of two has 64 bits
+    word = np.uint32((word ^ (word >> np.uint32(13))) * np.uint32(0xC2B2AE35))
+    return np.uint32(word ^ (word >> np.uint32(16)))
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _chance(given, face, row, x, y, z, is_behind):  # type: ignore[no-untyped-def]
+    """A number in (0, 1] for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
+
+    A given one moves with the face: what a ray met before says nothing about what it meets behind that. All rays to
+    one light have one direction and so one chance, at fronts and at backs of each image: shadows of panes are even.
+    """
+    if given == ANYWHERE:
+        return np.float32(1 / 512)
+    if given == EVERYWHERE:
+        return np.float32(1)
+    if given > 0:
+        moved = given + np.float32(_hashed(np.uint32(face)) >> np.uint32(8)) * np.float32(2**-24)
+        return moved - np.float32(1) if moved > 1 else moved
+    word = np.uint32(2 * row + is_behind)
+    for component in (x, y, z):
+        word = _hashed(np.uint32(word ^ np.float32(component).view(np.uint32)))
+    return (np.float32(word >> np.uint32(8)) + np.float32(1)) * np.float32(2**-24)
+
+
+@nb.cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
+def _filter(arguments):  # type: ignore[no-untyped-def]
+    """RTCFilterFunctionN. arguments: valid, user pointer, context, ray, hit, and how many."""
+    words = _array(arguments, (6,))
+    width = np.int64(np.uint32(words[5] & 0xFFFFFFFF))
+    valid = _array(_at(words[0]), (width,), np.int32)
+    rays = _array(_at(words[3]), (9, width), np.float32)
+    hits = _array(_at(words[4]), (6, width), np.float32)
+    primitives = _array(_at(words[4]), (6, width), np.uint32)
+    read = _array(_at(words[1]), (6,), np.int64)
+    of_face = _array(_at(read[0]), (1 << 40,), np.int32)
+    faces = _array(_at(read[1]), (1 << 40, 3), np.uint32)
+    uvs = _array(_at(read[2]), (1 << 40, 2), np.float32)
+    texels = _array(_at(read[3]), (1 << 40,), np.uint8)
+    images = _array(_at(read[4]), (1 << 30, 5), np.int64)
+    bounds = _array(_at(read[5]), (1 << 30,), np.float32)
+    for lane in range(width):
+        if valid[lane] == 0:
+            continue
+        face = np.int64(primitives[_PRIMITIVE, lane])
+        row = of_face[face]
+        b, c = hits[_U, lane], hits[_V, lane]
+        a = np.float32(1) - b - c
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        u = a * uvs[i, 0] + b * uvs[j, 0] + c * uvs[k, 0]
+        v = a * uvs[i, 1] + b * uvs[j, 1] + c * uvs[k, 1]
+        least = bounds[row]
+        if least < 0:
+            x, y, z = rays[_DIRECTION, lane], rays[_DIRECTION + 1, lane], rays[_DIRECTION + 2, lane]
+            is_behind = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z > 0
+            least = _chance(rays[_TIME, lane], face, row, x, y, z, is_behind)
+        if _opacity(images[row], texels, u, v) < least:
+            valid[lane] = 0
+
+
+FILTER = ctypes.c_void_p(_filter.address)
+"""What Embree calls."""

@@ -1,0 +1,77 @@
+"""Surfaces with holes: which triangles have them, and where.
+
+A material's opacity (`relume.scene.model.Opacity`) cuts: from a bound on, a surface is there; or it blends, and a
+surface is there for a share of the rays, its opacity. Rays find out while Embree traces them
+(`relume.trace.cutout_filter`), whatever they are traced for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.errors import ChunkDamagedError
+from relume.scene.model import Material
+
+F32 = NDArray[np.float32]
+U32 = NDArray[np.uint32]
+WRAPS = ("repeat", "mirror", "clamp")
+BLENDS = -1.0  # instead of a bound
+
+
+class Cutouts(NamedTuple):
+    """The opacity of a scene's materials.
+
+    Attributes:
+        texels: opacity, 255 where a surface is there; images one after another, row after row. (texels,) uint8
+        images: first texel, height, width, how u and v continue. (num, 5) int64
+        bounds: opacity from which a surface is there, or `BLENDS`. (num,) float32
+        of_material: row of the two above, −1 where a material has no holes. (materials,) int32
+    """
+
+    texels: NDArray[np.uint8]
+    images: NDArray[np.int64]
+    bounds: F32
+    of_material: NDArray[np.int32]
+
+
+def cutouts_of(materials: Sequence[Material]) -> Cutouts | None:
+    """Collect the opacity of materials; None where none has holes."""
+    texels, images, bounds = list[NDArray[np.uint8]](), list[list[int]](), list[float]()
+    of_material, end = np.full(len(materials), -1, np.int32), 0
+    for index, material in enumerate(materials):
+        opacity = material.opacity
+        if opacity is not None:
+            of_material[index] = len(images)
+            images.append([end, *opacity.alpha.shape, *map(WRAPS.index, opacity.wrap)])
+            bounds.append(BLENDS if opacity.cutoff is None else opacity.cutoff)
+            texels.append(opacity.alpha.ravel())
+            end += opacity.alpha.size
+    if not images:
+        return None
+    return Cutouts(np.concatenate(texels), np.array(images, np.int64), np.array(bounds, np.float32), of_material)
+
+
+def check_cutouts(arrays: Mapping[str, NDArray[Any]], num_materials: int) -> Cutouts:
+    """Make cut-outs of the arrays of a store, by the names of the fields.
+
+    Raises:
+        ChunkDamagedError: they do not fit each other; rays would read beyond their ends.
+    """
+    cutouts = Cutouts(*(np.ascontiguousarray(arrays[name]) for name in Cutouts._fields))
+    shapes = (cutouts.images.shape, cutouts.bounds.shape, cutouts.of_material.shape)
+    types = [array.dtype.name for array in cutouts]
+    num = len(cutouts.bounds)
+    fits = shapes == ((num, 5), (num,), (num_materials,)) and types == ["uint8", "int64", "float32", "int32"]
+    if fits and num:
+        first, height, width, *wraps = cutouts.images.T
+        fits = min(first.min(), height.min() - 1, width.min() - 1, np.min(wraps)) >= 0
+        fits &= max(height.max(), width.max()) < 1 << 20 and int(np.max(wraps)) < len(WRAPS)
+        fits &= bool((first + height * width <= cutouts.texels.size).all())
+    if not fits or not -1 <= int(cutouts.of_material.min(initial=-1)) <= int(cutouts.of_material.max(initial=-1)) < num:
+        raise ChunkDamagedError("scene/cutouts", "its images do not fit its texels or materials")
+    return cutouts
+
