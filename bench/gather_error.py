@@ -65,5 +65,5 @@ def _is_all_floor(transfer: Transfer) -> Any:
     is_floor = np.zeros(view.num_view_samples, bool)
     is_floor[view.rows(transfer.material_names.index("Floor"))] = True
     pixel_of = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
-    share = np.bincount(pixel_of, view.weight * is_floor[view.order], view.width * view.height)
+    share = np.bincount(pixel_of, view.gains[:, 0] * is_floor[view.order], view.width * view.height)
     return share.reshape(view.height, view.width) > 1 - 1e-6

@@ -112,7 +112,7 @@ def _full_image(transfer: Transfer, look: Look) -> F64:
     weighted = np.empty((view.width * view.height, 3))
     pixel_of = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
     for c in range(3):
-        weighted[:, c] = np.bincount(pixel_of, view.weight * radiance[view.order, c], len(weighted))
+        weighted[:, c] = np.bincount(pixel_of, view.gains[:, 0] * radiance[view.order, c], len(weighted))
     return np.array(look.environment.gain) * weighted.reshape(view.height, view.width, 3)
 
 

@@ -238,10 +238,10 @@ def shining(transfer, view: View, index, look):
 
 def resolve(view: View, radiance):
     """Samples to pixels: the weighted sum of each pixel's. radiance (n, 3) -> (height, width, 3) float64"""
-    weight = np.empty(view.num_view_samples)
-    weight[view.order] = view.weight
+    gains = np.empty((view.num_view_samples, view.gains.shape[1]))
+    gains[view.order] = view.gains
     out = np.zeros((view.width * view.height, 3))
-    np.add.at(out, view.pixel.astype(int), weight[:, None] * radiance)
+    np.add.at(out, view.pixel.astype(int), gains * radiance)
     return out.reshape(view.height, view.width, 3)
 
 

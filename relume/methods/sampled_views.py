@@ -10,6 +10,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular, uv
+    views/<k>/through                                        of scenes with glass: relume.trace.view_samples
     views/<k>/visibility                                     samples on surfaces only
     views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
 """
@@ -34,6 +35,7 @@ from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directi
 from relume.scene.model import Camera, Scene
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
+from relume.trace.glass import has_glass
 from relume.trace.view_samples import BACKGROUND, sample_view
 
 CHUNK_ROWS = 1024
@@ -106,7 +108,8 @@ class SampledViews:
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
-            "has_holes": any(material.opacity is not None for material in scene.materials),
+            "has_holes": any(material.opacity or material.glass for material in scene.materials),
+            "has_glass": has_glass(scene.materials),
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -152,6 +155,8 @@ class SampledViews:
             "position": points.position, "normal": points.normal, "tangent": points.tangent,
             "diffuse": samples.surface.diffuse, "specular": samples.surface.specular, "uv": samples.surface.uv,
         }  # fmt: skip
+        if samples.through is not None:
+            arrays["through"] = samples.through
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
 

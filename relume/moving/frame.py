@@ -18,6 +18,7 @@ from relume.moving.edges import resolve
 from relume.moving.evaluate import Tables, send, tables_of
 from relume.moving.glints import glance
 from relume.moving.look_up import Seen, at_vertices
+from relume.moving.panes import hide_less, lay_over_glass
 from relume.moving.pixels import Mirrored, Sent, combine
 from relume.moving.relief.show import Sight, show_texels
 from relume.moving.relief.tables import Cover, covers_of
@@ -93,6 +94,7 @@ def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camer
     caught = _caught(transfer, wanted, seen)
     behind = seen_behind(transfer, wanted.look.background, light, wanted.gain, seen, caught.is_catcher)
     hides = lay_over(surface, seen, behind, caught, wanted.gain, is_direct=light.paths.direct, out=out)
+    out, hides = lay_over_glass(seen.panes, out), hide_less(seen.panes, hides)
     image = resolve(out, seen.owner, width * height).reshape(height, width, 3)
     if wanted.look.background.kind != "transparent":
         return Frame(image, None)

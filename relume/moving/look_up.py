@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numba as nb
@@ -10,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.edges import POSITIONS, find_edges, rays_an_edge
+from relume.moving.panes import Panes, find_glass, panes_of
 from relume.moving.points.lattice import node_of
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
 from relume.scene.model import Camera
+from relume.trace.cutout_filter import EVERYWHERE, PAST_GLASS
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import Hits, trace_from
 
 F32 = NDArray[np.float32]
 
+_PAST_GLASS, _NOTHING = np.full(1, PAST_GLASS), np.empty((0, 3), np.float32)
 _MIDDLE = np.array([[0.5, 0.5]], np.float32)
 
 
@@ -29,6 +33,7 @@ class Seen(NamedTuple):
         hits: of the rays. directions: of these, unit. (n, 3) float32
         owner: pixels that those beyond one for each belong to. (m,) int32
         vertex: the three about each hit. (n, 3) uint32. weight: of each; all zero where there are none. (n, 3) float32
+        panes: glass before rays, whose own hits come after those of all others.
         is_seen: whether any ray meets the surface about a vertex. (vertices,) uint8
         is_needed: whether one that is shown follows from a point. (points,) uint8
     """
@@ -38,6 +43,7 @@ class Seen(NamedTuple):
     owner: NDArray[np.int32]
     vertex: NDArray[np.uint32]
     weight: F32
+    panes: Panes
     is_seen: NDArray[np.uint8]
     is_needed: NDArray[np.uint8]
 
@@ -103,19 +109,24 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     Args:
         surface: that is seen. embree: its triangles. camera: the eye. size: width and height in pixels.
     """
-    num = size[0] * size[1]
-    hits, directions = _trace(embree, camera, size, np.arange(num, dtype=np.int32), _MIDDLE)
+    num, eye = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
+    directions = _directions(camera, size, np.arange(num, dtype=np.int32), _MIDDLE)
+    hits, panes = trace_from(embree, eye, directions, _PAST_GLASS), Panes(np.empty(0, np.int64), _NOTHING)
+    first = find_glass(embree, eye, directions)
     edges = find_edges(surface, hits, directions, size)
+    if first is not None:
+        edges = np.union1d(edges, find_edges(surface, first, directions, size)).astype(np.int32)
     more = rays_an_edge(len(edges), num)
     owner = np.repeat(edges, more)
     if len(owner):
-        beside, towards = _trace(embree, camera, size, edges, POSITIONS[:more])
-        hits = Hits(
-            np.concatenate([hits.face, beside.face]),
-            np.concatenate([hits.uv, beside.uv]),
-            np.concatenate([hits.distance, beside.distance]),
-        )
+        towards = _directions(camera, size, edges, POSITIONS[:more])
+        hits = _both(hits, trace_from(embree, eye, towards, _PAST_GLASS))
         directions = np.concatenate([directions, towards])
+    if first is not None:
+        first = _both(first, trace_from(embree, eye, directions[num:], np.full(1, EVERYWHERE)))
+        panes = panes_of(embree, surface, first, directions)
+        hits = _both(hits, Hits(first.face[panes.ray], first.uv[panes.ray], first.distance[panes.ray]))
+        directions = np.concatenate([directions, directions[panes.ray]])
     num_rays = len(directions)
     vertex, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
     is_seen = np.zeros(len(surface.vertices.normal), np.uint8)
@@ -123,20 +134,22 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     for_shares(lambda start, stop: _find(*args, start, stop, vertex, weight, is_seen), num_rays)
     is_needed = np.zeros(surface.points.num_points, np.uint8)
     _need(surface.vertices, is_seen, is_needed)
-    return Seen(hits, directions, owner, vertex, weight, is_seen, is_needed)
+    return Seen(hits, directions, owner, vertex, weight, panes, is_seen, is_needed)
 
 
-def _trace(
-    embree: EmbreeScene, camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32], places: F32
-) -> tuple[Hits, F32]:
-    """Trace rays through places in pixels, those of one pixel in a row. places: pixel units. (k, 2) float32"""
+def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32], places: F32) -> F32:
+    """Aim rays through places in pixels, those of one pixel in a row. places: pixel units. (k, 2) float32"""
     width, height = size
     half_height = np.float32(math.tan(camera.yfov / 2))
     rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
     directions = np.empty((len(pixels) * len(places), 3), np.float32)
     aim = (rotation, np.float32(half_height * width / height), half_height, width, height, pixels, places)
     for_shares(lambda start, stop: _aim(*aim, start, stop, directions), len(directions))
-    return trace_from(embree, camera.to_world[:3, 3].astype(np.float32), directions), directions
+    return directions
+
+
+def _both(one: Hits, other: Hits) -> Hits:
+    return Hits(*(np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(Hits)))
 
 
 @nb.njit(nogil=True, cache=True)

@@ -25,7 +25,7 @@ class Coverage:
         self._samples = np.ones(view.num_view_samples, np.float32)
         self._samples[view.num_surface_samples :] = 0
         shape = view.width * view.height, view.num_view_samples
-        self._shares = csr_array((view.weight, view.order, view.first), shape=shape)
+        self._shares = csr_array((view.gains.mean(axis=1), view.order, view.first), shape=shape)
         self._seen: dict[int, int] = {}
         self._pixels: F32 | None = None
 
@@ -36,7 +36,9 @@ class Coverage:
                 self._seen[material.index] = material.num_composed
                 self._follow(material)
         if self._pixels is None:
-            whole = np.clip(self._shares @ self._samples, 0, 1)
+            whole = np.clip(
+                1 - self._shares @ (1 - self._samples), 0, 1
+            )  # glass hides nothing, but dims what is behind
             self._pixels = whole.reshape(self._view.height, self._view.width)
         return self._pixels
 

@@ -41,9 +41,9 @@ def probe(
         raise ParameterError("pixel", [x, y], f"x below {view.width} and y below {view.height}")
     pixel = y * view.width + x
     entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
-    samples, weights = view.order[entries], view.weight[entries]
-    seen = gain * (radiance[:, samples] * weights).sum(axis=1)
-    heaviest = int(samples[np.argmax(weights)])
+    samples, gains = view.order[entries], view.gains[entries]
+    seen = gain * (radiance[:, samples] * gains.T).sum(axis=1)
+    heaviest = int(samples[np.argmax(gains.max(axis=1))])
     index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
     found = {"material": None, "position": None, "normal": None, "radiance": seen, "bands": None, "curve": None}
     if index >= len(images.by_name):
@@ -52,7 +52,7 @@ def probe(
     position, normal = view.surface_at(heaviest)
     found |= {"material": name, "position": position, "normal": normal}
     for k, term in _touched_first(images, name, touched):
-        bands = _contributions(images, name, term, samples, weights)
+        bands = _contributions(images, name, term, samples, gains)
         if bands is not None and isinstance(term.ready.basis, CurveBasis):
             pointer = str(CurvePointer(name, k, term.ready.basis.name))
             return found | {"bands": gain[:, None] * bands, "curve": pointer}
@@ -69,7 +69,7 @@ def _touched_first(
 
 
 def _contributions(
-    images: ViewImages, name: str, term: LiveTerm, samples: NDArray[np.int32], weights: F32
+    images: ViewImages, name: str, term: LiveTerm, samples: NDArray[np.int32], gains: F32
 ) -> NDArray[np.float64] | None:
     """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None where none is frozen."""
     material = images.by_name[name]
@@ -80,12 +80,12 @@ def _contributions(
     rows = images.view.rows(material.index)
     curve = synthesis(ready.coefficients) if ready.coefficients is not None else term.target[ready.basis.name]
     bands = np.zeros_like(curve)
-    for sample, weight in zip(samples, weights, strict=True):
+    for sample, of_sample in zip(samples, gains, strict=True):
         if rows.start <= sample < rows.stop:
             row = int(sample) - rows.start
             tile, offset = divmod(row, frozen.transport.shape[3])
             columns = synthesis(frozen.transport[tile, :, :, offset].astype(np.float64))
-            bands += weight * columns * material.factors_at(term, row)[:, None] * curve
+            bands += of_sample[:, None] * columns * material.factors_at(term, row)[:, None] * curve
     return bands
 
 

@@ -181,6 +181,6 @@ def points_of(samples: ViewSamples, eye: F64) -> Points:
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:
     """Samples to pixels by their weights. (height, width, 3)"""
     width, height = size
-    weighted = samples.weight[:, None] * radiance
+    weighted = samples.gains * radiance
     pixels = [np.bincount(samples.pixel, weighted[:, c], width * height) for c in range(3)]
     return np.stack(pixels, axis=-1).reshape(height, width, 3).astype(np.float32)

@@ -7,7 +7,7 @@ import json
 import math
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -20,7 +20,7 @@ from relume.errors import SceneError
 from relume.remarks import Remark, remark_of
 from relume.replacing import replacing
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -145,6 +145,7 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 # ids of scenes without these stay what they were
                 **({"catcher": True} if material.catcher else {}),
                 **({"opacity": _described_opacity(material.opacity)} if material.opacity else {}),
+                **({"glass": asdict(material.glass)} if material.glass else {}),
             }
             for material in scene.materials
         ],
@@ -194,7 +195,14 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
     terms = tuple(dict(term) for term in document["terms"])
     double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
     opacity = _assemble_opacity(document["opacity"], arrays[f"material{i}_opacity"]) if "opacity" in document else None
-    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher, opacity)
+    glass = _assemble_glass(document["glass"]) if "glass" in document else None
+    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher, opacity, glass)
+
+
+def _assemble_glass(document: dict[str, Any]) -> Glass:
+    (red, green, blue), (r, g, b) = document["tint"], document["absorbed"]
+    tint, absorbed = (float(red), float(green), float(blue)), (float(r), float(g), float(b))
+    return Glass(tint, float(document["ior"]), float(document["thickness"]), absorbed)
 
 
 def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:

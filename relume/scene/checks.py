@@ -13,6 +13,7 @@ from relume.scene.model import Camera, Light, Material, Mesh
 MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
 MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
+MAX_IOR = 4.0
 MAX_EMISSION, MAX_METRES = 1e6, 1e6  # of lights, in a scene and in a look
 
 
@@ -44,6 +45,17 @@ def check_opacity(material: Material) -> None:
         raise SceneError(f"the opacity of material {material.name!r} is not an image of bytes; import the scene again")
     if opacity.cutoff is not None and not 0 < opacity.cutoff <= 1:
         raise SceneError(f"material {material.name!r} is cut at {opacity.cutoff}; give a share above 0, at most 1")
+
+
+def check_glass(material: Material) -> None:
+    """Raises SceneError where glass is of numbers that none has."""
+    glass = material.glass
+    if glass is None:
+        return
+    shares = all(0 <= share <= 1 for share in glass.tint) and all(0 <= rate < np.inf for rate in glass.absorbed)
+    sizes = 1 <= glass.ior <= MAX_IOR and 0 <= glass.thickness <= MAX_METRES
+    if not (shares and sizes and len(glass.tint) == len(glass.absorbed) == 3):
+        raise SceneError(f"the glass of material {material.name!r} is out of range; import the scene again")
 
 
 def check_camera(camera: Camera) -> None:
@@ -86,7 +98,7 @@ def check_scene(
 
     Args:
         meshes: their shapes, indices and values are checked, and that they have at most `MAX_TRIANGLES` together.
-        materials: checked to have names of their own, and opacity that is an image.
+        materials: checked to have names of their own, opacity that is an image, and glass that bends and dims.
         cameras: checked to be rigid and to have names of their own.
         environment: its size and values are checked.
         lights: their number and names are checked; their fields are the look's to check.
@@ -109,6 +121,7 @@ def check_scene(
         check_mesh(mesh, len(materials))
     for material in materials:
         check_opacity(material)
+        check_glass(material)
     for camera in cameras:
         check_camera(camera)
     check_environment(environment)

@@ -47,6 +47,23 @@ class Opacity:
 
 
 @dataclass(frozen=True)
+class Glass:
+    """A surface that light passes.
+
+    Attributes:
+        tint: share of the light that passes once, but for what is reflected. Three numbers within [0, 1].
+        ior: index of refraction, within [1, 4].
+        thickness: of a solid whose rim it is, about, metres; 0 for a pane, which bends nothing.
+        absorbed: inside of a solid, per metre. Three numbers.
+    """
+
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ior: float = 1.5
+    thickness: float = 0.0
+    absorbed: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Mesh:
     """Triangles of one material, node transforms applied.
 
@@ -80,6 +97,7 @@ class Material:
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         catcher: it is a ground that looks may show by its shadows alone, and the default look does.
         opacity: where it has holes; None where it is whole.
+        glass: how light passes it; None where none does.
     """
 
     name: str
@@ -89,6 +107,7 @@ class Material:
     double_sided: bool = True
     catcher: bool = False
     opacity: Opacity | None = None
+    glass: Glass | None = None
 
 
 @dataclass(frozen=True)

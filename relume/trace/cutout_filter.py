@@ -1,9 +1,9 @@
-"""What Embree asks while it traces: is the surface there, where a ray meets a triangle with holes?
+"""What Embree asks while it traces: is the surface there, where a ray meets a triangle that rays may pass?
 
-One function for all triangles with holes of a scene; Embree calls it with a packet's hits and takes back which of them
+One function for all such triangles of a scene; Embree calls it with a packet's hits and takes back which of them
 count. A surface that blends is there for the share of rays that its opacity says. Which rays those are, their chance
 decides: a number that the caller gives an eye's rays, so that those of a pixel share out the opacity evenly; of others
-it follows from their direction: the same ray finds the same, in any packet.
+it follows from their direction: the same ray finds the same, in any packet. Rays that are given one always meet glass.
 """
 
 from __future__ import annotations
@@ -17,16 +17,20 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from relume.trace.cutouts import Cutouts
+from relume.color import LUMINANCE
+from relume.trace.cutouts import PASSES, Cutouts
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 
 _DIRECTION, _TIME = 4, 7  # rows of RTCRayN; triangles that do not move have no other use for the time
 _U, _V, _PRIMITIVE = 3, 4, 5  # rows of RTCHitN
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
 _CLAMP, _MIRROR = 2, 1  # of WRAPS
-# chances of rays that are stopped by whatever is there a little, and of those that only what is wholly there stops
-ANYWHERE, EVERYWHERE = np.float32(-1), np.float32(2)
+_MOST = np.float32(254.5 / 255)  # a chance that texels of 255 reach, however they are rounded
+# chances of rays that are stopped by whatever is there a little, of those that only what is wholly there stops, and of
+# those that see no glass, and else what their direction makes them see
+ANYWHERE, EVERYWHERE, PAST_GLASS = np.float32(-1), np.float32(2), np.float32(-2)
 
 
 class Holes(NamedTuple):
@@ -55,7 +59,7 @@ class Holes(NamedTuple):
         """
         image = np.ascontiguousarray(cutouts.of_material[face_material], np.int32)
         faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
-        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.bounds)
+        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.rules)
         return cls(np.array([array.ctypes.data for array in read], np.int64), image, faces, uvs, cutouts)
 
 
@@ -106,7 +110,7 @@ def _hashed(word):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _chance(given, face, row, x, y, z, is_behind):  # type: ignore[no-untyped-def]
-    """A number in (0, 1] for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
+    """A number in (0, 1) for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
 
     A given one moves with the face: what a ray met before says nothing about what it meets behind that. All rays to
     one light have one direction and so one chance, at fronts and at backs of each image: shadows of panes are even.
@@ -114,14 +118,19 @@ def _chance(given, face, row, x, y, z, is_behind):  # type: ignore[no-untyped-de
     if given == ANYWHERE:
         return np.float32(1 / 512)
     if given == EVERYWHERE:
-        return np.float32(1)
+        return _MOST
     if given > 0:
         moved = given + np.float32(_hashed(np.uint32(face)) >> np.uint32(8)) * np.float32(2**-24)
-        return moved - np.float32(1) if moved > 1 else moved
+        return min(moved - np.float32(1) if moved > 1 else moved, _MOST)
     word = np.uint32(2 * row + is_behind)
     for component in (x, y, z):
         word = _hashed(np.uint32(word ^ np.float32(component).view(np.uint32)))
-    return (np.float32(word >> np.uint32(8)) + np.float32(1)) * np.float32(2**-24)
+    return min((np.float32(word >> np.uint32(8)) + np.float32(1)) * np.float32(2**-24), _MOST)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _schlick(cosine, f0):  # type: ignore[no-untyped-def]
+    return f0 + (np.float32(1) - f0) * (np.float32(1) - min(cosine, np.float32(1))) ** 5
 
 
 @nb.cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
@@ -139,7 +148,7 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
     uvs = _array(_at(read[2]), (1 << 40, 2), np.float32)
     texels = _array(_at(read[3]), (1 << 40,), np.uint8)
     images = _array(_at(read[4]), (1 << 30, 5), np.int64)
-    bounds = _array(_at(read[5]), (1 << 30,), np.float32)
+    rules = _array(_at(read[5]), (1 << 30, 6), np.float32)
     for lane in range(width):
         if valid[lane] == 0:
             continue
@@ -150,12 +159,20 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         u = a * uvs[i, 0] + b * uvs[j, 0] + c * uvs[k, 0]
         v = a * uvs[i, 1] + b * uvs[j, 1] + c * uvs[k, 1]
-        least = bounds[row]
+        there, least = _opacity(images[row], texels, u, v), rules[row, 0]
         if least < 0:
             x, y, z = rays[_DIRECTION, lane], rays[_DIRECTION + 1, lane], rays[_DIRECTION + 2, lane]
-            is_behind = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z > 0
-            least = _chance(rays[_TIME, lane], face, row, x, y, z, is_behind)
-        if _opacity(images[row], texels, u, v) < least:
+            along = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z
+            given = rays[_TIME, lane]
+            least = _chance(given, face, row, x, y, z, along > 0)
+            if rules[row, 0] == PASSES and given == PAST_GLASS:
+                there = np.float32(0)
+            elif rules[row, 0] == PASSES and given == 0:
+                square = hits[0, lane] ** 2 + hits[1, lane] ** 2 + hits[2, lane] ** 2
+                cosine = abs(along) / np.sqrt(square * (x * x + y * y + z * z))
+                passed = _RED * rules[row, 1] + _GREEN * rules[row, 2] + _BLUE * rules[row, 3]
+                there *= np.float32(1) - passed * (np.float32(1) - _schlick(cosine, rules[row, 4]))
+        if there < least:
             valid[lane] = 0
 
 

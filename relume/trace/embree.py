@@ -136,9 +136,7 @@ class EmbreeScene:
         weakref.finalize(self, _release_scene, self.handle).atexit = False
 
 
-def _attach(
-    scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None
-) -> None:
+def _attach(scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None) -> None:
     """Add triangles to a scene, asking what `holes` says about each hit. Raises SceneError."""
     geometry = _new_geometry(_device, _TRIANGLE)
     for kind, layout, rows in (

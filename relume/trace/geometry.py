@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.scene.model import Scene
-from relume.trace.cutout_filter import Holes
+from relume.trace.cutout_filter import PAST_GLASS, Holes
 from relume.trace.cutouts import cutouts_of
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import trace_from
@@ -70,7 +70,7 @@ def is_front(
         (n,)
     """
     directions = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
-    face = trace_from(embree, eye, directions.astype(np.float32)).face
+    face = trace_from(embree, eye, directions.astype(np.float32), np.full(1, PAST_GLASS)).face
     a, b, c = positions[faces[np.maximum(face, 0)]].transpose(1, 0, 2)
     return np.asarray(np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) < 0)
 

@@ -7,7 +7,9 @@ of them: a silhouette has eight levels of coverage for a few samples, and thin c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from relume.environments.equirect import lookup
 from relume.scene.model import Scene
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.geometry import Geometry
+from relume.trace.glass import Layer, has_glass, layers_of
 from relume.trace.primary import Hits, camera_directions, trace_from
 from relume.trace.surface import Surface, surface_at
 
@@ -39,11 +42,13 @@ class ViewSamples:
 
     Attributes:
         pixel: row-major index. (n,) uint32
-        weight: share of the pixel; the shares of a pixel sum to one. (n,) float32
+        weight: share of the pixel; the shares of a pixel sum to one, but for what lies behind glass. (n,) float32
         material: index into the scene's materials, `BACKGROUND` where the ray left the scene. (n,) uint16
         surface: points and textures; for background samples the position is the ray's direction and `diffuse` the
             environment's radiance in it.
         num_rays: how many were traced to find them.
+        through: what glass before a sample lets through; None where there is none. Samples on glass and those behind
+            it have the same shares of a pixel. (n, 3) float32
     """
 
     pixel: NDArray[np.uint32]
@@ -51,6 +56,12 @@ class ViewSamples:
     material: NDArray[np.uint16]
     surface: Surface
     num_rays: int
+    through: F32 | None = None
+
+    @property
+    def gains(self) -> F32:
+        """What the radiance of each sample is multiplied by for its pixel. (n, 1) float32, or (n, 3) behind glass"""
+        return self.weight[:, None] if self.through is None else self.weight[:, None] * self.through
 
 
 def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) -> tuple[NDArray[np.bool_], F32]:
@@ -106,36 +117,90 @@ def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
     return code
 
 
-def _merge(
-    geometry: Geometry, hits: Hits, directions: F32, num_pixels: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], F32]:
-    """Group the eight rays of each edge pixel by what they see.
+class _Chosen(NamedTuple):
+    """Rays that samples are made of.
 
-    Returns:
-        Index of the ray that stands for each group, the pixel (of the edge pixels) it belongs to, and its weight.
+    Attributes:
+        pixel: that each is of. (n,) int64. weight: share of it. (n,) float32
+        hits, directions, through: see `relume.trace.glass.Layer`.
     """
-    mesh = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
-    mesh = mesh.reshape(num_pixels, POSITIONS_A_PIXEL)
-    normal = surface_at(geometry, hits, directions).points.normal.reshape(num_pixels, POSITIONS_A_PIXEL, 3)
-    distance = hits.distance.reshape(num_pixels, POSITIONS_A_PIXEL)
-    rays = directions.reshape(num_pixels, POSITIONS_A_PIXEL, 3)
-    group = np.full((num_pixels, POSITIONS_A_PIXEL), -1)
+
+    pixel: NDArray[np.int64]
+    weight: F32
+    hits: Hits
+    directions: F32
+    through: F32
+
+
+def _merge(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> _Chosen:
+    """Group the rays of a layer by what they see, of the eight rays of each of some pixels.
+
+    Of each group the ray next to its middle is kept, for as many eighths of the pixel as the group has rays.
+    """
+    shape = len(pixels), POSITIONS_A_PIXEL
+    row = layer.ray[layer.is_shown]
+    hits, directions = _hits_at(layer.hits, layer.is_shown), layer.directions[layer.is_shown]
+    mesh, normal = np.full(shape, -2), np.zeros((*shape, 3), np.float32)
+    distance, rays, through = np.ones(shape, np.float32), np.ones((*shape, 3), np.float32), np.ones((*shape, 3))
+    mesh.flat[row] = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
+    distance.flat[row] = hits.distance
+    for out, values in (
+        (normal, surface_at(geometry, hits, directions).points.normal),
+        (rays, directions),
+        (through, layer.through[layer.is_shown]),
+    ):
+        out.reshape(-1, 3)[row] = values
+    group = np.where(mesh == -2, -2, -1)
     for candidate in range(POSITIONS_A_PIXEL):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
         one = slice(candidate, candidate + 1)
         cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
         off = _is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
-        same = (group < 0) & (mesh == mesh[:, one]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
-        same &= (group[:, candidate] < 0)[:, None]
+        same = (group == -1) & (mesh == mesh[:, one]) & (((cosine > _COS_TURN) & ~off) | (mesh < 0))
+        same &= (group[:, candidate] == -1)[:, None]
         group[same] = candidate
     pixel, first = np.nonzero(group == np.arange(POSITIONS_A_PIXEL))
     is_in = group[pixel] == first[:, None]
     size = is_in.sum(axis=1)
-    return (
-        pixel * POSITIONS_A_PIXEL + _most_central(is_in, size),
-        pixel,
-        (size / POSITIONS_A_PIXEL).astype(np.float32),
+    kept = pixel * POSITIONS_A_PIXEL + _most_central(is_in, size)
+    place = np.searchsorted(row, kept)
+    mean = np.einsum("gk,gkc->gc", is_in, through[pixel]) / size[:, None]
+    weight = (size / POSITIONS_A_PIXEL).astype(np.float32)
+    return _Chosen(pixels[pixel], weight, _hits_at(hits, place), directions[place], mean.astype(np.float32))
+
+
+def _hits_at(hits: Hits, rows: NDArray[Any]) -> Hits:
+    return Hits(hits.face[rows], hits.uv[rows], hits.distance[rows])
+
+
+def _alone(layer: Layer, is_edge: NDArray[np.bool_]) -> _Chosen:
+    """The rays of a layer through the middles of pixels that are no edges."""
+    rows = np.flatnonzero(layer.is_shown & ~is_edge[layer.ray])
+    weight = np.ones(len(rows), np.float32)
+    return _Chosen(layer.ray[rows], weight, _hits_at(layer.hits, rows), layer.directions[rows], layer.through[rows])
+
+
+def _joined(parts: Sequence[_Chosen]) -> _Chosen:
+    hits = Hits(*(np.concatenate([getattr(part.hits, f.name) for part in parts]) for f in fields(Hits)))
+    pixel, weight, directions, through = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("pixel", "weight", "directions", "through")
     )
+    return _Chosen(pixel, weight, hits, directions, through)
+
+
+def _edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Find pixels that want more rays by what a layer shows. (pixels,)"""
+    width, height = size
+    surface = surface_at(geometry, layer.hits, layer.directions)
+    key, normal = np.full(width * height, -2), np.zeros((width * height, 3), np.float32)
+    distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
+    key[layer.ray] = np.where(layer.hits.face >= 0, geometry.face_mesh[np.maximum(layer.hits.face, 0)], -1)
+    normal[layer.ray], distance[layer.ray] = surface.points.normal, layer.hits.distance
+    directions[layer.ray] = layer.directions
+    shape = (height, width)
+    seen = key.reshape(shape)
+    differs, cosine = _edges(seen, normal.reshape(*shape, 3), distance.reshape(shape), directions.reshape(*shape, 3))
+    return np.asarray((differs | _turning(differs, cosine, seen)).ravel())
 
 
 def _is_partly_there(geometry: Geometry, origin: F32, directions: F32) -> NDArray[np.bool_]:
@@ -176,42 +241,35 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     origin = camera.to_world[:3, 3].astype(np.float32)
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    hits = trace_from(geometry.embree, origin, directions)
-    surface = surface_at(geometry, hits, directions)
-    key = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1).astype(np.int64)
-    shape = (height, width)
-    seen = key.reshape(shape)
-    differs, cosine = _edges(
-        seen, surface.points.normal.reshape(*shape, 3), hits.distance.reshape(shape), directions.reshape(*shape, 3)
-    )
-    edge = (differs | _turning(differs, cosine, seen)).ravel()
+    layers = layers_of(geometry, scene.materials, origin, directions, np.full(1, EVERYWHERE))
+    is_edge = np.any([_edges_of(geometry, layer, size) for layer in layers], axis=0)
     if geometry.embree.holes is not None:
-        edge |= _is_partly_there(geometry, origin, directions)
+        is_edge |= _is_partly_there(geometry, origin, directions)
 
-    edge_pixel = np.nonzero(edge)[0]
+    edge_pixel = np.nonzero(is_edge)[0]
     more_x = (x[edge_pixel, None] + _POSITIONS[:, 0]).astype(np.float32).ravel()
     more_y = (y[edge_pixel, None] + _POSITIONS[:, 1]).astype(np.float32).ravel()
     more_directions = camera_directions(camera, size, more_x, more_y)
-    more = trace_from(geometry.embree, origin, more_directions, _shared_chances(edge_pixel))
-    chosen, owner, share = _merge(geometry, more, more_directions, len(edge_pixel))
-
-    inner = np.nonzero(~edge)[0]
-    pixel = np.concatenate([inner, edge_pixel[owner]])
-    weight = np.concatenate([np.ones(len(inner), np.float32), share])
-    all_hits = Hits(
-        np.concatenate([hits.face[inner], more.face[chosen]]),
-        np.concatenate([hits.uv[inner], more.uv[chosen]]),
-        np.concatenate([hits.distance[inner], more.distance[chosen]]),
+    more = layers_of(geometry, scene.materials, origin, more_directions, _shared_chances(edge_pixel))
+    chosen = _joined(
+        [
+            *(_alone(layer, is_edge) for layer in layers),
+            *(_merge(geometry, layer, edge_pixel) for layer in more),
+        ]
     )
-    all_directions = np.concatenate([directions[inner], more_directions[chosen]])
-    hit = all_hits.face >= 0
-    material = np.where(hit, geometry.face_material[np.maximum(all_hits.face, 0)], BACKGROUND).astype(np.uint16)
-    order = np.lexsort((_morton(pixel, width), material))
+    hit = chosen.hits.face >= 0
+    material = np.where(hit, geometry.face_material[np.maximum(chosen.hits.face, 0)], BACKGROUND).astype(np.uint16)
+    order = np.lexsort((_morton(chosen.pixel, width), material))
     pixel_angle = camera.yfov / height
-    sorted_hits = Hits(all_hits.face[order], all_hits.uv[order], all_hits.distance[order])
-    full = surface_at(geometry, sorted_hits, all_directions[order], scene.materials, pixel_angle, origin)
+    towards = chosen.directions[order]
+    full = surface_at(geometry, _hits_at(chosen.hits, order), towards, scene.materials, pixel_angle, origin)
     outside = ~hit[order]
-    full.diffuse[outside] = lookup(scene.environment.radiance, all_directions[order][outside])
+    full.diffuse[outside] = lookup(scene.environment.radiance, towards[outside])
     return ViewSamples(
-        pixel[order].astype(np.uint32), weight[order], material[order], full, len(directions) + len(more_directions)
+        chosen.pixel[order].astype(np.uint32),
+        chosen.weight[order],
+        material[order],
+        full,
+        len(directions) + len(more_directions),
+        chosen.through[order] if has_glass(scene.materials) else None,
     )

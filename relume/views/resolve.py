@@ -41,8 +41,9 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _resolve(radiance, gain, first, order, weight, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
+def _resolve(radiance, gain, first, order, gains, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
+    middle, last = gains.shape[1] // 2, gains.shape[1] - 1  # columns of green and blue
     for t in range(start, stop):
         x0, y0, tile_width, tile_height = tiles[t, 0], tiles[t, 1], tiles[t, 2], tiles[t, 3]
         at = offsets[t]
@@ -51,10 +52,10 @@ def _resolve(radiance, gain, first, order, weight, width, tiles, offsets, start,
                 p = y * width + x
                 red = green = blue = np.float32(0)
                 for k in range(first[p], first[p + 1]):
-                    s, w = order[k], weight[k]
-                    red += w * radiance[0, s]
-                    green += w * radiance[1, s]
-                    blue += w * radiance[2, s]
+                    s = order[k]
+                    red += gains[k, 0] * radiance[0, s]
+                    green += gains[k, middle] * radiance[1, s]
+                    blue += gains[k, last] * radiance[2, s]
                 out[at, 0], out[at, 1], out[at, 2] = gain[0] * red, gain[1] * green, gain[2] * blue
                 at += 1
 
@@ -81,7 +82,7 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike) -
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
     factors = np.array(np.broadcast_to(np.asarray(gain, np.float32), 3))
-    args = (radiance, factors, view.first, view.order, view.weight, view.width, table, offsets)
+    args = (radiance, factors, view.first, view.order, view.gains, view.width, table, offsets)
     for_shares(lambda start, stop: _resolve(*args, start, stop, out), len(table))
     return out
 

@@ -35,7 +35,8 @@ class View:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
         key: of the bake in `memory`.
         first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int64
-        order: (n,) int32. weight: share of its pixel, in that order. (n,) float32
+        order: (n,) int32. gains: what the radiance of each is multiplied by for its pixel, in that order: its share of
+            it, and what glass lets through that is before it. (n, 1) float32, or (n, 3) where there is glass
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
     """
 
@@ -50,7 +51,7 @@ class View:
     pixel: NDArray[np.uint32]
     first: NDArray[np.int64]
     order: NDArray[np.int32]
-    weight: F32
+    gains: F32
     textures: dict[str, F32]
     cos_theta_o: NDArray[np.float64]
 
@@ -151,7 +152,7 @@ class View:
         for index in range(len(self.bounds) - 1):
             material[self.rows(index)] = index
         ids = np.full(self.width * self.height, BACKGROUND, np.uint16)
-        by_weight = np.argsort(self.weight, kind="stable")  # the heaviest of a pixel is written last
+        by_weight = np.argsort(self.gains.max(axis=1), kind="stable")  # the heaviest of a pixel is written last
         pixel_of = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
         ids[pixel_of[by_weight]] = material[self.order[by_weight]]
         return ids.reshape(self.height, self.width)
@@ -191,7 +192,9 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
     prefix = f"views/{index}"
     pixel = store.read(f"{prefix}/pixel")
     material = store.read(f"{prefix}/material")
-    weight = store.read(f"{prefix}/weight")
+    gains = store.read(f"{prefix}/weight")[:, None]
+    if store.attributes.get("has_glass"):
+        gains = gains * store.read(f"{prefix}/through")
     num_materials = len(store.attributes["materials"])
     surface = int(np.searchsorted(material, BACKGROUND))
     if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(np.diff(material.astype(np.int64)) < 0):
@@ -214,7 +217,7 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         pixel=pixel,
         first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
         order=order,
-        weight=np.ascontiguousarray(weight[order], np.float32),
+        gains=np.ascontiguousarray(gains[order], np.float32),
         textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
         cos_theta_o=np.clip(cosine, 0, 1),
     )

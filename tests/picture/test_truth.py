@@ -96,8 +96,8 @@ def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
     picture.set_look(look)
     image = settle(picture).image().reshape(-1, 3)
     num_samples = np.bincount(view.pixel, minlength=48 * 36)
-    weight = np.empty_like(view.weight)
-    weight[view.order] = view.weight
+    weight = np.empty_like(view.gains)
+    weight[view.order] = view.gains
     found, expected = [], []
     for material in range(3):
         own = view.rows(material)
@@ -105,7 +105,7 @@ def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
         chosen = np.unique(view.pixel[own][is_whole[view.pixel[own]]])[::11]
         assert len(chosen) > 5
         rows = np.nonzero(np.isin(view.pixel[own], chosen))[0]
-        shares = weight[own][rows, None] * truth_of(scene, transfer, material, rows, look)
+        shares = weight[own][rows] * truth_of(scene, transfer, material, rows, look)
         pixels = np.zeros_like(image, np.float64)
         np.add.at(pixels, view.pixel[own][rows], shares)
         found.append(image[chosen])

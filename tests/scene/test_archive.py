@@ -14,7 +14,7 @@ from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.remarks import simplified
 from relume.scene.archive import load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 
 def small_scene(**changes: object) -> Scene:
@@ -204,3 +204,23 @@ def test_opacity_is_kept_and_changes_the_id(tmp_path: Path) -> None:
 def test_opacity_that_is_no_image_of_bytes_is_refused(opacity: Opacity) -> None:
     with pytest.raises(SceneError, match=r"opacity|cut at"):
         small_scene(materials=[dataclasses.replace(small_scene().materials[0], opacity=opacity)])
+
+
+def test_glass_is_kept_and_changes_the_id(tmp_path: Path) -> None:
+    clear = small_scene()
+    glass = Glass((0.5, 0.25, 1.0), 1.4, 0.125, (3.0, 0.0, 0.5))
+    scene = small_scene(materials=[dataclasses.replace(clear.materials[0], glass=glass)])
+    save_scene(scene, tmp_path)
+    assert load_scene(tmp_path).materials[0].glass == glass
+    assert scene.id != clear.id
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"ior": 0.5}, {"ior": 100.0}, {"ior": float("nan")}, {"tint": (2.0, 0.0, 0.0)}, {"absorbed": (-1.0, 0.0, 0.0)},
+     {"thickness": float("inf")}, {"tint": (0.5, 0.5)}],
+)  # fmt: skip
+def test_glass_that_nothing_is_made_of_is_refused(fields: dict[str, object]) -> None:
+    glass = dataclasses.replace(Glass(), **fields)
+    with pytest.raises(SceneError, match="glass of material"):
+        small_scene(materials=[dataclasses.replace(small_scene().materials[0], glass=glass)])

@@ -284,14 +284,14 @@ def test_each_thing_not_understood_is_one_warning_that_names_it() -> None:
     description = {
         "name": "Lamp",
         "occlusionTexture": texture,
-        "extensions": {"KHR_materials_volume": {}},
+        "extensions": {"KHR_materials_iridescence": {}},
     }
     glb.quad(description, COLOR_0=colours)
     glb.document |= {"animations": [{}], "skins": [{}]}
     glb.document["meshes"][0]["primitives"][0]["targets"] = [{}]
     glb.document["nodes"][0]["skin"] = 0
     warnings = imported(glb).warnings
-    words = ["occlusion", "volume", "vertex colours", "animations", "morph", "skin"]
+    words = ["occlusion", "iridescence", "vertex colours", "animations", "morph", "skin"]
     for word in words:
         assert len([warning for warning in warnings if word in warning]) == 1, word
     assert len(warnings) == len(words)

@@ -15,7 +15,7 @@ from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
 from relume.scene.gltf.sheen import MIN_ALPHA, sheen_curve
 from relume.scene.gltf.terms import COAT_ALBEDO
-from relume.scene.model import Scene
+from relume.scene.model import Glass, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 PLASTIC = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.5}
@@ -163,3 +163,62 @@ def test_what_is_not_valid_is_a_warning_and_not_used(extensions: dict[str, Any])
     assert scene.materials[0].terms == terms_of({})
     assert len(scene.warnings) == 1
     assert "not valid" in scene.warnings[0]
+
+
+def glass_of(extensions: dict[str, Any], **material: Any) -> Glass:
+    glass = imported(extensions, **material).materials[0].glass
+    assert glass is not None
+    return glass
+
+
+def test_transmission_is_a_pane_of_the_base_colour_and_leaves_less_to_be_scattered() -> None:
+    scene = imported(
+        {"transmission": {"transmissionFactor": 0.75}}, pbrMetallicRoughness=PLASTIC | {"roughnessFactor": 0}
+    )
+    made = scene.materials[0]
+    assert made.glass == Glass((0.375, 0.1875, 0.09375))
+    assert made.terms[0]["color"] == [0.125, 0.0625, 0.03125]
+    assert scene.warnings == ()
+    assert imported({"transmission": {}}).materials[0].glass is None
+
+
+def test_a_volume_is_a_solid_that_absorbs() -> None:
+    volume = {"thicknessFactor": 0.2, "attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.25]}
+    glass = glass_of({"transmission": {"transmissionFactor": 1}, "volume": volume, "ior": {"ior": 1.33}})
+    assert (glass.thickness, glass.ior) == (0.2, 1.33)
+    np.testing.assert_allclose(np.exp(-np.array(glass.absorbed) * 0.5), [1, 0.5, 0.25])
+    black = glass_of({"transmission": {"transmissionFactor": 1}, "volume": volume | {"attenuationColor": [0, 0, 0]}})
+    assert np.isfinite(black.absorbed).all()
+    flat = glass_of({"transmission": {"transmissionFactor": 1}, "volume": volume | {"thicknessFactor": 0}})
+    assert (flat.thickness, flat.absorbed) == (0.0, (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("ior", [0.0, 0.5, 100.0])
+def test_an_index_that_no_glass_has_is_said_and_replaced(ior: float) -> None:
+    scene = imported({"transmission": {"transmissionFactor": 1}, "ior": {"ior": ior}})
+    assert any("index of refraction" in str(warning) for warning in scene.warnings)
+    assert scene.materials[0].glass is not None
+    assert scene.materials[0].glass.ior == 1.5
+
+
+def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
+    glb = Glb()
+    texture = {"index": glb.texture([[[255, 0, 0], [0, 0, 0]]])}
+    passing = {"transmissionFactor": 1, "transmissionTexture": texture}
+    scene = imported({"transmission": passing, "dispersion": {"dispersion": 1}}, glb)
+    assert scene.materials[0].glass is not None
+    np.testing.assert_allclose(scene.materials[0].glass.tint, [0.25, 0.125, 0.0625])
+    for word in ("frosted", "transmission texture", "dispersion"):
+        assert len([warning for warning in scene.warnings if word in str(warning)]) == 1
+
+
+@pytest.mark.parametrize(
+    "extensions",
+    [
+        {"transmission": {"transmissionFactor": 2}},
+        {"transmission": {"transmissionFactor": 1}, "volume": {"thicknessFactor": -1}},
+        {"transmission": {"transmissionFactor": 1}, "volume": {"attenuationDistance": 0}},
+    ],
+)
+def test_transmission_out_of_range_is_said(extensions: dict[str, Any]) -> None:
+    assert any("is not valid" in str(warning) for warning in imported(extensions).warnings)

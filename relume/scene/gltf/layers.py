@@ -1,6 +1,7 @@
 """Material extensions as typed models: what the file says beyond metallic-roughness.
 
-Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy and _emissive_strength.
+Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy, _emissive_strength,
+_transmission and _volume.
 """
 
 from __future__ import annotations
@@ -66,6 +67,21 @@ class EmissiveStrength(BaseModel, frozen=True):
     emissiveStrength: Annotated[Number, Field(ge=0)] = 1.0  # noqa: N815
 
 
+class Transmission(BaseModel, frozen=True):
+    """KHR_materials_transmission: the share of light that passes instead of being scattered."""
+
+    transmissionFactor: Factor = 0.0  # noqa: N815
+    transmissionTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Volume(BaseModel, frozen=True):
+    """KHR_materials_volume: the surface is the rim of a solid, which absorbs; thickness 0 is a pane."""
+
+    thicknessFactor: Weight = 0.0  # noqa: N815
+    attenuationDistance: Annotated[float, Field(gt=0)] = float("inf")  # noqa: N815
+    attenuationColor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]  # noqa: N815
+
+
 class Layers(BaseModel, frozen=True):
     """All that relume understands of one material's extensions."""
 
@@ -75,6 +91,8 @@ class Layers(BaseModel, frozen=True):
     sheen: Sheen = Sheen()
     anisotropy: Anisotropy = Anisotropy()
     emissive_strength: EmissiveStrength = EmissiveStrength()
+    transmission: Transmission = Transmission()
+    volume: Volume = Volume()
 
 
 UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields}
@@ -106,4 +124,6 @@ def read_layers(extensions: Extensions, what: str, warnings: list[Remark]) -> La
         sheen=read(Sheen),
         anisotropy=read(Anisotropy),
         emissive_strength=read(EmissiveStrength),
+        transmission=read(Transmission),
+        volume=read(Volume),
     )

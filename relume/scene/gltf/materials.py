@@ -7,13 +7,14 @@ appendix B, and the extensions' own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, unused, wrong
+from relume.scene.checks import MAX_IOR
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import TextureInfo
 from relume.scene.gltf.images import ImageReader, to_linear
@@ -22,9 +23,10 @@ from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
-from relume.scene.model import Material, Opacity, Texture
+from relume.scene.model import Glass, Material, Opacity, Texture
 from relume.scene.opacity import is_nowhere, make_opacity
 
+_CLEAR = 0.1  # roughness of glass that blurs nothing to speak of
 MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
 
 
@@ -65,6 +67,9 @@ class MaterialReader:
         use = uv_use([info for info in _infos(material, layers) if info is not None], what, self._warnings)
         surface = self._surface(material, layers, what)
         strength, turn = self._anisotropy(layers, what)
+        transmission = self._transmission(layers, what)
+        glass = self._glass(surface, layers, transmission, what) if transmission > 0 else None
+        surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
         over = self._over(layers, strength, what)
         normal_map = self._normal_map(material.normalTexture, turn, what)
         if over.coat > 0 and normal_map is not None:
@@ -78,8 +83,31 @@ class MaterialReader:
             normal_map,
             material.doubleSided,
             opacity=self._opacity(material, what),
+            glass=glass,
         )
         return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
+
+    def _transmission(self, layers: Layers, what: str) -> float:
+        passing = layers.transmission
+        return passing.transmissionFactor * self._mean(
+            passing.transmissionTexture, 0, f"transmission texture of {what}"
+        )
+
+    def _glass(self, surface: Surface, layers: Layers, share: float, what: str) -> Glass:
+        """How light passes: tinted by the base colour, and inside of a solid by what it absorbs."""
+        volume, ior = layers.volume, layers.ior.ior
+        if surface.roughness > _CLEAR:
+            self._warnings.append(simplified(f"{what} is frosted; what is behind it is seen sharply"))
+        if not 1 <= ior <= MAX_IOR:
+            self._warnings.append(wrong(f"{what} has an index of refraction of {ior:g}; it bends as if it had 1.5"))
+            ior = 1.5
+        tint = surface.diffuse * share
+        if "diffuse" in surface.textures:
+            tint = tint * surface.textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64)
+        absorbed = -np.log(np.maximum(volume.attenuationColor, 1e-6)) / volume.attenuationDistance
+        red, green, blue = np.clip(tint, 0, 1).tolist()
+        r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
+        return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
 
     def _opacity(self, material: GltfMaterial, what: str) -> Opacity | None:
         """Where the material has holes; alpha that is not asked for is not looked at."""

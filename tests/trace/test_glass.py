@@ -1,0 +1,195 @@
+"""Glass: what eyes see through it against Snell and Fresnel, and how much light passes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from sessions import look_of, relative_rmse
+from tiny_scenes import looking, quad, scene_of, sphere, studio
+from twins import unit
+
+from relume.bake import Recipe
+from relume.brdf.fresnel import fresnel
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.picture.coverage import Coverage
+from relume.reference.image import reference_image
+from relume.render.image import render_image
+from relume.scene.model import Glass, Material
+from relume.store import bake_here
+from relume.trace.geometry import merge
+from relume.trace.glass import MAX_LAYERS, dielectric, layers_of
+from relume.trace.view_samples import sample_view
+from relume.trace.visibility import trace_visibility
+
+SIZE = (64, 48)
+EVEN = np.full(1, 0.5, np.float32)
+WHITE = Material("White", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))
+
+
+def glass(**fields):
+    term = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3, "f0": [0.04] * 3}}
+    return Material("Glass", (term,), glass=Glass(**fields))
+
+
+def wall(z=-1.0):
+    return quad("wall", [[-3, -3, z], [3, -3, z], [3, 3, z], [-3, 3, z]], 0)
+
+
+def slab(depth):
+    """A box about the origin, `depth` from front to back, faces outwards."""
+    x, y, z = 2.0, 2.0, depth / 2
+    corners = [
+        [[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]],
+        [[x, -y, -z], [-x, -y, -z], [-x, y, -z], [x, y, -z]],
+    ]
+    return [quad(name, side, 1) for name, side in zip(("front", "back"), corners, strict=True)]
+
+
+def scene_with(*meshes, material):
+    camera = looking("front", (0, 0, 3), (0, 0, 0), 0.6)
+    return scene_of(wall(), *meshes, camera=camera, environment=studio(), materials=[WHITE, material])
+
+
+def followed(scene, directions):
+    eye = np.array([0, 0, 3], np.float32)
+    return layers_of(merge(scene), scene.materials, eye, directions.astype(np.float32), EVEN)
+
+
+def slanted(num=50):
+    across = np.linspace(-0.3, 0.3, num)
+    return unit(np.stack([across, 0.3 * across, -np.ones(num)], axis=1))
+
+
+def test_the_rim_reflects_as_fresnel_says_from_outside_and_all_from_inside():
+    cosine = np.linspace(0, 1, 101)
+    outside, cos_t = dielectric(cosine, np.full(101, 1 / 1.5))
+    np.testing.assert_allclose(outside, fresnel(cosine, 1.5, 0.0), atol=1e-12)
+    np.testing.assert_allclose(np.sqrt(1 - cos_t**2) * 1.5, np.sqrt(1 - cosine**2), atol=1e-12)
+    inside, cos_t = dielectric(cosine, np.full(101, 1.5))
+    passes = np.sqrt(1 - cosine**2) * 1.5 < 1
+    np.testing.assert_allclose(inside[passes], dielectric(cos_t[passes], np.full(passes.sum(), 1 / 1.5))[0], atol=1e-9)
+    assert (inside[~passes] == 1).all()
+
+
+def test_a_pane_dims_by_its_tint_and_what_it_reflects_and_bends_nothing():
+    tint = (0.9, 0.5, 0.2)
+    pane = quad("pane", [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], 1)
+    directions = slanted()
+    first, behind = followed(scene_with(pane, material=glass(tint=tint)), directions)
+    assert first.is_shown.all()
+    np.testing.assert_array_equal(behind.directions, directions.astype(np.float32))
+    wanted = (1 - fresnel(-directions[:, 2], 1.5, 0.0))[:, None] * tint
+    np.testing.assert_allclose(behind.through, wanted, rtol=1e-4)
+    np.testing.assert_allclose(behind.hits.distance, 4 / -directions[:, 2], rtol=1e-4)
+
+
+@pytest.mark.parametrize("ior", [1.0, 1.5, 2.4])
+def test_a_slab_shifts_what_is_behind_it_as_snell_says(ior):
+    depth, directions = 0.5, slanted()
+    absorbed = (0.0, 0.4, 2.0)
+    scene = scene_with(*slab(depth), material=glass(thickness=depth, ior=ior, absorbed=absorbed))
+    front, back, behind = followed(scene, directions)
+    assert front.is_shown.all()
+    assert not back.is_shown.any()
+    np.testing.assert_allclose(behind.directions, directions, atol=2e-5)  # out as it came in
+    sin_i = np.linalg.norm(directions[:, :2], axis=1)
+    inside = depth / np.sqrt(1 - (sin_i / ior) ** 2)
+    tan_t = sin_i / ior / np.sqrt(1 - (sin_i / ior) ** 2)
+    off_axis = sin_i / -directions[:, 2] * (2.75 + 0.75) + tan_t * depth
+    mesh = scene.meshes[0]
+    corners = mesh.positions[mesh.faces[behind.hits.face]]
+    b = np.column_stack([1 - behind.hits.uv.sum(axis=1), behind.hits.uv])[:, :, None]
+    np.testing.assert_allclose(np.linalg.norm((corners * b).sum(axis=1)[:, :2], axis=1), off_axis, atol=1e-3)
+    passed = (1 - fresnel(-directions[:, 2], ior, 0.0))[:, None] ** 2 * np.exp(-inside[:, None] * absorbed)
+    np.testing.assert_allclose(behind.through, passed, rtol=1e-3)
+
+
+def test_rays_that_are_kept_inside_end_somewhere():
+    scene = scene_with(sphere("ball", [0, 0, 0], 0.8, 1, rings=24), material=glass(thickness=1.6, ior=2.4))
+    layers = followed(scene, slanted(2000))
+    assert 3 <= len(layers) <= MAX_LAYERS
+    for before, after in pairwise(layers):
+        assert set(after.ray) <= set(before.ray)
+        assert (after.through <= 1).all()
+    np.testing.assert_allclose(np.linalg.norm(layers[-1].directions, axis=1), 1, atol=1e-5)
+
+
+def test_glass_that_neither_bends_nor_reflects_is_not_there():
+    ball = sphere("ball", [0, 0, 0], 0.8, 1, rings=16)
+    scene = scene_with(ball, material=glass(thickness=1.6, ior=1.0))
+    samples = sample_view(scene, merge(scene), "front", SIZE)
+    assert samples.through is not None
+    on_wall = samples.material == 0
+    seen = np.bincount(samples.pixel[on_wall], samples.gains[on_wall].mean(axis=1), minlength=SIZE[0] * SIZE[1])
+    assert np.median(np.abs(seen - 1)) < 1e-4
+    assert np.abs(seen - 1).max() < 0.26  # two layers' rays are merged apart
+
+
+def test_light_passes_in_its_share():
+    tint = (0.8, 0.8, 0.8)
+    pane = quad("pane", [[-90, 1, 90], [90, 1, 90], [90, 1, -90], [-90, 1, -90]], 1)
+    scene = scene_with(pane, material=glass(tint=tint))
+    z = np.linspace(0.3, 1, 16000)
+    turn = np.arange(16000) * 2.4
+    directions = np.stack([np.sqrt(1 - z**2) * np.cos(turn), z, np.sqrt(1 - z**2) * np.sin(turn)], axis=1)
+    points, up = np.array([[0.1, 0, 0.2], [0.5, 0.1, 0.3]], np.float32), np.tile([0, 1, 0], (2, 1)).astype(np.float32)
+    bits = trace_visibility(merge(scene).embree, points, up, directions.astype(np.float32)).visible
+    seen = np.unpackbits(bits, axis=1, bitorder="little")[:, :16000]
+    past_wall = replace(scene, meshes=scene.meshes[:1])
+    bits = trace_visibility(merge(past_wall).embree, points, up, directions.astype(np.float32)).visible
+    free = np.unpackbits(bits, axis=1, bitorder="little")[:, :16000].all(axis=0)
+    np.testing.assert_array_equal(seen[0, free], seen[1, free])  # one light passes everywhere or nowhere
+    for part in np.array_split(np.flatnonzero(free), 4):
+        schlick = 0.04 + 0.96 * (1 - z[part]) ** 5
+        assert seen[0, part].mean() == pytest.approx(np.mean(0.8 * (1 - schlick)), abs=0.04)
+
+
+@pytest.fixture(scope="module")
+def tinted():
+    """A ball of absorbing glass and a red pane before a wall."""
+    ball = sphere("ball", [-0.5, 0, 0], 0.4, 1, rings=16)
+    pane = quad("pane", [[0.1, -0.5, 0], [0.9, -0.5, 0], [0.9, 0.5, 0], [0.1, 0.5, 0]], 2)
+    materials = [WHITE, glass(thickness=0.8, absorbed=(2.0, 0.2, 0.2)), replace(glass(tint=(1, 0.1, 0.1)), name="Pane")]
+    camera = looking("front", (0, 0, 3), (0, 0, 0), 0.6)
+    back = quad("wall", [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], 0)
+    return scene_of(back, ball, pane, camera=camera, environment=studio(), materials=materials)
+
+
+def opened(scene, method, folder):
+    recipe = Recipe(method, ("front",), SIZE, 600, num_points=2000)
+    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+
+
+def test_pictures_agree_with_brute_force_and_the_background_shines_through(tinted, tmp_path):
+    found = opened(tinted, "direct", tmp_path)
+    look = look_of(found)
+    picture = render_image(found, "front", look)
+    assert relative_rmse(picture, reference_image(tinted, "front", look, SIZE, 0)) < 0.03
+    red, green, _ = picture[18:30, 40:52].mean(axis=(0, 1))
+    assert red > 3 * green
+    view = found.views["front"]
+    assert view.gains.shape == (view.num_view_samples, 3)
+    alpha = Coverage(view, lambda material: np.ones(0, np.float32)).pixels([])
+    assert alpha[24, 32] == 1
+    (camera,), materials = tinted.cameras, list(tinted.materials)
+    outside = scene_of(*tinted.meshes[1:], camera=camera, environment=studio(), materials=materials)
+    alone = opened(outside, "direct", tmp_path / "alone").views["front"]
+    alpha = Coverage(alone, lambda material: np.ones(0, np.float32)).pixels([])
+    assert alpha[24, 46] == pytest.approx(1 - 0.96 * 0.4, abs=0.01)
+    assert alpha[2, 2] == 0
+
+
+def test_a_moving_eye_sees_panes_as_one_at_rest(tinted, tmp_path):
+    back, _, pane = tinted.meshes
+    (camera,), materials = tinted.cameras, list(tinted.materials)
+    pane_alone = scene_of(back, pane, camera=camera, environment=studio(), materials=materials)
+    found = opened(pane_alone, "surface", tmp_path)
+    look = look_of(found)
+    moving = render_image(found, "front", look)
+    still = reference_image(pane_alone, "front", look, SIZE, 0)
+    inside = (slice(17, 31), slice(38, 54))
+    np.testing.assert_allclose(moving[inside].mean(axis=(0, 1)), still[inside].mean(axis=(0, 1)), rtol=0.08)
