@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from relume.bake import Recipe
 from relume.scene.model import Mesh, Scene, Texture
+from relume.trace.glass import MAX_LAYERS, MOST_SHOWN, has_glass
 from relume.trace.view_samples import POSITIONS_A_PIXEL
 
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
@@ -21,19 +22,21 @@ _TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
 LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
 BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
 _PYRAMID, _HALVING = 4 / 3, 2  # of a texture's bytes: all its levels; while the next is made, of the largest
+_CUTOUT_BYTES = 80  # of a material: its row of `relume.trace.cutouts.Cutouts`
 _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power, place in the tree
 
 
-def samples_of_view(recipe: Recipe) -> int:
-    """View samples of one view: every position of every pixel sees something else."""
+def samples_of_view(scene: Scene, recipe: Recipe) -> int:
+    """View samples of one view: every position of every pixel sees something else, and glass before it."""
     width, height = recipe.size
-    return POSITIONS_A_PIXEL * width * height
+    return POSITIONS_A_PIXEL * width * height * (1 + MOST_SHOWN if has_glass(scene.materials) else 1)
 
 
-def camera_rays(recipe: Recipe) -> int:
-    """Rays that find the samples of all views: one through each pixel, then all positions of each."""
+def camera_rays(scene: Scene, recipe: Recipe) -> int:
+    """Rays that find the samples of all views: one through each pixel, then all positions of each, and on by glass."""
     width, height = recipe.size
-    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views)
+    ways = MAX_LAYERS if has_glass(scene.materials) else 1
+    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views) * ways
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:
@@ -42,8 +45,17 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Of the store: the triangles, their corners and the material of each."""
-    return sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
+    """Of the store: the triangles, their corners and the material of each; where rays pass some, which and where."""
+    triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
+    if all(material.opacity is None and material.glass is None for material in scene.materials):
+        return triangles
+    return triangles + sum(mesh.uvs.nbytes for mesh in scene.meshes) + opacity_bytes(scene)
+
+
+def opacity_bytes(scene: Scene) -> int:
+    """Of all opacity, and of what says how materials are passed."""
+    images = sum(material.opacity.alpha.nbytes for material in scene.materials if material.opacity is not None)
+    return images + len(scene.materials) * _CUTOUT_BYTES
 
 
 def corner_bytes(scene: Scene) -> int:
@@ -72,6 +84,7 @@ def process_bytes(scene: Scene) -> int:
         + 2 * sum(meshes)
         + num_triangles(scene) * _TREE_BYTES_A_TRIANGLE
         + int(_PYRAMID * sum(textures))
+        + 2 * opacity_bytes(scene)
         + _HALVING * largest
     )
 
@@ -79,7 +92,7 @@ def process_bytes(scene: Scene) -> int:
 def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
     """What a task of the first stage takes besides: the lights, or the samples of a view."""
     height, width, _ = scene.environment.radiance.shape
-    num_rays = camera_rays(recipe) // len(recipe.views)
+    num_rays = camera_rays(scene, recipe) // len(recipe.views)
     return max(int(height * width) * LIGHT_BYTES_A_TEXEL, num_rays * BYTES_A_RAY)
 
 

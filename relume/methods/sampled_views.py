@@ -81,12 +81,12 @@ class SampledViews:
             raise PlanError(f"{width}×{height} pixels were asked for; give at least 16×16, at most {MAX_PIXELS} in all")
         if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
             raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
-        samples = bounds.samples_of_view(recipe) * len(recipe.views)
+        samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
         in_store = samples * (bits + _SURFACE_BYTES) + bounds.lights_bytes(scene, recipe)
         return Plan(
             num_view_samples=samples,
-            num_rays=samples * recipe.num_lights + bounds.camera_rays(recipe),
+            num_rays=samples * recipe.num_lights + bounds.camera_rays(scene, recipe),
             store_bytes=in_store + bounds.triangles_bytes(scene) + _METADATA_BYTES,
             peak_bytes=bounds.process_bytes(scene)
             + max(bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)),

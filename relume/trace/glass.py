@@ -26,7 +26,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 MAX_LAYERS = 8  # surfaces that a ray meets; two are a pane, four a bottle
-_MOST_SHOWN = 2  # of glass, one behind the other, that are seen themselves: each costs a sample of every pixel
+MOST_SHOWN = 2  # of glass, one behind the other, that are seen themselves: each costs a sample of every pixel
 
 
 class Layer(NamedTuple):
@@ -91,7 +91,7 @@ def layers_of(geometry: Geometry, materials: Sequence[Material], eye: F32, direc
         is_glass = (hits.face >= 0) & panes.is_glass[material]
         is_outer, behind = _behind(geometry, panes, ways, hits, np.flatnonzero(is_glass))
         is_shown = ~is_glass
-        is_shown[is_glass] = is_outer & (len(layers) < _MOST_SHOWN)
+        is_shown[is_glass] = is_outer & (len(layers) < MOST_SHOWN)
         whole = replace(hits, distance=hits.distance + ways.length)
         layers.append(Layer(ways.ray, whole, ways.directions, ways.through, is_shown))
         ways = behind
