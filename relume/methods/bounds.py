@@ -21,7 +21,8 @@ PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled ke
 _TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
 LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
 BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
-_PYRAMID, _HALVING = 4 / 3, 2  # of a texture's bytes: all its levels; while the next is made, of the largest
+_HALVINGS = 1 / 3  # of a texture's texels, in half precision
+_HALVING = 2  # of the largest texture's bytes, while its first halving is made
 _CUTOUT_BYTES = 80  # of a material: its row of `relume.trace.cutouts.Cutouts`
 _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power, place in the tree
 
@@ -76,6 +77,7 @@ def num_triangles(scene: Scene) -> int:
 def process_bytes(scene: Scene) -> int:
     """What a process holds between tasks: the program, the scene, its merged triangles, their tree, mip pyramids."""
     textures = [texture.pixels.nbytes for texture in _textures(scene)]
+    halvings = sum(_HALVINGS * texture.pixels.size * 2 for texture in _textures(scene))
     meshes = [array.nbytes for mesh in scene.meshes for array in _arrays(mesh)]
     largest = max([scene.environment.radiance.nbytes, *textures, *meshes])  # read from disk, it is there twice
     return (
@@ -83,7 +85,8 @@ def process_bytes(scene: Scene) -> int:
         + scene.environment.radiance.nbytes
         + 2 * sum(meshes)
         + num_triangles(scene) * _TREE_BYTES_A_TRIANGLE
-        + int(_PYRAMID * sum(textures))
+        + sum(textures)
+        + int(halvings)
         + 2 * opacity_bytes(scene)
         + _HALVING * largest
     )

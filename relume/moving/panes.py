@@ -30,7 +30,11 @@ class Panes(NamedTuple):
 
 
 def find_glass(embree: EmbreeScene, eye: F32, directions: F32) -> Hits | None:
-    """Find what rays of an eye meet first, glass included; None where a scene has none. directions: (n, 3)"""
+    """Find what rays of an eye meet first, glass included; None where a scene has none.
+
+    Args:
+        embree: the triangles. eye: (3,) float32. directions: of the rays, unit. (n, 3) float32
+    """
     holes = embree.holes
     if holes is None or not (holes.cutouts.rules[:, 0] == PASSES).any():
         return None

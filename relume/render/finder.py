@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.albedo import TEXTURES, is_diffuse, reflectances_of, shares_in
 from relume.color import srgb_encode
 from relume.look import default_look
+from relume.scene.coding import mean_of
 from relume.scene.gltf.cameras import framing_camera
 from relume.scene.model import Camera, Material, Scene
 from relume.trace.geometry import Geometry, merge
@@ -111,4 +112,4 @@ def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
 
 def _mean(material: Material, name: str) -> F64:
     texture = material.textures.get(name)
-    return np.ones(3) if texture is None else texture.pixels.reshape(-1, 3).mean(axis=0, dtype=np.float64)
+    return np.ones(3) if texture is None else mean_of(texture)

@@ -20,7 +20,7 @@ from relume.errors import SceneError
 from relume.remarks import Remark, remark_of
 from relume.replacing import replacing
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -143,6 +143,7 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
                 "double_sided": material.double_sided,
                 # ids of scenes without these stay what they were
+                **_described_codings(material),
                 **({"catcher": True} if material.catcher else {}),
                 **({"opacity": _described_opacity(material.opacity)} if material.opacity else {}),
                 **({"glass": asdict(material.glass)} if material.glass else {}),
@@ -158,6 +159,11 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     if scene.lights:
         document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
     return document, arrays
+
+
+def _described_codings(material: Material) -> dict[str, Any]:
+    codings = {channel: asdict(texture.coding) for channel, texture in _textures(material) if texture.coding}
+    return {"codings": codings} if codings else {}
 
 
 def _described_opacity(opacity: Opacity) -> dict[str, Any]:
@@ -185,12 +191,10 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
 
 
 def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Material:
-    textures = {}
-    for channel, (wrap_u, wrap_v) in document["textures"].items():
-        pixels = arrays[f"material{i}_{channel}"]
-        if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0 or pixels.dtype != np.float32:
-            raise SceneError(f"a texture of material {document['name']!r} has the wrong shape or type; {REMEDY}")
-        textures[channel] = Texture(pixels, (str(wrap_u), str(wrap_v)))
+    textures = {
+        channel: _assemble_texture(arrays[f"material{i}_{channel}"], wrap, document.get("codings", {}).get(channel))
+        for channel, wrap in document["textures"].items()
+    }
     normal_map = textures.pop("normal_map", None)
     terms = tuple(dict(term) for term in document["terms"])
     double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
@@ -203,6 +207,19 @@ def _assemble_glass(document: dict[str, Any]) -> Glass:
     (red, green, blue), (r, g, b) = document["tint"], document["absorbed"]
     tint, absorbed = (float(red), float(green), float(blue)), (float(r), float(g), float(b))
     return Glass(tint, float(document["ior"]), float(document["thickness"]), absorbed)
+
+
+def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], coding: dict[str, Any] | None) -> Texture:
+    is_image = pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.size > 0
+    if not is_image or pixels.dtype != (np.float32 if coding is None else np.uint8):
+        raise SceneError(f"a texture of the scene has the wrong shape or type; {REMEDY}")
+    wrap_u, wrap_v = map(str, wrap)
+    if coding is None:
+        return Texture(pixels, (wrap_u, wrap_v))
+    red, green, blue = map(float, coding["scale"])
+    if coding["kind"] not in ("srgb", "normal"):
+        raise SceneError(f"a texture of the scene has a coding that is not known; {REMEDY}")
+    return Texture(pixels, (wrap_u, wrap_v), Coding(str(coding["kind"]), (red, green, blue), float(coding["turn"])))
 
 
 def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:

@@ -19,16 +19,32 @@ U32 = NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
-class Texture:
-    """An image in linear values, ready to be sampled.
+class Coding:
+    """What the bytes of a texture stand for: see `relume.scene.coding.decode`.
 
     Attributes:
-        pixels: linear RGB, top row first. (height, width, 3) float32
-        wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
+        kind: "srgb", display values of colours; or "normal", normals of tangent space.
+        scale: multiplies the values. turn: of normals about +Z, radians.
     """
 
-    pixels: F32
+    kind: str
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image, ready to be sampled.
+
+    Attributes:
+        pixels: top row first. (height, width, 3) uint8 where it has a coding, else float32, the values themselves
+        wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
+        coding: what bytes stand for; None where pixels are linear RGB, or normals.
+    """
+
+    pixels: NDArray[Any]
     wrap: tuple[str, str] = ("repeat", "repeat")
+    coding: Coding | None = None
 
 
 @dataclass(frozen=True)
@@ -93,7 +109,7 @@ class Material:
         terms: the material's default terms as they stand in a look document.
         textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
             `textures["diffuse"]`. Known channels: "diffuse", "specular".
-        normal_map: tangent-space normals in [-1, 1], already scaled; None where there is none.
+        normal_map: tangent-space normals in [-1, 1]; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         catcher: it is a ground that looks may show by its shadows alone, and the default look does.
         opacity: where it has holes; None where it is whole.

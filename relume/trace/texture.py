@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import weakref
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.scene.coding import ROWS_AT_ONCE, decode
 from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
 
 class MipMap:
-    """A texture and its halvings down to one texel."""
+    """A texture and its halvings down to one texel; these are kept in half precision."""
 
     def __init__(self, texture: Texture) -> None:
-        self.wrap = texture.wrap
-        self.levels = [np.asarray(texture.pixels, np.float32)]
+        self.wrap, self.coding = texture.wrap, texture.coding
+        self.levels: list[NDArray[Any]] = [texture.pixels]
         while max(self.levels[-1].shape[:2]) > 1:
-            self.levels.append(_halve(self.levels[-1]))
+            self.levels.append(self._halved(len(self.levels) - 1))
+
+    def level(self, k: int) -> F32:
+        """The values of a level. (height, width, 3) float32"""
+        return decode(self.levels[k], self.coding if k == 0 else None)
+
+    def _halved(self, k: int) -> NDArray[np.float16]:
+        """The level after level k, made a few rows at a time."""
+        image, coding = self.levels[k], self.coding if k == 0 else None
+        parts = [
+            _halve(decode(image[start : start + ROWS_AT_ONCE], coding)) for start in range(0, len(image), ROWS_AT_ONCE)
+        ]
+        return np.concatenate([part.astype(np.float16) for part in parts])
 
     @staticmethod
     def of(texture: Texture) -> MipMap:
@@ -49,7 +63,7 @@ class MipMap:
         return out
 
     def _bilinear(self, k: int, uv: F32) -> F32:
-        image = self.levels[k]
+        image, coding = self.levels[k], self.coding if k == 0 else None
         height, width = image.shape[:2]
         x = uv[:, 0].astype(np.float64) * width - 0.5
         y = uv[:, 1].astype(np.float64) * height - 0.5
@@ -57,8 +71,8 @@ class MipMap:
         fx, fy = (x - x0)[:, None], (y - y0)[:, None]
         columns = [_wrapped(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
         rows = [_wrapped(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
-        top = image[rows[0], columns[0]] * (1 - fx) + image[rows[0], columns[1]] * fx
-        bottom = image[rows[1], columns[0]] * (1 - fx) + image[rows[1], columns[1]] * fx
+        of = [[decode(image[row, column], coding) for column in columns] for row in rows]
+        top, bottom = (left * (1 - fx) + right * fx for left, right in of)
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 

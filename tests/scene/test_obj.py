@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import pytest
+from texture_values import values_of
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -108,7 +109,7 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     path = tmp_path / "thing.obj"
     path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\nusemtl a\nf 1/1 2/2 3/3\n")
     scene = import_scene(path, "thing", LIGHT)
-    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0])
+    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0])
     assert scene.materials[0].terms[0] == {"model": "lambert", "color": [1.0, 1.0, 1.0], "texture": "diffuse"}
     assert scene.lights == (Light("a", {"kind": "mesh", "material": "a", "emission": [1.0, 1.0, 1.0]}),)
     opacity = scene.materials[0].opacity
@@ -166,7 +167,7 @@ def test_an_archive_holds_the_scene_with_its_files() -> None:
         archive.writestr("model/m.mtl", "newmtl a\nmap_Kd ../maps/Wood.png\n")
         archive.writestr("maps/wood.png", png(0, 255, 0))
     scene = import_scene(packed.getvalue(), "test", LIGHT)
-    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [0, 1, 0])
+    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [0, 1, 0])
     assert scene.warnings == ()
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from texture_values import values_of
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -51,7 +52,7 @@ def test_images_lie_where_the_material_file_says_or_else_where_the_scene_would(t
     lies = {"../images/red.png": "room/images/red.png", "looks/red.png": "room/looks/red.png"}[image]
     sent = Sent({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
     scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, sent)
-    np.testing.assert_allclose(scene.materials[0].textures["diffuse"].pixels[0, 0], [1, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0], atol=1e-3)
 
 
 def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

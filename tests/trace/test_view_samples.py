@@ -190,14 +190,14 @@ def test_far_checkers_become_grey_and_near_ones_stay():
 def test_mip_levels_keep_the_mean_and_a_footprint_of_a_texel_the_texels():
     pixels = np.random.default_rng(3).random((32, 32, 3), np.float32)
     pyramid = MipMap(Texture(pixels))
-    for level in pyramid.levels:
-        np.testing.assert_allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), rtol=1e-5)
+    for level in map(pyramid.level, range(len(pyramid.levels))):
+        np.testing.assert_allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), rtol=5e-4)  # halves
     y, x = np.divmod(np.arange(32 * 32), 32)
     uv = np.column_stack([(x + 0.5) / 32, (y + 0.5) / 32]).astype(np.float32)
     exact = pyramid.sample(uv, np.full(1024, 1 / 32, np.float32))
     np.testing.assert_allclose(exact, pixels.reshape(-1, 3), atol=2e-5)
     everything = pyramid.sample(uv, np.full(1024, 5.0, np.float32))
-    np.testing.assert_allclose(everything, np.tile(pixels.mean(axis=(0, 1)), (1024, 1)), rtol=1e-4)
+    np.testing.assert_allclose(everything, np.tile(pixels.mean(axis=(0, 1)), (1024, 1)), rtol=5e-4)
 
 
 @pytest.mark.parametrize(

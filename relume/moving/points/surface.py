@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
 MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
+_MOST_TEXELS = 1 << 25  # of all finest levels; values are kept as floats, 12 bytes each
 _WRAPS = ("repeat", "mirror", "clamp")
 NORMAL_MAP = len(TEXTURES)  # its column in `Textures.of_material`
 
@@ -57,7 +59,8 @@ def textures_of(scene: Scene) -> StoredTextures:
         "textures": [[number_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
         "normal_maps": [number_of(m.normal_map) for m in scene.materials],
     }
-    arrays = {f"textures/{k}": _level(texture).astype(np.float16) for k, texture in enumerate(kept)}
+    side = _most_side(kept)
+    arrays = {f"textures/{k}": _level(texture, side).astype(np.float16) for k, texture in enumerate(kept)}
     wraps = [[_WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
     return StoredTextures(arrays, {**described, "wraps": wraps})
 
@@ -72,8 +75,21 @@ def tangents_of(scene: Scene, geometry: Geometry) -> F16:
     return (geometry.tangents if has_maps else geometry.tangents[:0]).astype(np.float16)
 
 
-def _level(texture: Texture) -> F32:
-    return next(level for level in MipMap.of(texture).levels if max(level.shape[:2]) <= MAX_TEXTURE_SIDE)
+def _most_side(textures: Sequence[Texture]) -> int:
+    """How wide and high they may be for all to have at most `_MOST_TEXELS`."""
+    side, pyramids = MAX_TEXTURE_SIDE, [MipMap.of(texture) for texture in textures]
+    while side > 1 and sum(p.levels[_number_of_level(p, side)].size // 3 for p in pyramids) > _MOST_TEXELS:
+        side //= 2
+    return side
+
+
+def _level(texture: Texture, side: int) -> F32:
+    pyramid = MipMap.of(texture)
+    return pyramid.level(_number_of_level(pyramid, side))
+
+
+def _number_of_level(pyramid: MipMap, side: int) -> int:
+    return next(k for k, level in enumerate(pyramid.levels) if max(level.shape[:2]) <= side)
 
 
 class Textures(NamedTuple):
@@ -197,7 +213,8 @@ def _read_textures(store: StoreReader) -> Textures:
     texels, levels, first, end = [], [], [0], 0
     for k in range(len(wraps)):
         pixels = store.read(f"textures/{k}").astype(np.float32)
-        for level in MipMap(Texture(pixels)).levels:
+        pyramid = MipMap(Texture(pixels))
+        for level in map(pyramid.level, range(len(pyramid.levels))):
             levels.append((end, *level.shape[:2]))
             texels.append(level.reshape(-1, 3))
             end += len(texels[-1])

@@ -16,20 +16,12 @@ from relume.scene.gltf.accessors import view_bytes
 from relume.scene.gltf.container import Container
 
 U8 = NDArray[np.uint8]
-F32 = NDArray[np.float32]
 MAX_SIDE = 8_192
-MAX_TEXELS = 200_000_000  # of all images of a scene together
+MAX_TEXELS = 1_000_000_000  # of all images of a scene together, as often as they are decoded
+_KEPT_BYTES = 300_000_000  # of decoded images, for the next material that names them
 MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
 FORMATS = ("PNG", "JPEG", "WEBP")
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
-
-_SRGB = np.arange(256) / 255
-SRGB_TO_LINEAR = np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def to_linear(pixels: U8) -> F32:
-    """Linear values of sRGB bytes."""
-    return SRGB_TO_LINEAR[pixels]
 
 
 class Decoder:
@@ -66,7 +58,7 @@ class Decoder:
 
 
 class ImageReader:
-    """Decodes the images of one file, each once."""
+    """Decodes the images of one file, and keeps the last of them."""
 
     def __init__(self, container: Container) -> None:
         self._container = container
@@ -104,7 +96,9 @@ class ImageReader:
         images = self._container.document.images
         if not 0 <= index < len(images):
             raise SceneError(f"{what} refers to image {index} of {len(images)}; export the scene again")
-        if index not in self._decoded:
+        if index in self._decoded:
+            self._decoded[index] = self._decoded.pop(index)  # the newest comes last
+        else:
             image = images[index]
             if image.bufferView is not None:
                 data = bytes(view_bytes(self._container, image.bufferView, what))
@@ -113,6 +107,8 @@ class ImageReader:
             else:
                 raise SceneError(f"{what} has no data; export the scene again")
             self._decoded[index] = self._decoder.decode(data, what)
+            while len(self._decoded) > 1 and sum(kept.nbytes for kept in self._decoded.values()) > _KEPT_BYTES:
+                del self._decoded[next(iter(self._decoded))]
         return self._decoded[index]
 
 

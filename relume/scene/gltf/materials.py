@@ -15,19 +15,21 @@ import numpy as np
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.checks import MAX_IOR
+from relume.scene.coding import mean_of
+from relume.scene.gltf.blend import Blend, mix
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import TextureInfo
-from relume.scene.gltf.images import ImageReader, to_linear
+from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.layers import Layers, read_layers
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
-from relume.scene.model import Glass, Material, Opacity, Texture
+from relume.scene.model import Coding, Glass, Material, Opacity, Texture
 from relume.scene.opacity import is_nowhere, make_opacity
 
 _CLEAR = 0.1  # roughness of glass that blurs nothing to speak of
-MAX_TEXTURE_TEXELS = 150_000_000  # made for the materials of one scene, 12 bytes each
+MAX_TEXTURE_TEXELS = 700_000_000  # kept for the materials of one scene, 3 bytes each
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class MaterialReader:
             ior = 1.5
         tint = surface.diffuse * share
         if "diffuse" in surface.textures:
-            tint = tint * surface.textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64)
+            tint = tint * mean_of(surface.textures["diffuse"])
         absorbed = -np.log(np.maximum(volume.attenuationColor, 1e-6)) / volume.attenuationDistance
         red, green, blue = np.clip(tint, 0, 1).tolist()
         r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
@@ -143,21 +145,15 @@ class MaterialReader:
             )
         if raster.empty:
             metallic, weight = pbr.metallicFactor, specular.specularFactor
-            f0 = _mix(weight * np.minimum(dielectric, 1), factor, metallic)
-            return Surface(factor * (1 - metallic), f0, _mix(weight, 1, metallic), roughness)
-        self._spend(4 * raster.num_texels)  # base, metallic, diffuse and f0
-        texel = to_linear(raster.rgb("base"))
-        metallic_texel = raster.channel("packed", 2) * np.float32(pbr.metallicFactor)
-        weight_texel = raster.channel("specular", 3) * np.float32(specular.specularFactor)
-        diffuse = np.ascontiguousarray(texel * (1 - metallic_texel))
-        textures = {"diffuse": Texture(diffuse, raster.wrap)}
-        head_on = np.minimum(to_linear(raster.rgb("tint")) * dielectric.astype(np.float32), 1) * weight_texel
-        f0_texel = _mix(head_on, factor.astype(np.float32) * texel, metallic_texel)
-        f90 = float(_mix(weight_texel, 1, metallic_texel).mean(dtype=np.float64))
-        if np.ptp(f0_texel.reshape(-1, 3), axis=0).max() < 1e-6:
-            return Surface(factor, f0_texel.reshape(-1, 3)[0].astype(np.float64), f90, roughness, textures)
-        mean_f0 = np.maximum(f0_texel.mean(axis=(0, 1), dtype=np.float64), 1e-4)
-        textures["specular"] = Texture((f0_texel / mean_f0).astype(np.float32), raster.wrap)
+            f0 = mix(weight * np.minimum(dielectric, 1), factor, metallic)
+            return Surface(factor * (1 - metallic), f0, mix(weight, 1, metallic), roughness)
+        blend = Blend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
+        textures = {"diffuse": self._kept(blend.diffuse())}
+        lowest, highest, mean_f0, f90 = blend.f0_and_f90()
+        if (highest - lowest).max() < 1e-6:
+            return Surface(factor, lowest, f90, roughness, textures)
+        mean_f0 = np.maximum(mean_f0, 1e-4)
+        textures["specular"] = self._kept(blend.f0_over(mean_f0, highest))
         return Surface(factor, mean_f0, f90, roughness, textures)
 
     def _raster(self, material: GltfMaterial, layers: Layers, what: str) -> Raster:
@@ -223,15 +219,9 @@ class MaterialReader:
         if info is None:
             return None
         pixels, wrap = self._images.texture(info.index, f"the normal texture of {what}")
-        self._spend(2 * pixels.shape[0] * pixels.shape[1])
-        normals = pixels[..., :3].astype(np.float32) / np.float32(127.5) - np.float32(1)
-        normals[..., :2] *= np.float32(np.clip(info.scale, -100, 100))
-        if turn:
-            c, s = np.cos(turn), np.sin(turn)
-            normals[..., :2] = normals[..., :2] @ np.array([[c, -s], [s, c]], np.float32)
-        length = np.linalg.norm(normals, axis=-1, keepdims=True)
-        unit = np.where(length > 1e-3, normals / np.maximum(length, 1e-3), (0, 0, 1))
-        return Texture(np.ascontiguousarray(unit, np.float32), wrap)
+        scale = float(np.clip(info.scale, -100, 100))
+        coding = Coding("normal", (scale, scale, 1.0), turn)
+        return self._kept(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, coding))
 
     def _mean(self, info: TextureInfo | None, channel: int, words: str) -> float:
         """Mean of one channel, in [0, 1]; 1 without a texture, and a warning where it varies."""
@@ -246,15 +236,15 @@ class MaterialReader:
         if info is None:
             return np.ones(3)
         pixels, _ = self._images.texture(info.index, f"the {words}")
-        self._spend(pixels.shape[0] * pixels.shape[1])
         if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
             self._warnings.append(simplified(f"the {words} is replaced by its mean"))
-        return to_linear(pixels[..., :3]).mean((0, 1), dtype=np.float64)
+        return mean_of(Texture(pixels[..., :3], coding=Coding("srgb")))
 
-    def _spend(self, num_texels: int) -> None:
-        self._texels_left -= num_texels
+    def _kept(self, texture: Texture) -> Texture:
+        self._texels_left -= texture.pixels.size // 3
         if self._texels_left < 0:
             raise SceneError(f"the scene needs more than {MAX_TEXTURE_TEXELS:,} texels; scale its textures down")
+        return texture
 
     def _warn_of_the_rest(self, material: GltfMaterial, what: str) -> None:
         if material.occlusionTexture is not None:
@@ -271,7 +261,3 @@ def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:
 def _f0(ior: float) -> float:
     """Reflectance of a dielectric head-on; the extension's 0 stands for a mirror."""
     return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
-
-
-def _mix(a: Any, b: Any, share: Any) -> Any:
-    return a + (b - a) * share

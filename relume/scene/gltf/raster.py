@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import PIL.Image
 
-from relume.scene.gltf.images import F32, U8
+from relume.scene.gltf.images import U8
 
 Wrap = tuple[str, str]
+_NOISE = 2  # that lossy coding makes of one value
 
 
 class Raster:
@@ -20,21 +21,24 @@ class Raster:
         first, self.wrap = next(iter(images.values()), (np.zeros((0, 0, 4), np.uint8), ("repeat", "repeat")))
         self._height, self._width = int(first.shape[0]), int(first.shape[1])
         self.empty = not images
+        self._channels: dict[tuple[str, int], U8] = {}
 
     @property
-    def num_texels(self) -> int:
-        """The number of texels of an image."""
-        return self._height * self._width
+    def size(self) -> tuple[int, int]:
+        """Height and width of all images."""
+        return self._height, self._width
 
     def rgb(self, key: str) -> U8:
         """(height, width, 3); (1, 1, 3) white where there is no such image."""
-        return self._resized(key)[..., :3]
+        return self.pixels(key)[..., :3]
 
-    def channel(self, key: str, channel: int) -> F32:
-        """One channel in [0, 1]. (height, width, 1); (1, 1, 1) where it does not vary, 1 where there is no image."""
-        values = self._resized(key)[..., channel, None]
-        values = values if np.ptp(values) > 0 else values[:1, :1]
-        return values.astype(np.float32) / np.float32(255)
+    def channel(self, key: str, channel: int) -> U8:
+        """One channel. (height, width, 1); (1, 1, 1) where it does not vary by more than noise, white where there is no image."""
+        if (key, channel) not in self._channels:
+            values = self.pixels(key)[..., channel, None]
+            alike = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
+            self._channels[key, channel] = values if np.ptp(values) > _NOISE else alike
+        return self._channels[key, channel]
 
     def mean(self, key: str, channel: int) -> float:
         """Mean of a channel in [0, 1]; 1 where there is no such image."""
@@ -42,15 +46,16 @@ class Raster:
 
     def varies(self, key: str, channel: int) -> bool:
         """Whether a channel differs from texel to texel by more than the noise of its coding."""
-        return key in self._images and bool(np.ptp(self._images[key][..., channel]) > 2)
+        return key in self._images and bool(np.ptp(self._images[key][..., channel]) > _NOISE)
 
-    def _resized(self, key: str) -> U8:
+    def pixels(self, key: str) -> U8:
+        """(height, width, 4); (1, 1, 4) white where there is no such image."""
         if key not in self._images:
             return np.full((1, 1, 4), 255, np.uint8)
         pixels = self._images[key]
-        if pixels.shape[:2] == (self._height, self._width):
-            return pixels
-        # Channel by channel: Pillow would multiply colours by alpha
-        channels = [PIL.Image.fromarray(np.ascontiguousarray(pixels[..., k])) for k in range(4)]
-        size = (self._width, self._height)
-        return np.stack([np.asarray(c.resize(size, PIL.Image.Resampling.BILINEAR)) for c in channels], axis=-1)
+        if pixels.shape[:2] != self.size:
+            # Channel by channel: Pillow would multiply colours by alpha
+            channels = [PIL.Image.fromarray(np.ascontiguousarray(pixels[..., k])) for k in range(4)]
+            scaled = [c.resize(self.size[::-1], PIL.Image.Resampling.BILINEAR) for c in channels]
+            self._images[key] = np.stack([np.asarray(c) for c in scaled], axis=-1)
+        return self._images[key]

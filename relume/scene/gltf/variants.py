@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, ValidationError
 from relume.brdf.document import complete_term
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified
+from relume.scene.coding import F64, mean_of, rows_of
 from relume.scene.gltf.document import Document, Index, Name, Primitive
 from relume.scene.gltf.materials import Understood
 from relume.scene.gltf.names import unique_name
@@ -130,14 +131,20 @@ def _kept_channel(own: Understood, other: Understood, image: Texture) -> tuple[s
             if baked.wrap != image.wrap or baked.pixels.shape != image.pixels.shape:
                 continue
             tint = np.divide(mean, _mean(baked), out=np.zeros(3, np.float32), where=_mean(baked) > 0)
-            error = np.sqrt(np.square(baked.pixels * tint - image.pixels).mean((0, 1), dtype=np.float64))
-            if (error <= SAME_IMAGE * mean.max()).all():
+            if (_difference(baked, image, tint) <= SAME_IMAGE * mean.max()).all():
                 return channel, tint
     return None, mean
 
 
+def _difference(baked: Texture, image: Texture, tint: F32) -> F64:
+    """Root of the mean square between an image and another times a colour. (3,)"""
+    pairs = zip(rows_of(baked), rows_of(image), strict=True)
+    total = sum(np.square(one * tint - other).sum((0, 1), dtype=np.float64) for one, other in pairs)
+    return np.asarray(np.sqrt(total * 3 / image.pixels.size))
+
+
 def _mean(image: Texture) -> F32:
-    return np.asarray(image.pixels.mean((0, 1), dtype=np.float64), np.float32)
+    return mean_of(image).astype(np.float32)
 
 
 def _same_normals(own: Understood, other: Understood) -> bool:
@@ -146,4 +153,5 @@ def _same_normals(own: Understood, other: Understood) -> bool:
         return mine is theirs
     if own.uv_use != other.uv_use or mine.pixels.shape != theirs.pixels.shape:
         return False
-    return bool(np.abs(mine.pixels - theirs.pixels).max() < 1e-3)
+    pairs = zip(rows_of(mine), rows_of(theirs), strict=True)
+    return all(np.abs(one - other).max() < 1e-3 for one, other in pairs)

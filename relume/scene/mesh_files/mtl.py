@@ -6,7 +6,6 @@ Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), a
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,11 +15,12 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, wrong
+from relume.scene.coding import mean_of
 from relume.scene.companions import Companions
-from relume.scene.gltf.images import U8, Decoder, to_linear
+from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, make_terms
-from relume.scene.model import Material, Opacity, Texture
+from relume.scene.model import Coding, Material, Opacity, Texture
 from relume.scene.opacity import is_nowhere, make_opacity
 
 F64 = NDArray[np.float64]
@@ -104,7 +104,7 @@ class MaterialMaker:
             return Material(own_name, make_terms(Surface(np.array(GREY), np.full(3, 0.04), 1.0, 0.5), Over()))
         textures = self._textures(described, what)
         self._warn_of_the_rest(described, what)
-        normal_map = self._image(described, "norm", f"the normal map of {what}", _normals)
+        normal_map = self._image(described, "norm", f"the normal map of {what}", Coding("normal"))
         opacity = self._opacity(described, what)
         return Material(own_name, _terms(described, textures), textures, normal_map, opacity=opacity)
 
@@ -127,25 +127,25 @@ class MaterialMaker:
         if described is None:
             return np.zeros(3)
         factor = np.array(described.numbers.get("Ke", [0.0, 0.0, 0.0]))
-        texture = self._image(described, "map_Ke", f"map_Ke of material {material.name!r}", to_linear)
+        texture = self._image(described, "map_Ke", f"map_Ke of material {material.name!r}", Coding("srgb"))
         if texture is None:
             return factor
-        if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 0.01:
+        if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 2:
             self._warnings.append(simplified(f"map_Ke of material {material.name!r} is replaced by its mean"))
         factor = factor if factor.any() else np.ones(3)  # exporters write zeros where they mean the image
-        return np.asarray(factor * texture.pixels.mean((0, 1), dtype=np.float64))
+        return factor * mean_of(texture)
 
     def _textures(self, described: Described, what: str) -> dict[str, Texture]:
         textures = {}
         for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular")):
-            texture = self._image(described, keyword, f"{keyword} of {what}", to_linear)
+            texture = self._image(described, keyword, f"{keyword} of {what}", Coding("srgb"))
             if texture is not None:
                 textures[channel] = texture
         return textures
 
-    def _image(self, described: Described, keyword: str, what: str, convert: Callable[[Any], Any]) -> Texture | None:
+    def _image(self, described: Described, keyword: str, what: str, coding: Coding) -> Texture | None:
         pixels = self._decoded(described, keyword, what)
-        return None if pixels is None else Texture(np.ascontiguousarray(convert(pixels[..., :3]), np.float32))
+        return None if pixels is None else Texture(np.ascontiguousarray(pixels[..., :3]), coding=coding)
 
     def _decoded(self, described: Described, keyword: str, what: str) -> U8 | None:
         """The bytes of an image, RGBA. (height, width, 4)"""
@@ -186,9 +186,3 @@ def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str
     held = float(np.clip(numbers.get("Ns", [exponent.default])[0], exponent.minimum, exponent.maximum))
     gloss = {"model": "blinn_phong", "color": np.clip(tint, 0, 1).tolist(), "params": {"exponent": held}}
     return (diffuse, gloss | {"texture": "specular" if "specular" in textures else None})
-
-
-def _normals(pixels: Any) -> Any:
-    normals = pixels.astype(np.float32) / np.float32(127.5) - np.float32(1)
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    return np.where(length > 1e-3, normals / np.maximum(length, 1e-3), (0, 0, 1))
