@@ -13,6 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 import PIL.Image
 
+LEFT = 0.956463  # of light by what a dielectric of index 1.5 reflects first
 FLOAT, U8, U16, U32 = 5126, 5121, 5123, 5125
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 COMPONENTS = {"f4": FLOAT, "u1": U8, "u2": U16, "u4": U32, "i1": 5120, "i2": 5122}

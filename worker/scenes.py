@@ -29,8 +29,8 @@ class SceneRecord:
     Attributes:
         created: seconds since 1970.
         views: camera names, in order.
-        materials: {"name", "terms", "catcher", "is_projected"} each, in the order of material ids; old ones lack the
-            last two.
+        materials: {"name", "terms", "catcher", "is_projected", "is_glass"} each, in the order of material ids; old ones
+            lack the last three.
         variants: partial looks that the file brought, by name.
         lights: names of the scene's own.
     """
@@ -64,6 +64,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
                 "terms": list(material.terms),
                 "catcher": material.catcher,
                 "is_projected": is_projected,
+                "is_glass": material.glass is not None,
             }
             for material, is_projected in zip(scene.materials, are_projected(scene), strict=True)
         ],

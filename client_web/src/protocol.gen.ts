@@ -540,12 +540,13 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. */
+/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. `is_glass`: light passes it, as the scene's file says and no look changes. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
   catcher: boolean;
   is_projected: boolean;
+  is_glass: boolean;
 }
 
 /** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */

@@ -26,7 +26,7 @@ from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
-_OF_OLD_ROWS = {"catcher": False, "is_projected": False}  # which do not say it
+_OF_OLD_ROWS = {"catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
 DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
 SceneFile = Annotated[
     UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")

@@ -34,12 +34,14 @@ class SceneView(Body):
 
 class SceneMaterial(Body):
     """A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its
-    shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection."""
+    shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. `is_glass`:
+    light passes it, as the scene's file says and no look changes."""
 
     name: str
     terms: list[dict[str, Any]]
     catcher: bool
     is_projected: bool
+    is_glass: bool
 
 
 class SceneVariant(Body):

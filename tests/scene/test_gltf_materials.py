@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_builder import Glb
+from glb_builder import LEFT, Glb
 from texture_values import values_of
 
 from relume.brdf.document import complete_term
@@ -15,7 +15,7 @@ from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
 from relume.scene.gltf.sheen import MIN_ALPHA, sheen_curve
-from relume.scene.gltf.terms import COAT_ALBEDO
+from relume.scene.gltf.terms import COAT_ALBEDO, dielectric_share
 from relume.scene.model import Glass, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -41,6 +41,19 @@ def terms_of(extensions: dict[str, Any], **material: Any) -> tuple[dict[str, Any
 def test_ior_gives_the_reflectance_head_on(ior: float, f0: float) -> None:
     ggx = terms_of({"ior": {"ior": ior}})[1]
     np.testing.assert_allclose(ggx["params"]["f0"], f0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("f0", "f90"), [(0.04, 1.0), (0.17, 1.0), (0.02, 0.5), (0.0, 0.0)])
+def test_what_scatters_light_gets_what_is_not_reflected_before(f0: float, f90: float) -> None:
+    """The mean of F(θd) over light and eye, both as many as their cosine says."""
+    rng = np.random.default_rng(7)
+    square, turn = rng.random((2, 400_000)), rng.uniform(0, 2 * np.pi, 400_000)
+    cosine, sine = np.sqrt(square), np.sqrt(1 - square)
+    towards = cosine[0] * cosine[1] + sine[0] * sine[1] * np.cos(turn)
+    reflected = f0 + (f90 - f0) * (1 - np.sqrt((1 + towards) / 2)) ** 5
+    assert dielectric_share(f0, f90) == pytest.approx(reflected.mean(), abs=1e-4)
+    if (f0, f90) == (0.04, 1.0):
+        assert dielectric_share(f0, f90) == pytest.approx(1 - LEFT, abs=1e-6)
 
 
 def test_specular_gives_both_ends_of_the_fresnel_curve() -> None:
@@ -178,7 +191,7 @@ def test_transmission_is_a_pane_of_the_base_colour_and_leaves_less_to_be_scatter
     )
     made = scene.materials[0]
     assert made.glass == Glass((0.375, 0.1875, 0.09375))
-    assert made.terms[0]["color"] == [0.125, 0.0625, 0.03125]
+    np.testing.assert_allclose(made.terms[0]["color"], np.array([0.125, 0.0625, 0.03125]) * LEFT, atol=1e-6)
     assert scene.warnings == ()
     assert imported({"transmission": {}}).materials[0].glass is None
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from glb_builder import LEFT
 from ply_builder import POINTS, binary, text
 
 from relume.environments.model import Environment
@@ -41,7 +42,7 @@ def test_normals_coordinates_and_colours_are_understood() -> None:
     mesh = scene.meshes[0]
     np.testing.assert_allclose(mesh.normals, [[0, 0.6, 0.8]] * 3, atol=1e-6)
     np.testing.assert_array_equal(mesh.uvs, [[0, 1], [1, 1], [0, 0]])
-    np.testing.assert_allclose(scene.materials[0].terms[0]["color"], [1, 0, 0.2158605], atol=1e-6)
+    np.testing.assert_allclose(scene.materials[0].terms[0]["color"], np.array([1, 0, 0.2158605]) * LEFT, atol=1e-6)
     assert scene.warnings == ("vertex colours are replaced by their mean",)
 
 

@@ -8,7 +8,7 @@ import { openLight } from "../lights/lights";
 import { MAX_TERMS } from "../look.gen";
 import { defaultLook, look } from "../state/look";
 import { shownPanels } from "../state/room";
-import { models } from "../state/scene";
+import { models, scene } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
@@ -69,6 +69,12 @@ function Catcher({ material }: { material: string }) {
   );
 }
 
+/** What of glass is edited here, and what is not. */
+function Glass({ material }: { material: string }) {
+  if (scene.value?.materials.find(({ name }) => name === material)?.is_glass !== true) return null;
+  return <p class="glass">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
+}
+
 export function Inspector() {
   const [light, shown] = [openLight.value, selectedLight.value];
   if (light !== null && shown !== null) return <LightInspector key={shown} name={shown} light={light} />;
@@ -109,6 +115,7 @@ function MaterialInspector() {
         />
       </header>
       <Catcher material={material} />
+      <Glass material={material} />
       {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}

@@ -23,7 +23,7 @@ from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.layers import Layers, read_layers
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
-from relume.scene.gltf.terms import Over, Surface, make_terms
+from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
 from relume.scene.model import Coding, Glass, Material, Opacity, Texture
 from relume.scene.opacity import is_nowhere, make_opacity
@@ -143,18 +143,21 @@ class MaterialReader:
             self._warnings.append(
                 simplified(f"the roughness texture of {what} is replaced by its mean, {roughness:.2f}")
             )
+        reflected = dielectric_share(
+            float(np.minimum(dielectric, 1).max()) * specular.specularFactor, specular.specularFactor
+        )
         if raster.empty:
             metallic, weight = pbr.metallicFactor, specular.specularFactor
             f0 = mix(weight * np.minimum(dielectric, 1), factor, metallic)
-            return Surface(factor * (1 - metallic), f0, mix(weight, 1, metallic), roughness)
+            return Surface(factor * (1 - metallic), f0, mix(weight, 1, metallic), roughness, reflected)
         blend = Blend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
         textures = {"diffuse": self._kept(blend.diffuse())}
         lowest, highest, mean_f0, f90 = blend.f0_and_f90()
         if (highest - lowest).max() < 1e-6:
-            return Surface(factor, lowest, f90, roughness, textures)
+            return Surface(factor, lowest, f90, roughness, reflected, textures)
         mean_f0 = np.maximum(mean_f0, 1e-4)
         textures["specular"] = self._kept(blend.f0_over(mean_f0, highest))
-        return Surface(factor, mean_f0, f90, roughness, textures)
+        return Surface(factor, mean_f0, f90, roughness, reflected, textures)
 
     def _raster(self, material: GltfMaterial, layers: Layers, what: str) -> Raster:
         """The images that the base layer is made of, all in the size of the first."""

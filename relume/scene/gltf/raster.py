@@ -33,7 +33,7 @@ class Raster:
         return self.pixels(key)[..., :3]
 
     def channel(self, key: str, channel: int) -> U8:
-        """One channel. (height, width, 1); (1, 1, 1) where it does not vary by more than noise, white where there is no image."""
+        """One channel; white where there is no image. (height, width, 1); (1, 1, 1) where it varies by noise alone"""
         if (key, channel) not in self._channels:
             values = self.pixels(key)[..., channel, None]
             alike = np.full((1, 1, 1), round(float(values.mean())), np.uint8)

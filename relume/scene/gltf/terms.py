@@ -1,8 +1,9 @@
 """A glTF material in numbers, and the terms that stand for it.
 
-Base: lambert and ggx, F = f90 · schlick(f0 / f90). Anisotropic: ashikhmin_shirley instead of ggx, its exponents from
-the widths of the facet distribution, n = 2/α² - 2 (Walter 2007, section 5.2). Clearcoat: a second ggx; sheen: a drawn
-curve. What lies under a coat or sheen is dimmed by its mean albedo: the look's colours know no direction.
+Base: lambert times the mean of (1 - F) of what is not metal, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
+ashikhmin_shirley instead of ggx, its exponents from the widths of the facet distribution, n = 2/α² - 2 (Walter 2007,
+section 5.2). Clearcoat: a second ggx; sheen: a drawn curve. What lies under a coat or sheen is dimmed by its mean
+albedo: the look's colours know no direction.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from relume.scene.model import Texture
 F64 = NDArray[np.float64]
 COAT_F0 = 0.04
 COAT_ALBEDO = COAT_F0 + (1 - COAT_F0) / 21  # mean of schlick(0.04), weighted by the cosine
+_MEAN_RISE = 0.0036845  # of (1 - cos θd)^5 over both hemispheres, each weighted by its cosine
 Terms = tuple[dict[str, Any], ...]
 
 
@@ -31,6 +33,7 @@ class Surface:
     Attributes:
         diffuse: albedo. f0, f90: reflectance head-on and at the horizon. (3,), (3,), one
         roughness: as artists know it.
+        reflected: mean share that what is not metal reflects before light comes to what scatters it.
         textures: multipliers of the two terms.
     """
 
@@ -38,6 +41,7 @@ class Surface:
     f0: F64
     f90: float
     roughness: float
+    reflected: float = 0.0
     textures: dict[str, Texture] = field(default_factory=dict)
 
 
@@ -56,7 +60,11 @@ def make_terms(surface: Surface, over: Over) -> Terms:
     """The terms of a look, bottom up: diffuse, highlight, sheen, coat."""
     textures = {channel: channel if channel in surface.textures else None for channel in ("diffuse", "specular")}
     layers = [
-        {"model": "lambert", "color": _rounded(surface.diffuse), "texture": textures["diffuse"]},
+        {
+            "model": "lambert",
+            "color": _rounded(surface.diffuse * (1 - surface.reflected)),
+            "texture": textures["diffuse"],
+        },
         _highlight(surface, over.anisotropy) | {"texture": textures["specular"]},
     ]
     if any(over.sheen):
@@ -69,6 +77,11 @@ def make_terms(surface: Surface, over: Over) -> Terms:
         layers = _dimmed(layers, over.coat * COAT_ALBEDO)
         layers.append({"model": "ggx", "color": [over.coat] * 3, "params": params, "texture": None})
     return tuple(layers)
+
+
+def dielectric_share(f0: float, f90: float) -> float:
+    """Mean reflectance of a dielectric by Schlick's F(θd) from f0 head-on to f90 at the horizon."""
+    return f0 + (f90 - f0) * _MEAN_RISE
 
 
 def _highlight(surface: Surface, anisotropy: float) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from relume.scene.coding import mean_of
 from relume.scene.companions import Companions
 from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
-from relume.scene.gltf.terms import Over, Surface, make_terms
+from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.model import Coding, Material, Opacity, Texture
 from relume.scene.opacity import is_nowhere, make_opacity
 
@@ -101,7 +101,7 @@ class MaterialMaker:
         own_name = unique_name(name or "material", self._names)
         what = f"material {own_name!r}"
         if described is None:
-            return Material(own_name, make_terms(Surface(np.array(GREY), np.full(3, 0.04), 1.0, 0.5), Over()))
+            return Material(own_name, make_terms(_plastic(np.array(GREY), 0.0, 0.5, {}), Over()))
         textures = self._textures(described, what)
         self._warn_of_the_rest(described, what)
         normal_map = self._image(described, "norm", f"the normal map of {what}", Coding("normal"))
@@ -175,9 +175,7 @@ def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str
         base = [1.0, 1.0, 1.0]  # exporters write zeros where they mean the image
     if "Pr" in numbers or "Pm" in numbers:
         metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
-        f0 = 0.04 + (np.array(base) - 0.04) * metallic
-        surface = Surface(np.array(base) * (1 - metallic), f0, 1.0, numbers.get("Pr", [0.5])[0], textures)
-        return make_terms(surface, Over())
+        return make_terms(_plastic(np.array(base), metallic, numbers.get("Pr", [0.5])[0], textures), Over())
     diffuse = {"model": "lambert", "color": base, "texture": "diffuse" if "diffuse" in textures else None}
     tint = numbers.get("Ks", [0.0, 0.0, 0.0])
     if not any(tint):
@@ -186,3 +184,9 @@ def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str
     held = float(np.clip(numbers.get("Ns", [exponent.default])[0], exponent.minimum, exponent.maximum))
     gloss = {"model": "blinn_phong", "color": np.clip(tint, 0, 1).tolist(), "params": {"exponent": held}}
     return (diffuse, gloss | {"texture": "specular" if "specular" in textures else None})
+
+
+def _plastic(base: F64, metallic: float, roughness: float, textures: dict[str, Texture]) -> Surface:
+    """A dielectric of index 1.5, or a metal, or between. base: (3,)"""
+    f0 = 0.04 + (base - 0.04) * metallic
+    return Surface(base * (1 - metallic), f0, 1.0, roughness, dielectric_share(0.04, 1.0), textures)
