@@ -34,6 +34,7 @@ READ_EXTENSIONS = {
     *MESHOPT,
     "KHR_mesh_quantization",
     "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_variants",

@@ -162,7 +162,7 @@ class Document(Part):
     images: Annotated[list[Image], Field(max_length=10_000, fail_fast=True)] = []
     materials: Annotated[list[Material], Field(max_length=1_000, fail_fast=True)] = []
     meshes: Annotated[list[Mesh], Field(max_length=100_000, fail_fast=True)] = []
-    nodes: Annotated[list[Node], Field(max_length=4_096, fail_fast=True)] = []
+    nodes: Annotated[list[Node], Field(max_length=100_000, fail_fast=True)] = []
     samplers: Annotated[list[Sampler], Field(max_length=10_000, fail_fast=True)] = []
     scene: Index | None = None
     scenes: Annotated[list[SceneRoot], Field(max_length=10_000, fail_fast=True)] = []

@@ -22,18 +22,21 @@ from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import Node, Primitive
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
+from relume.scene.gltf.instances import instances_of
 from relume.scene.gltf.lights import LightReader
 from relume.scene.gltf.materials import MaterialReader, Understood
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.nodes import placed_nodes
 from relume.scene.gltf.uvs import made_tangents, turned_tangents
 from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
+from relume.scene.joined import joined
 from relume.scene.lights import LightCollector
 from relume.scene.model import Camera, Mesh, Scene
 
 F64 = NDArray[np.float64]
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
-MAX_PLACED = 20_000  # primitives times the nodes that show them
+MAX_PLACED = 100_000  # primitives times the nodes and the instances that show them
+_MANY = 2_000  # meshes; more of one material are joined, for each is a handful of arrays in files and in memory
 
 
 def import_gltf(
@@ -82,6 +85,8 @@ class _Reading:
         self._warn_of_the_rest()
         for node, to_world in placed_nodes(self._document):
             self._place(node, to_world)
+        if len(self.meshes) > _MANY:
+            self.meshes = joined(self.meshes)
         if not self.meshes:
             raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
         emissions = [np.array(understood.emission) for understood in self.materials]
@@ -95,8 +100,6 @@ class _Reading:
         if node.camera is not None:
             self._place_camera(node, to_world)
         self._light_reader.place(node, to_world)
-        if "EXT_mesh_gpu_instancing" in node.extensions:
-            self.warnings.append(wrong(f"the instances of node {node.name[:80]!r} are not used; it appears once"))
         if node.mesh is None:
             return
         if node.mesh >= len(self._document.meshes):
@@ -104,12 +107,14 @@ class _Reading:
         if node.skin is not None:
             self.warnings.append(simplified(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose"))
         mesh = self._document.meshes[node.mesh]
-        self._places_left -= len(mesh.primitives)
+        instances = instances_of(node, self._accessors, self._places_left, self.warnings)
+        self._places_left -= len(mesh.primitives) * len(instances)
         if self._places_left < 0:
             raise SceneError(f"the scene shows more than {MAX_PLACED:,} meshes; join them (gltf-transform join)")
-        for i, primitive in enumerate(mesh.primitives):
-            name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
-            self._place_primitive((node.mesh, i), primitive, name, to_world)
+        for instance in instances:
+            for i, primitive in enumerate(mesh.primitives):
+                name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
+                self._place_primitive((node.mesh, i), primitive, name, to_world @ instance)
 
     def _place_primitive(self, key: tuple[int, int], primitive: Primitive, name: str, to_world: F64) -> None:
         if key not in self._geometry:

@@ -15,7 +15,7 @@ from relume.scene.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]
 MAX_DEPTH = 64
-MAX_NODES = 4_096
+MAX_NODES = 100_000
 
 
 def placed_nodes(document: Document) -> Iterator[tuple[Node, F64]]:
@@ -48,24 +48,22 @@ def local_transform(node: Node) -> F64:
     if node.matrix is not None:
         return np.array(node.matrix, np.float64).reshape(4, 4).T
     transform = np.eye(4)
-    transform[:3, :3] = _rotation(np.array(node.rotation, np.float64)) * np.array(node.scale, np.float64)
+    transform[:3, :3] = rotations(np.array([node.rotation], np.float64))[0] * np.array(node.scale, np.float64)
     transform[:3, 3] = node.translation
     return transform
 
 
-def _rotation(quaternion: F64) -> F64:
-    """Rotation of a quaternion (x, y, z, w), normalised first; one of no length turns nothing."""
-    length = np.linalg.norm(quaternion)
-    if not 1e-12 < length < 1e12:
-        return np.eye(3)
-    x, y, z, w = quaternion / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+def rotations(quaternions: F64) -> F64:
+    """Rotations of quaternions x, y, z, w, (n, 4), normalised first; one of no length turns nothing. (n, 3, 3)"""
+    length = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    turns = (length > 1e-12) & (length < 1e12)
+    x, y, z, w = np.where(turns, quaternions / np.where(turns, length, 1), [0.0, 0.0, 0.0, 1.0]).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def _roots(document: Document) -> list[int]:
