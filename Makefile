@@ -25,6 +25,9 @@ MARKERS := not slow$(if $(CHROMIUM),, and not e2e)
 # Tests are shared out to processes; which of them stay together, tests/conftest.py says.
 SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadscope --no-loadscope-reorder
 
+# Of NumPy's linear algebra: its threads spin where they wait for a core that another process of tests has.
+ONE_THREAD := OPENBLAS_NUM_THREADS=1
+
 .PHONY: help setup demo test test-slow bench lint lock clean client-check
 
 help:  ## what each target does
@@ -38,10 +41,10 @@ demo: setup  ## bake the built-in scene, serve it, open the editor
 test:  ## everything that must hold before a commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line setup lint client-check
 	$(if $(CHROMIUM),,@echo "No chromium on this machine: the browser tests (marker e2e) are left out.")
-	$(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
+	$(ONE_THREAD) $(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
 
 test-slow: setup  ## the long tests
-	$(BIN)/python -m pytest -m slow --timeout=3600
+	$(ONE_THREAD) $(BIN)/python -m pytest -m slow --timeout=3600
 
 bench: setup  ## the project's own figures
 	$(BIN)/relume bench $(ARGS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relume.bake import Recipe
 from relume.scene.model import Mesh, Scene, Texture
 from relume.trace.glass import MAX_LAYERS, MOST_SHOWN, has_glass
-from relume.trace.view_samples import POSITIONS_A_PIXEL
+from relume.trace.merged import POSITIONS_A_PIXEL
 
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numba as nb
@@ -120,12 +119,12 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     owner = np.repeat(edges, more)
     if len(owner):
         towards = _directions(camera, size, edges, POSITIONS[:more])
-        hits = _both(hits, trace_from(embree, eye, towards, _PAST_GLASS))
+        hits = Hits.joined([hits, trace_from(embree, eye, towards, _PAST_GLASS)])
         directions = np.concatenate([directions, towards])
     if first is not None:
-        first = _both(first, trace_from(embree, eye, directions[num:], np.full(1, EVERYWHERE)))
+        first = Hits.joined([first, trace_from(embree, eye, directions[num:], np.full(1, EVERYWHERE))])
         panes = panes_of(embree, surface, first, directions)
-        hits = _both(hits, Hits(first.face[panes.ray], first.uv[panes.ray], first.distance[panes.ray]))
+        hits = Hits.joined([hits, first.rows(panes.ray)])
         directions = np.concatenate([directions, directions[panes.ray]])
     num_rays = len(directions)
     vertex, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
@@ -146,10 +145,6 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
     aim = (rotation, np.float32(half_height * width / height), half_height, width, height, pixels, places)
     for_shares(lambda start, stop: _aim(*aim, start, stop, directions), len(directions))
     return directions
-
-
-def _both(one: Hits, other: Hits) -> Hits:
-    return Hits(*(np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(Hits)))
 
 
 @nb.njit(nogil=True, cache=True)

@@ -107,7 +107,7 @@ def _places(
     scene: Scene, geometry: Geometry, hits: Hits, directions: F32, hit: NDArray[np.intp]
 ) -> tuple[Points, NDArray[np.int32]]:
     """What some of the rays have hit, seen from where they come, and its materials."""
-    some = Hits(hits.face[hit], hits.uv[hit], hits.distance[hit])
+    some = hits.rows(hit)
     surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
     points = Points(*surface.points[:3], -directions[hit], textures)

@@ -86,7 +86,7 @@ class SmallGeometry:
     def _sent(self, hits: Hits, wo: F64, lights: F64) -> F64:
         """What is sent from hits towards wo, by light. (lights, hits, 3)"""
         found, seen = hits.face >= 0, np.zeros((self.rings.num_directions, len(hits.face), 3))
-        some = Hits(hits.face[found], hits.uv[found], hits.distance[found])
+        some = hits.rows(found)
         places = self._places(some, wo)
         step = max(1, _PAIRS_AT_ONCE // self.rings.num_directions)
         rows = np.flatnonzero(found)

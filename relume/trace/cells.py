@@ -18,7 +18,6 @@ from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
 from relume.trace.geometry import Geometry
 from relume.trace.photons import shoot_photons
-from relume.trace.primary import Hits
 from relume.trace.surface import any_tangent, surface_at
 
 F32 = NDArray[np.float32]
@@ -93,7 +92,7 @@ def choose_cells(
     # a cell's photons are in order along the axis that divided it last: every so many are far apart
     evenly = (np.arange(POINTS_A_CELL) + 0.5) / POINTS_A_CELL
     chosen = np.array([rows[(evenly * len(rows)).astype(np.int64)] for rows in members], np.int64).reshape(-1)
-    some = Hits(hits.face[chosen], hits.uv[chosen], hits.distance[chosen])
+    some = hits.rows(chosen)
     surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
     shape = (len(members), POINTS_A_CELL, 3)
     return Cells(

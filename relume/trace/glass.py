@@ -119,7 +119,7 @@ def _behind(
     Returns:
         Whether each met the outer side of a solid, or a pane, (k,), and how they go on.
     """
-    own = Hits(hits.face[rows], hits.uv[rows], hits.distance[rows])
+    own = hits.rows(rows)
     material, directions = geometry.face_material[own.face], ways.directions[rows].astype(np.float64)
     points = surface_at(geometry, own, ways.directions[rows]).points  # moved off to the side that is seen
     outwards, normal = geometry.face_normals[own.face].astype(np.float64), points.normal.astype(np.float64)

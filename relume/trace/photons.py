@@ -54,8 +54,7 @@ class Photons:
 
     def rows(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
         """Choose some of them."""
-        hits = self.hits
-        return Photons(Hits(hits.face[which], hits.uv[which], hits.distance[which]), self.directions[which])
+        return Photons(self.hits.rows(which), self.directions[which])
 
 
 class _Found(NamedTuple):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -32,6 +34,15 @@ class Hits:
     face: NDArray[np.int32]
     uv: F32
     distance: F32
+
+    def rows(self, rows: NDArray[Any] | slice) -> Hits:
+        """Those of some rays."""
+        return Hits(self.face[rows], self.uv[rows], self.distance[rows])
+
+    @staticmethod
+    def joined(parts: Sequence[Hits]) -> Hits:
+        """Those of several, one after another."""
+        return Hits(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Hits)))
 
 
 @nb.njit(nogil=True, cache=True)

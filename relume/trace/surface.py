@@ -80,8 +80,8 @@ def surface_at(
     parts: dict[int, tuple[F32, ...]] = {}
 
     def interpolate(start: int, stop: int) -> None:
-        some = Hits(hits.face[start:stop], hits.uv[start:stop], hits.distance[start:stop])
-        parts[start] = _surface_at(geometry, some, directions[start:stop], materials, pixel_angle, origin)
+        some = slice(start, stop)
+        parts[start] = _surface_at(geometry, hits.rows(some), directions[start:stop], materials, pixel_angle, origin)
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
     columns = zip(*(parts[start] for start in sorted(parts)), strict=True)

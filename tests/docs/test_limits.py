@@ -14,7 +14,7 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
-from relume.trace.view_samples import POSITIONS_A_PIXEL
+from relume.trace.merged import POSITIONS_A_PIXEL
 from server.queues.work_queue import MAX_QUEUED
 from server.records import looks, shares
 from server.wire import bodies, protocol, renders

@@ -114,6 +114,10 @@ class MaterialReader:
     def _opacity(self, material: GltfMaterial, what: str) -> Opacity | None:
         """Where the material has holes; alpha that is not asked for is not looked at."""
         if material.alphaMode not in ("MASK", "BLEND"):
+            if material.alphaMode != "OPAQUE":
+                self._warnings.append(
+                    wrong(f"{what} has the alpha mode {material.alphaMode[:20]!r}; it is opaque here")
+                )
             return None
         pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
         if pbr.baseColorTexture is not None:

@@ -1,0 +1,97 @@
+"""Pixels of a view that want more rays than one: what is seen changes across them, or is partly there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
+from relume.trace.geometry import Geometry
+from relume.trace.glass import Layer
+from relume.trace.primary import trace_from
+from relume.trace.surface import surface_at
+
+F32 = NDArray[np.float32]
+
+COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
+_COS_EDGE = np.cos(np.radians(20.0))  # a crease
+_DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
+_MOST_TURNING = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
+
+
+def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) -> tuple[NDArray[np.bool_], F32]:
+    """Find pixels that differ from a neighbour, and the least cosine between the normals of each and its neighbours.
+
+    Args:
+        key: what is hit. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
+    Returns:
+        (height, width) both
+    """
+    edge, cosine = np.zeros(key.shape, np.bool_), np.ones(key.shape, np.float32)
+    for axis in (0, 1):
+        here = tuple(slice(None, -1) if a == axis else slice(None) for a in (0, 1))
+        there = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
+        between = np.einsum("ijk,ijk->ij", normal[here], normal[there])
+        off = [
+            is_off_plane(normal[one], distance[one], directions[one], distance[other], directions[other])
+            for one, other in ((here, there), (there, here))
+        ]
+        # off both planes: of one alone may be a surface that is seen along itself
+        differs = (key[here] != key[there]) | (between < _COS_EDGE) | (off[0] & off[1])
+        for side in (here, there):
+            edge[side] |= differs
+            cosine[side] = np.minimum(cosine[side], between)
+    return edge, cosine
+
+
+def is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F32, other: F32) -> NDArray[np.bool_]:
+    """Tell whether what another ray of an eye hits is off the plane of a hit by more than a small share of the way.
+
+    Args:
+        normal, distance, direction: of a hit, and of its ray. (…, 3), (…), (…, 3)
+        other_distance, other: of the other hit, and of its ray. (…), (…, 3)
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
+        slope = np.sum(direction * normal, axis=-1) / np.sum(other * normal, axis=-1)
+        nearer = np.minimum(distance, other_distance)
+        return np.asarray(np.abs(other_distance - distance * slope) > _DEPTH_EDGE * nearer)
+
+
+def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Find pixels that are no edges, but whose normals turn enough for reflections to alias. (height, width)"""
+    turning = ~edge & (cosine < COS_TURN) & (key >= 0)
+    most = int(_MOST_TURNING * edge.size)
+    if np.count_nonzero(turning) > most:
+        turning &= cosine < np.partition(cosine[turning], most)[most]
+    return np.asarray(turning)
+
+
+def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Find pixels that want more rays by what a layer shows. (pixels,)
+
+    Args:
+        geometry: the triangles. layer: of one ray through the middle of each pixel. size: width and height in pixels.
+    """
+    width, height = size
+    surface = surface_at(geometry, layer.hits, layer.directions)
+    key, normal = np.full(width * height, -2), np.zeros((width * height, 3), np.float32)
+    distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
+    key[layer.ray] = np.where(layer.hits.face >= 0, geometry.face_mesh[np.maximum(layer.hits.face, 0)], -1)
+    normal[layer.ray], distance[layer.ray] = surface.points.normal, layer.hits.distance
+    directions[layer.ray] = layer.directions
+    shape = (height, width)
+    seen = key.reshape(shape)
+    differs, cosine = _edges(seen, normal.reshape(*shape, 3), distance.reshape(shape), directions.reshape(*shape, 3))
+    return np.asarray((differs | _turning(differs, cosine, seen)).ravel())
+
+
+def is_partly_there(geometry: Geometry, origin: F32, directions: F32) -> NDArray[np.bool_]:
+    """Find rays that meet a surface that blends. (n,)
+
+    Args:
+        geometry: the triangles. origin: of the rays. (3,) float32. directions: unit. (n, 3) float32
+    """
+    at_least, wholly = (
+        trace_from(geometry.embree, origin, directions, np.full(1, chance)).face for chance in (ANYWHERE, EVERYWHERE)
+    )
+    return np.asarray(at_least != wholly)
