@@ -210,7 +210,7 @@ async function load(of: BakeConnection): Promise<Here | null> {
   }
   const path = `/api/bakes/${encodeURIComponent(of.bake)}/surface`;
   const surface = await getJson<SurfaceBody>(path);
-  if (surface.has_holes) throw new Error("This browser cannot draw surfaces with holes");
+  if (surface.has_holes) throw new Error("This browser cannot draw glass or surfaces with holes");
   const arrays = await Promise.all(
     surface.arrays.map(async (name) => {
       const bytes = new Uint8Array(await (await request(`${path}/${encodeURIComponent(name)}`)).arrayBuffer());
