@@ -34,11 +34,11 @@ def fresnel(cos_theta_d: F64, ior: float, extinction: float) -> F64:
     return np.asarray(np.clip(0.5 * (r_perpendicular + r_parallel), 0.0, 1.0))
 
 
-def schlick(cos_theta_d: F64, f0: float) -> F64:
+def schlick(cos_theta_d: F64, f0: float | F64) -> F64:
     """f0 + (1 - f0)(1 - cos θd)^5; eq. 15, Schlick 1994.
 
     Args:
-        cos_theta_d: (...). f0: reflectance at normal incidence, in [0, 1].
+        cos_theta_d: (...). f0: reflectance at normal incidence, in [0, 1]; one, or (...).
     Returns:
         Reflectance in [f0, 1]. (...)
     """

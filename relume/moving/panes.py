@@ -54,7 +54,7 @@ def panes_of(embree: EmbreeScene, surface: Surface, first: Hits, directions: F32
     rules, normal = cutouts.rules[row[ray]].astype(np.float64), surface.face_normal[first.face[ray]]
     cosine = np.abs(np.einsum("nc,nc->n", normal, directions[ray])).astype(np.float64)
     f0, sides = rules[:, 4], rules[:, 5]
-    passed = (1 - np.array([schlick(*one) for one in zip(cosine, f0, strict=True)]))[:, None] * rules[:, 1:4]
+    passed = (1 - schlick(cosine, f0))[:, None] * rules[:, 1:4]
     return Panes(ray, (passed ** sides[:, None]).astype(np.float32))
 
 
