@@ -26,11 +26,15 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
 
     Args:
         arrays: of scene.npz. k: which mesh.
-        bsdf: its material, as `bench.mitsuba.bsdf` describes it.
+        bsdf: its material, as `bench.mitsuba.bsdf` describes it; "interior" is the medium inside.
     """
     props = mi.Properties()
     colors = {key: mi.ScalarVector3f(value) for key, value in bsdf.items() if isinstance(value, list)}
-    props["mesh_bsdf"] = mi.load_dict({"type": "twosided", "front": {**bsdf, **colors}})
+    inside = bsdf.get("interior")
+    own = {key: value for key, value in {**bsdf, **colors}.items() if key != "interior"}
+    props["mesh_bsdf"] = mi.load_dict(own if "dielectric" in own["type"] else {"type": "twosided", "front": own})
+    if inside is not None:
+        props["interior"] = mi.load_dict(inside)
     positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
     shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), has_vertex_normals=True, props=props)
     params = mi.traverse(shape)

@@ -132,6 +132,7 @@ GROUPS = (
             for kind in ("rmse", "bias")
         ),
     ),
+    Group("bench.glass", ("glass.rmse",)),
     Group(
         "bench.estimators",
         (

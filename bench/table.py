@@ -91,6 +91,7 @@ def document_of(name: str) -> str:
                 "pca.",
                 "gather.rmse",
                 "gather.full",
+                "glass.",
                 "lights.rmse",
                 "btf.compression_error",
                 "btf.compression_ratio",

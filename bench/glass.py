@@ -1,0 +1,124 @@
+"""glass.rmse: a scene with glass against Mitsuba's whole path tracer with dielectrics of its own.
+
+A grey floor with a clear ball, a ball that absorbs and a green pane before a red ball, under a sky with a sun, all
+paths. Mitsuba's volpath bends light's rays as well: caustics and what inner sides reflect are part of the error. Parts
+of the picture are in the row: the floor before the glass, the pane, the balls.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.figure import Figure, skipped
+from bench.gather import bake
+from bench.indirect import PASSES
+from bench.mitsuba import bsdf, missing, render
+from bench.standard_error import NoiseFree, over_passes
+from relume.bake import Recipe
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.render.image import render_image
+from relume.scene.archive import make_scene
+from relume.scene.cornell import rectangle, sunny_sky
+from relume.scene.demo.surfaces import sphere
+from relume.scene.model import Camera, Glass, Material, Scene
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NAME, _UNIT = "glass.rmse", "relative RMSE"
+_SIZE, _FINER, _SPP = (400, 300), 2, 128
+_DEPTH = 24
+_ABSORBED = (0.3, 1.5, 4.0)
+_PARTS = {"floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
+          "absorbing": (0.73, 0.9, 0.43, 0.66)}  # fmt: skip
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake and a render."""
+    if (why := missing()) is not None:
+        return skipped((_NAME,), _UNIT, why)
+    size, spp = ((40, 30), 2) if tiny else (_SIZE, _SPP)
+    scene = glass_scene()
+    with tempfile.TemporaryDirectory() as folder:
+        ours, theirs = _ours(scene, size, tiny, Path(folder)), _theirs(scene, size, spp, Path(folder))
+    found = over_passes(ours, theirs)
+    parts = {name: _said(_part(ours, theirs, *share)) for name, share in _PARTS.items()}
+    about = {**found.context, "size": list(size), "spp": PASSES * spp, **parts}
+    return [Figure(_NAME, found.error.value, _UNIT, about, found.error.standard_error)]
+
+
+def _part(ours: F64, theirs: F32, left: float, right: float, top: float, bottom: float) -> NoiseFree:
+    """Of a part of the picture, in shares of width and height."""
+    height, width, _ = ours.shape
+    rows, columns = slice(int(top * height), int(bottom * height)), slice(int(left * width), int(right * width))
+    return over_passes(ours[rows, columns], theirs[:, rows, columns])
+
+
+def _said(found: NoiseFree) -> str:
+    return f"{100 * found.error.value:.1f} % (bias {100 * found.bias.value:.1f} %)"
+
+
+def glass_scene() -> Scene:
+    """The scene of this benchmark."""
+    clear = {"model": "ggx", "color": [1.0, 1.0, 1.0], "params": {"roughness": 0.03, "f0": [0.04, 0.04, 0.04]}}
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.6, 0.6, 0.6]},)),
+        Material("Clear", (clear,), glass=Glass(thickness=0.9)),
+        Material("Pane", (clear,), glass=Glass((0.4, 0.9, 0.5))),
+        Material("Absorbing", (clear,), glass=Glass(thickness=0.7, absorbed=_ABSORBED)),
+        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
+    ]
+    turn = np.eye(3)
+    meshes = [
+        rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("floor", 0),
+        sphere(0.45, 48).moved(turn, [-0.9, 0.46, 0.2]).mesh("clear", 1),
+        rectangle([-0.3, 0.01, 0.5], [0.8, 0, 0], [0, 1, 0]).mesh("pane", 2),
+        sphere(0.35, 48).moved(turn, [1.0, 0.36, 0.2]).mesh("absorbing", 3),
+        sphere(0.35, 48).moved(turn, [0.1, 0.36, -0.3]).mesh("red", 4),
+    ]
+    return make_scene("glass", meshes, materials, [_camera()], sunny_sky())
+
+
+def _camera() -> Camera:
+    eye, target = np.array([0.3, 1.1, 3.4]), np.array([0.0, 0.4, 0.0])
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    right /= np.linalg.norm(right)
+    to_world = np.eye(4)
+    to_world[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
+    return Camera("front", to_world, 0.7)
+
+
+def _ours(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
+    width, height = size
+    recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), 60 if tiny else 2000)
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+    fine = render_image(transfer, "front", validate({}, transfer.default_look)).astype(np.float64)
+    return np.asarray(fine.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3)))
+
+
+def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+    materials = [scene.materials[mesh.material] for mesh in scene.meshes]
+    bsdfs = [bsdf(m.terms) if m.glass is None else _dielectric(m.glass) for m in materials]
+    job = {"integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
+    render(scene, size, job, folder)
+    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+
+
+def _dielectric(glass: Glass) -> Mapping[str, Any]:
+    """Glass as a plugin of Mitsuba's, with the medium inside of a solid."""
+    if glass.thickness == 0:
+        tint = {"type": "rgb", "value": list(glass.tint)}
+        return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
+    most = max(*glass.absorbed, 1e-9)
+    rate = {"type": "rgb", "value": [absorbed / most for absorbed in glass.absorbed]}
+    inside = {"type": "homogeneous", "albedo": 0.0, "scale": most, "sigma_t": rate}
+    return {"type": "dielectric", "int_ior": glass.ior, "interior": inside}
