@@ -66,7 +66,7 @@ def test_pictures_agree_with_brute_force(scene, method, tmp_path):
     found = opened(scene, method, tmp_path)
     look = look_of(found)
     wanted = reference_image(
-        scene, "front", look, (48, 36), 0 if method == "direct" else 2048, reflects=method == "gather"
+        scene, "front", look, (48, 36), 0 if method == "direct" else 1024, reflects=method == "gather"
     )
     picture = render_image(found, "front", look)
     assert relative_rmse(picture, wanted) < 0.03
