@@ -46,6 +46,13 @@ class Seen(NamedTuple):
     is_seen: NDArray[np.uint8]
     is_needed: NDArray[np.uint8]
 
+    def first_row(self, pixel: int) -> int:
+        """Which row tells what is met first through the middle of a pixel, glass included."""
+        panes = self.panes.ray
+        place = int(np.searchsorted(panes, pixel))
+        has_glass = place < len(panes) and panes[place] == pixel
+        return len(self.directions) - len(panes) + place if has_glass else pixel
+
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _aim(rotation, half_width, half_height, width, height, pixels, places, start, stop, out):  # type: ignore[no-untyped-def]

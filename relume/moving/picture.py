@@ -236,12 +236,15 @@ class MovingPicture:
             raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
         found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
         found["radiance"] = image[y, x]
-        if self._seen is None or self._seen[1].hits.face[y * width + x] < 0:
+        if self._seen is None:
             return found
-        seen, pixel, surface = self._seen[1], y * width + x, self._transfer.surface
-        face = int(seen.hits.face[pixel])
-        place = self._camera.to_world[:3, 3] + float(seen.hits.distance[pixel]) * seen.directions[pixel]
-        normal = seen.weight[pixel] @ surface.vertices.normal[seen.vertex[pixel]]
+        seen, surface = self._seen[1], self._transfer.surface
+        row = seen.first_row(y * width + x)
+        face = int(seen.hits.face[row])
+        if face < 0:
+            return found
+        place = self._camera.to_world[:3, 3] + float(seen.hits.distance[row]) * seen.directions[row]
+        normal = seen.weight[row] @ surface.vertices.normal[seen.vertex[row]]
         return found | {
             "material": self._transfer.material_names[int(surface.face_material[face])],
             "position": place,

@@ -49,6 +49,13 @@ class Holes(NamedTuple):
     uvs: F32
     cutouts: Cutouts
 
+    @property
+    def blends(self) -> bool:
+        """Whether some surface is there for a share of an eye's rays."""
+        is_share = self.cutouts.rules[:, 0] < 0
+        first, height, width = self.cutouts.images[is_share, :3].T
+        return any(self.cutouts.texels[a : a + h * w].min() < 255 for a, h, w in zip(first, height, width, strict=True))
+
     @classmethod
     def of(cls, faces: U32, uvs: F32, face_material: NDArray[np.int32], cutouts: Cutouts) -> Holes:
         """Gather what the filter reads.

@@ -89,7 +89,7 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     layers = layers_of(geometry, scene.materials, origin, directions, np.full(1, EVERYWHERE))
     is_edge = np.any([edges_of(geometry, layer, size) for layer in layers], axis=0)
-    if geometry.embree.holes is not None:
+    if geometry.embree.holes is not None and geometry.embree.holes.blends:
         is_edge |= is_partly_there(geometry, origin, directions)
 
     edge_pixel = np.nonzero(is_edge)[0]

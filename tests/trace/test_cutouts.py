@@ -12,7 +12,7 @@ from twins import opacity_at, unit
 from relume.errors import ChunkDamagedError
 from relume.light.local import make_local, pattern_of
 from relume.look import LightGeometry
-from relume.scene.model import Material, Opacity
+from relume.scene.model import Glass, Material, Opacity
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.cutouts import Cutouts, check_cutouts, cutouts_of
 from relume.trace.geometry import merge
@@ -157,3 +157,20 @@ def test_what_a_damaged_store_says_of_holes_is_refused(damage):
     check_cutouts(cutouts._asdict(), 2)
     with pytest.raises(ChunkDamagedError):
         check_cutouts({**cutouts._asdict(), **damage}, 2)
+
+
+@pytest.mark.parametrize(
+    ("opacity", "is_glass", "blends"),
+    [
+        (Opacity(random_alpha()), False, True),
+        (Opacity(random_alpha(), cutoff=0.5), False, False),
+        (Opacity(random_alpha()), True, True),
+        (None, True, False),
+    ],
+)
+def test_only_what_blends_wants_more_rays_of_every_pixel(opacity, is_glass, blends):
+    scene = card_before_wall(random_alpha())
+    card = replace(scene.materials[1], opacity=opacity, glass=Glass() if is_glass else None)
+    holes = merge(replace(scene, materials=(scene.materials[0], card))).embree.holes
+    assert holes is not None
+    assert holes.blends == blends

@@ -15,6 +15,7 @@ from relume.bake import Recipe
 from relume.brdf.fresnel import fresnel
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
+from relume.moving.picture import MovingPicture
 from relume.picture.coverage import Coverage
 from relume.reference.image import reference_image
 from relume.render.image import render_image
@@ -191,5 +192,12 @@ def test_a_moving_eye_sees_panes_as_one_at_rest(tinted, tmp_path):
     look = look_of(found)
     moving = render_image(found, "front", look)
     still = reference_image(pane_alone, "front", look, SIZE, 0)
+    session = MovingPicture(found, "front")
+    session.set_look(look)
+    session.advance(None)
+    session.image()
+    assert session.probe(46, 24)["material"] == "Pane"
+    assert session.probe(46, 24)["position"][2] == pytest.approx(0, abs=1e-3)
+    assert session.probe(20, 24)["material"] == "White"
     inside = (slice(17, 31), slice(38, 54))
     np.testing.assert_allclose(moving[inside].mean(axis=(0, 1)), still[inside].mean(axis=(0, 1)), rtol=0.08)
