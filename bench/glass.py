@@ -27,8 +27,9 @@ from relume.methods.registry import open_transfer
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.cornell import rectangle, sunny_sky
+from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import sphere
-from relume.scene.model import Camera, Glass, Material, Scene
+from relume.scene.model import Glass, Material, Scene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -84,17 +85,8 @@ def glass_scene() -> Scene:
         sphere(0.35, 48).moved(turn, [1.0, 0.36, 0.2]).mesh("absorbing", 3),
         sphere(0.35, 48).moved(turn, [0.1, 0.36, -0.3]).mesh("red", 4),
     ]
-    return make_scene("glass", meshes, materials, [_camera()], sunny_sky())
-
-
-def _camera() -> Camera:
-    eye, target = np.array([0.3, 1.1, 3.4]), np.array([0.0, 0.4, 0.0])
-    back = (eye - target) / np.linalg.norm(eye - target)
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    to_world = np.eye(4)
-    to_world[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
-    return Camera("front", to_world, 0.7)
+    camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
+    return make_scene("glass", meshes, materials, [camera], sunny_sky())
 
 
 def _ours(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:

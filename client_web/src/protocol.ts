@@ -74,4 +74,5 @@ export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 export type ShareBody = Omit<gen.ShareBody, "look"> & { look: Look };
 
 /** A scene, its default terms in look-document form. */
-export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: (Omit<gen.SceneMaterial, "terms"> & { terms: Term[] })[] };
+export type SceneMaterial = Omit<gen.SceneMaterial, "terms"> & { terms: Term[] };
+export type SceneBody = Omit<gen.SceneBody, "materials"> & { materials: SceneMaterial[] };

@@ -7,7 +7,7 @@ import numpy as np
 from relume.brdf.term import F64
 
 
-def fresnel(cos_theta_d: F64, ior: float, extinction: float) -> F64:
+def fresnel(cos_theta_d: F64, ior: float | F64, extinction: float) -> F64:
     """Mean of the reflectances parallel and perpendicular, light coming from vacuum.
 
     The exact equations for a conductor as collected by Lagarde 2013 (Memo on Fresnel equations); they
@@ -15,7 +15,7 @@ def fresnel(cos_theta_d: F64, ior: float, extinction: float) -> F64:
 
     Args:
         cos_theta_d: cosine between light and half vector, in [0, 1]. (...)
-        ior: index of refraction η. extinction: k; both relative to the outside.
+        ior: index of refraction η; one, or (...). extinction: k; both relative to the outside.
     Returns:
         Reflectance in [0, 1]. (...)
     """

@@ -48,7 +48,7 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 def triangles_bytes(scene: Scene) -> int:
     """Of the store: the triangles, their corners and the material of each; where rays pass some, which and where."""
     triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
-    if all(material.opacity is None and material.glass is None for material in scene.materials):
+    if not any(material.lets_pass for material in scene.materials):
         return triangles
     return triangles + sum(mesh.uvs.nbytes for mesh in scene.meshes) + opacity_bytes(scene)
 

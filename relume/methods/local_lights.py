@@ -13,7 +13,7 @@ from relume.bake import StoreReader
 from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
 from relume.look import LightGeometry
 from relume.memory import Memory
-from relume.methods.store_io import read_gather_samples, read_holes
+from relume.methods.store_io import has_holes, read_gather_samples, read_holes
 from relume.picture.light import Light, Source
 from relume.points import Points
 from relume.project.receivers import LocalRays
@@ -61,6 +61,11 @@ class LocalLights:
     def faces(self) -> NDArray[np.uint32]:
         """The triangles. (num_faces, 3) uint32"""
         return np.asarray(self._store.read("scene/faces"), np.uint32)
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether rays may pass some of them."""
+        return has_holes(self._store)
 
     @cached_property
     def embree(self) -> EmbreeScene:

@@ -104,6 +104,11 @@ class MovingViews:
         return self.lit.radiance_of(name)
 
     @property
+    def has_holes(self) -> bool:
+        """Whether rays may pass some triangles."""
+        return self.lit.local.has_holes
+
+    @property
     def embree(self) -> EmbreeScene:
         """The triangles' search tree."""
         return self.lit.local.embree

@@ -108,7 +108,7 @@ class SampledViews:
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
-            "has_holes": any(material.opacity or material.glass for material in scene.materials),
+            "has_holes": any(material.lets_pass for material in scene.materials),
             "has_glass": has_glass(scene.materials),
             "views": [_described(cameras[view]) for view in recipe.views],
         }

@@ -70,6 +70,11 @@ def read_cells(store: StoreReader) -> CellLight:
     )
 
 
+def has_holes(store: StoreReader) -> bool:
+    """Tell whether rays may pass some triangles of a store."""
+    return bool(store.attributes.get("has_holes"))
+
+
 def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
     """Where triangles of a store have holes; None where all are whole.
 
@@ -78,7 +83,7 @@ def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
     Raises:
         ChunkDamagedError: what says so does not fit the triangles.
     """
-    if not store.attributes.get("has_holes"):
+    if not has_holes(store):
         return None
     names = store.attributes["materials"]
     cutouts = check_cutouts({name: store.read(f"cutouts/{name}") for name in Cutouts._fields}, len(names))

@@ -21,7 +21,7 @@ from relume.trace.primary import Hits, trace_from
 
 F32 = NDArray[np.float32]
 
-_PAST_GLASS, _NOTHING = np.full(1, PAST_GLASS), np.empty((0, 3), np.float32)
+_NOTHING = np.empty((0, 3), np.float32)
 _MIDDLE = np.array([[0.5, 0.5]], np.float32)
 
 
@@ -117,7 +117,7 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     """
     num, eye = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num, dtype=np.int32), _MIDDLE)
-    hits, panes = trace_from(embree, eye, directions, _PAST_GLASS), Panes(np.empty(0, np.int64), _NOTHING)
+    hits, panes = trace_from(embree, eye, directions, PAST_GLASS), Panes(np.empty(0, np.int64), _NOTHING)
     first = find_glass(embree, eye, directions)
     edges = find_edges(surface, hits, directions, size)
     if first is not None:
@@ -126,10 +126,10 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     owner = np.repeat(edges, more)
     if len(owner):
         towards = _directions(camera, size, edges, POSITIONS[:more])
-        hits = Hits.joined([hits, trace_from(embree, eye, towards, _PAST_GLASS)])
+        hits = Hits.joined([hits, trace_from(embree, eye, towards, PAST_GLASS)])
         directions = np.concatenate([directions, towards])
     if first is not None:
-        first = Hits.joined([first, trace_from(embree, eye, directions[num:], np.full(1, EVERYWHERE))])
+        first = Hits.joined([first, trace_from(embree, eye, directions[num:], EVERYWHERE)])
         panes = panes_of(embree, surface, first, directions)
         hits = Hits.joined([hits, first.rows(panes.ray)])
         directions = np.concatenate([directions, directions[panes.ray]])

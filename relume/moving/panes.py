@@ -38,7 +38,7 @@ def find_glass(embree: EmbreeScene, eye: F32, directions: F32) -> Hits | None:
     holes = embree.holes
     if holes is None or not (holes.cutouts.rules[:, 0] == PASSES).any():
         return None
-    return trace_from(embree, eye, directions, np.full(1, EVERYWHERE))
+    return trace_from(embree, eye, directions, EVERYWHERE)
 
 
 def panes_of(embree: EmbreeScene, surface: Surface, first: Hits, directions: F32) -> Panes:

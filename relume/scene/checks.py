@@ -8,7 +8,7 @@ import numpy as np
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
-from relume.scene.model import Camera, Light, Material, Mesh
+from relume.scene.model import WRAPS, Camera, Light, Material, Mesh
 
 MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
@@ -41,7 +41,7 @@ def check_opacity(material: Material) -> None:
     if opacity is None:
         return
     is_image = opacity.alpha.ndim == 2 and opacity.alpha.size > 0 and opacity.alpha.dtype == np.uint8
-    if not is_image or not set(opacity.wrap) <= {"repeat", "mirror", "clamp"}:
+    if not is_image or not set(opacity.wrap) <= set(WRAPS):
         raise SceneError(f"the opacity of material {material.name!r} is not an image of bytes; import the scene again")
     if opacity.cutoff is not None and not 0 < opacity.cutoff <= 1:
         raise SceneError(f"material {material.name!r} is cut at {opacity.cutoff}; give a share above 0, at most 1")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
 import numpy as np
@@ -15,10 +15,11 @@ def joined(meshes: Iterable[Mesh]) -> list[Mesh]:
     of_material: dict[int, list[Mesh]] = {}
     for mesh in meshes:
         of_material.setdefault(mesh.material, []).append(mesh)
-    return [_one_of(parts) for parts in of_material.values()]
+    return [as_one(parts) for parts in of_material.values()]
 
 
-def _one_of(parts: list[Mesh]) -> Mesh:
+def as_one(parts: Sequence[Mesh]) -> Mesh:
+    """All triangles of some meshes, under the name and with the material of the first."""
     starts = accumulate((len(part.positions) for part in parts[:-1]), initial=0)
     positions, normals, tangents, uvs = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("positions", "normals", "tangents", "uvs")

@@ -18,6 +18,10 @@ F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 
 
+WRAPS = ("repeat", "mirror", "clamp")
+"""How textures may continue; stores and kernels know them by their places here."""
+
+
 @dataclass(frozen=True)
 class Coding:
     """What the bytes of a texture stand for: see `relume.scene.coding.decode`.
@@ -124,6 +128,11 @@ class Material:
     catcher: bool = False
     opacity: Opacity | None = None
     glass: Glass | None = None
+
+    @property
+    def lets_pass(self) -> bool:
+        """Whether rays may pass it, by holes or as glass."""
+        return self.opacity is not None or self.glass is not None
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.remarks import Remark, wrong
 from relume.scene.model import Opacity
 
 _WHOLE = 254  # of 255; below that lies what lossy images do to a white one
 
 
 def make_opacity(
-    alpha: NDArray[np.uint8] | None, wrap: tuple[str, str], factor: float, cutoff: float | None
+    alpha: NDArray[np.uint8] | None,
+    wrap: tuple[str, str],
+    factor: float,
+    cutoff: float | None,
+    what: str,
+    warnings: list[Remark],
 ) -> Opacity | None:
     """Make a material's opacity; None where it is whole.
 
@@ -19,7 +25,17 @@ def make_opacity(
         alpha: of its image, 255 where it is there; None where it has none. (height, width) uint8
         wrap: how the image continues. factor: multiplies it, within [0, 1].
         cutoff: share from which the surface is there; None where alpha is the share itself.
+        what: names the material. warnings: gets a sentence where nothing of it is there.
     """
+    opacity = _opacity(alpha, wrap, factor, cutoff)
+    if opacity is not None and _is_nowhere(opacity):
+        warnings.append(wrong(f"{what} is transparent everywhere, as the file says; nothing of it is seen"))
+    return opacity
+
+
+def _opacity(
+    alpha: NDArray[np.uint8] | None, wrap: tuple[str, str], factor: float, cutoff: float | None
+) -> Opacity | None:
     if cutoff is not None and cutoff > 1:
         return Opacity(np.zeros((1, 1), np.uint8), wrap, 1.0)  # nothing of it is there
     image = np.full((1, 1), 255, np.uint8) if alpha is None else alpha
@@ -32,7 +48,7 @@ def make_opacity(
     return Opacity(np.ascontiguousarray(scaled), wrap, cutoff)
 
 
-def is_nowhere(opacity: Opacity) -> bool:
+def _is_nowhere(opacity: Opacity) -> bool:
     """Tell whether nothing of the surface is there."""
     least = 1 if opacity.cutoff is None else 255 * opacity.cutoff
     return int(opacity.alpha.max()) < least

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from relume.color import LUMINANCE
 from relume.trace.cutouts import PASSES, Cutouts
+from relume.trace.texture import two_texels
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -26,7 +27,6 @@ U32 = NDArray[np.uint32]
 _DIRECTION, _TIME = 4, 7  # rows of RTCRayN; triangles that do not move have no other use for the time
 _U, _V, _PRIMITIVE = 3, 4, 5  # rows of RTCHitN
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
-_CLAMP, _MIRROR = 2, 1  # of WRAPS
 _MOST = np.float32(254.5 / 255)  # a chance that texels of 255 reach, however they are rounded
 # chances of rays that are stopped by whatever is there a little, of those that only what is wholly there stops, and of
 # those that see no glass, and else what their direction makes them see
@@ -81,30 +81,17 @@ _at: Any = intrinsic(_cast)  # makes an address (int64) a pointer
 _array: Any = nb.carray  # type: ignore[attr-defined]  # an array over the memory at a pointer
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _texel(index, size, wrap):  # type: ignore[no-untyped-def]
-    if wrap == _CLAMP:
-        return min(max(index, 0), size - 1)
-    if wrap == _MIRROR:
-        folded = index % (2 * size)
-        return min(folded, 2 * size - 1 - folded)
-    return index % size
-
-
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
     """Look opacity up, between four texels. image: of `Cutouts.images`. u, v: v from the top"""
-    height, width = image[1], image[2]
-    x, y = u * np.float32(width) - np.float32(0.5), v * np.float32(height) - np.float32(0.5)
-    x0, y0 = np.floor(x), np.floor(y)
-    fx, fy = x - x0, y - y0
-    total = np.float32(0)
-    for k in range(4):
-        dx, dy = k & 1, k >> 1
-        weight = (fx if dx else np.float32(1) - fx) * (fy if dy else np.float32(1) - fy)
-        row, column = _texel(np.int64(y0) + dy, height, image[4]), _texel(np.int64(x0) + dx, width, image[3])
-        total += weight * np.float32(texels[image[0] + row * width + column])
-    return total / np.float32(255)
+    first, height, width = image[0], image[1], image[2]
+    left, right, x = two_texels(image[3], u, width)
+    above, below, y = two_texels(image[4], v, height)
+    over, under = first + above * width, first + below * width
+    one = np.float32(1)
+    top = (one - x) * np.float32(texels[over + left]) + x * np.float32(texels[over + right])
+    bottom = (one - x) * np.float32(texels[under + left]) + x * np.float32(texels[under + right])
+    return ((one - y) * top + y * bottom) / np.float32(255)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ChunkDamagedError
-from relume.scene.model import Glass, Material, Opacity
+from relume.scene.model import WRAPS, Glass, Material, Opacity
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
-WRAPS = ("repeat", "mirror", "clamp")
 BLENDS, PASSES = -1.0, -2.0  # instead of a bound: shares of opacity; glass
 
 
@@ -45,7 +44,7 @@ def cutouts_of(materials: Sequence[Material]) -> Cutouts | None:
     texels, images, rules = list[NDArray[np.uint8]](), list[list[int]](), list[tuple[float, ...]]()
     of_material, end = np.full(len(materials), -1, np.int32), 0
     for index, material in enumerate(materials):
-        if material.opacity is None and material.glass is None:
+        if not material.lets_pass:
             continue
         opacity = material.opacity or Opacity(np.full((1, 1), 255, np.uint8))
         of_material[index] = len(images)

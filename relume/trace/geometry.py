@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.scene.joined import as_one
 from relume.scene.model import Scene
 from relume.trace.cutout_filter import PAST_GLASS, Holes
 from relume.trace.cutouts import cutouts_of
@@ -70,7 +71,7 @@ def is_front(
         (n,)
     """
     directions = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
-    face = trace_from(embree, eye, directions.astype(np.float32), np.full(1, PAST_GLASS)).face
+    face = trace_from(embree, eye, directions.astype(np.float32), PAST_GLASS).face
     a, b, c = positions[faces[np.maximum(face, 0)]].transpose(1, 0, 2)
     return np.asarray(np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) < 0)
 
@@ -83,23 +84,19 @@ def merge(scene: Scene) -> Geometry:
     """
     if not any(len(mesh.faces) for mesh in scene.meshes):
         raise SceneError("the scene has no triangles; add a mesh")
-    first = np.cumsum([0, *(len(mesh.positions) for mesh in scene.meshes)])
-    positions = np.concatenate([mesh.positions for mesh in scene.meshes])
-    faces = np.concatenate(
-        [mesh.faces + np.uint32(start) for mesh, start in zip(scene.meshes, first[:-1], strict=True)]
-    )
+    whole = as_one(scene.meshes)
     counts = [len(mesh.faces) for mesh in scene.meshes]
     face_material = np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32)
-    uvs, cutouts = np.concatenate([mesh.uvs for mesh in scene.meshes]), cutouts_of(scene.materials)
-    holes = None if cutouts is None else Holes.of(faces, uvs, face_material, cutouts)
+    cutouts = cutouts_of(scene.materials)
+    holes = None if cutouts is None else Holes.of(whole.faces, whole.uvs, face_material, cutouts)
     return Geometry(
-        positions=positions,
-        normals=np.concatenate([mesh.normals for mesh in scene.meshes]),
-        tangents=np.concatenate([mesh.tangents for mesh in scene.meshes]),
-        uvs=uvs,
-        faces=faces,
+        positions=whole.positions,
+        normals=whole.normals,
+        tangents=whole.tangents,
+        uvs=whole.uvs,
+        faces=whole.faces,
         face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
-        embree=EmbreeScene.build(positions, faces, holes),
-        epsilon=off_surface(positions),
+        embree=EmbreeScene.build(whole.positions, whole.faces, holes),
+        epsilon=off_surface(whole.positions),
     )

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import fresnel
 from relume.scene.model import Glass, Material
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, trace_from
@@ -72,7 +73,9 @@ def has_glass(materials: Sequence[Material]) -> bool:
     return any(material.glass is not None for material in materials)
 
 
-def layers_of(geometry: Geometry, materials: Sequence[Material], eye: F32, directions: F32, chance: F32) -> list[Layer]:
+def layers_of(
+    geometry: Geometry, materials: Sequence[Material], eye: F32, directions: F32, chance: F32 | np.float32
+) -> list[Layer]:
     """Follow an eye's rays through glass.
 
     Args:
@@ -155,12 +158,5 @@ def dielectric(cos_theta_i: F64, eta: F64) -> tuple[F64, F64]:
     Returns:
         (n,) both; 1 and 0 where nothing passes.
     """
-    sin2_t = eta**2 * (1 - cos_theta_i**2)
-    cos_theta_t = np.sqrt(np.maximum(1 - sin2_t, 0))
-    across = _ratio(eta * cos_theta_i - cos_theta_t, eta * cos_theta_i + cos_theta_t)
-    along = _ratio(cos_theta_i - eta * cos_theta_t, cos_theta_i + eta * cos_theta_t)
-    return np.where(sin2_t >= 1, 1.0, (across**2 + along**2) / 2), cos_theta_t
-
-
-def _ratio(a: F64, b: F64) -> F64:
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+    cos_theta_t = np.sqrt(np.maximum(1 - eta**2 * (1 - cos_theta_i**2), 0))
+    return fresnel(cos_theta_i, 1 / eta, 0.0), cos_theta_t

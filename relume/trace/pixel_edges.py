@@ -92,6 +92,6 @@ def is_partly_there(geometry: Geometry, origin: F32, directions: F32) -> NDArray
         geometry: the triangles. origin: of the rays. (3,) float32. directions: unit. (n, 3) float32
     """
     at_least, wholly = (
-        trace_from(geometry.embree, origin, directions, np.full(1, chance)).face for chance in (ANYWHERE, EVERYWHERE)
+        trace_from(geometry.embree, origin, directions, chance).face for chance in (ANYWHERE, EVERYWHERE)
     )
     return np.asarray(at_least != wholly)

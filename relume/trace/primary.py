@@ -18,7 +18,7 @@ from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_o
 F32 = NDArray[np.float32]
 
 _RAYS_A_RANGE = 8192
-_BY_PLACE = np.zeros(1, np.float32)  # the chance of rays that are given none
+_BY_DIRECTION = np.float32(0)  # the chance of rays that are given none
 
 
 @dataclass(frozen=True)
@@ -66,21 +66,21 @@ def _trace(intersect, scene, arguments, origins, directions, chance, start, stop
             uv[r, 0], uv[r, 1] = uv_of(packet, k)
 
 
-def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 = _BY_PLACE) -> Hits:
+def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | np.float32 = _BY_DIRECTION) -> Hits:
     """Find the first hits of rays from one point, or from a point each.
 
     Args:
         scene: the triangles. origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
-        chance: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) or (1,) float32
+        chance: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) float32
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
-    is_coherent = len(origins) == 1
+    is_coherent, chances = len(origins) == 1, np.atleast_1d(chance)
     hits = Hits(np.empty(n, np.int32), np.empty((n, 2), np.float32), np.empty(n, np.float32))
     arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(
-            intersect16, scene.handle, arguments.ctypes.data, origins, directions, chance, start, stop,
+            intersect16, scene.handle, arguments.ctypes.data, origins, directions, chances, start, stop,
             hits.face, hits.uv, hits.distance,
         ),
         n,

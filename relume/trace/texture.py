@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from typing import Any
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.coding import ROWS_AT_ONCE, decode
-from relume.scene.model import Texture
+from relume.scene.model import WRAPS, Texture
 
 F32 = NDArray[np.float32]
+
+_REPEAT, _, _CLAMP = range(len(WRAPS))  # as kernels know them
 
 
 class MipMap:
@@ -98,3 +102,29 @@ def _wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int
         folded = np.mod(index, 2 * size)
         return np.asarray(np.minimum(folded, 2 * size - 1 - folded), np.int64)
     return np.asarray(np.mod(index, size), np.int64)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
+    """Fold a texel's index into an image that is mirrored outside, or clamp it."""
+    if wrap == _CLAMP:
+        return min(max(index, 0), size - 1)
+    folded = index % (2 * size)
+    return min(folded, 2 * size - 1 - folded)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def two_texels(wrap, place, size):  # type: ignore[no-untyped-def]
+    """Find the two texels about a place along one side of an image, and the share of the second.
+
+    wrap: of `WRAPS`. place: of the image's side. size: texels along it.
+    """
+    if wrap == _REPEAT:
+        place -= math.floor(place)  # so that what is outside is so by one texel at most, and nothing is divided
+    at = place * np.float32(size) - np.float32(0.5)
+    below = math.floor(at)
+    first: Any = np.int64(below)
+    second = first + 1
+    if wrap == _REPEAT:
+        return first + size if first < 0 else first, second - size if second >= size else second, np.float32(at - below)
+    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(at - below)

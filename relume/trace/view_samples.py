@@ -87,7 +87,7 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     origin = camera.to_world[:3, 3].astype(np.float32)
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    layers = layers_of(geometry, scene.materials, origin, directions, np.full(1, EVERYWHERE))
+    layers = layers_of(geometry, scene.materials, origin, directions, EVERYWHERE)
     is_edge = np.any([edges_of(geometry, layer, size) for layer in layers], axis=0)
     if geometry.embree.holes is not None and geometry.embree.holes.blends:
         is_edge |= is_partly_there(geometry, origin, directions)
@@ -116,6 +116,6 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
         chosen.weight[order],
         material[order],
         full,
-        len(directions) + len(more_directions),
+        sum(len(layer.ray) for layer in (*layers, *more)),
         chosen.through[order] if has_glass(scene.materials) else None,
     )

@@ -65,10 +65,18 @@ def slanted(num=50):
     return unit(np.stack([across, 0.3 * across, -np.ones(num)], axis=1))
 
 
+def by_angles(theta_i, theta_t):
+    """Fresnel's equations, in the angles before and behind the rim, neither 0."""
+    across = np.sin(theta_i - theta_t) / np.sin(theta_i + theta_t)
+    along = np.tan(theta_i - theta_t) / np.tan(theta_i + theta_t)
+    return (across**2 + along**2) / 2
+
+
 def test_the_rim_reflects_as_fresnel_says_from_outside_and_all_from_inside():
     cosine = np.linspace(0, 1, 101)
     outside, cos_t = dielectric(cosine, np.full(101, 1 / 1.5))
     np.testing.assert_allclose(outside, fresnel(cosine, 1.5, 0.0), atol=1e-12)
+    np.testing.assert_allclose(outside[:-1], by_angles(np.arccos(cosine[:-1]), np.arccos(cos_t[:-1])), atol=1e-9)
     np.testing.assert_allclose(np.sqrt(1 - cos_t**2) * 1.5, np.sqrt(1 - cosine**2), atol=1e-12)
     inside, cos_t = dielectric(cosine, np.full(101, 1.5))
     passes = np.sqrt(1 - cosine**2) * 1.5 < 1

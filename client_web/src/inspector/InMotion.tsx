@@ -2,7 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { getInOut } from "../net/api";
 import type { InOutBody, Term } from "../protocol";
-import { scene } from "../state/scene";
+import { materialOf } from "../state/scene";
 import { moves } from "../state/views";
 import { isTexels } from "../state/look";
 import { drawsHere } from "../live/drawing";
@@ -18,7 +18,7 @@ function words({ functions, missed, needed, is_mirror }: InOutBody): string {
 
 /** How a texture that looks different from every side lies on a material, and who can draw it. */
 function Cover({ material }: { material: string }) {
-  const isProjected = scene.value?.materials.find(({ name }) => name === material)?.is_projected === true;
+  const isProjected = materialOf(material)?.is_projected === true;
   const isMean = moves.value && drawsHere.value;
   if (!isProjected && !isMean) return null;
   return (

@@ -8,7 +8,7 @@ import { openLight } from "../lights/lights";
 import { MAX_TERMS } from "../look.gen";
 import { defaultLook, look } from "../state/look";
 import { shownPanels } from "../state/room";
-import { models, scene } from "../state/scene";
+import { materialOf, models } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { TermCard } from "./TermCard";
@@ -71,7 +71,7 @@ function Catcher({ material }: { material: string }) {
 
 /** What of glass is edited here, and what is not. */
 function Glass({ material }: { material: string }) {
-  if (scene.value?.materials.find(({ name }) => name === material)?.is_glass !== true) return null;
+  if (materialOf(material)?.is_glass !== true) return null;
   return <p class="glass">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
 }
 

@@ -1,13 +1,13 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
 import type { ModelBody, Term } from "../protocol";
-import { scene } from "../state/scene";
+import { materialOf } from "../state/scene";
 
 /** The images that a material may have, in words. */
 export const TEXTURES: Record<string, string> = { diffuse: "Base colour", specular: "Highlight" };
 
 /** Those that a material of the scene has: its own terms take them. */
 export function texturesOf(material: string): string[] {
-  const own = scene.value?.materials.find(({ name }) => name === material)?.terms ?? [];
+  const own = materialOf(material)?.terms ?? [];
   return Object.keys(TEXTURES).filter((channel) => own.some((term) => term.texture === channel));
 }
 

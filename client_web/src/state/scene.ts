@@ -1,11 +1,16 @@
 /** The page that is open, the scene that is edited, and the models that its terms may have. */
 import { computed, signal } from "@preact/signals";
-import type { ModelBody, SceneBody, Term } from "../protocol";
+import type { ModelBody, SceneBody, SceneMaterial, Term } from "../protocol";
 
 export const page = signal<"start" | "editor">("start");
 export const models = signal<ModelBody[]>([]);
 export const scene = signal<SceneBody | null>(null);
 export const materialNames = computed(() => scene.value?.materials.map((m) => m.name) ?? []);
+
+/** What the scene says of a material. */
+export function materialOf(name: string): SceneMaterial | undefined {
+  return scene.value?.materials.find((material) => material.name === name);
+}
 
 export function modelOf(term: Term): ModelBody | undefined {
   return models.value.find((model) => model.model === term.model);

@@ -16,7 +16,7 @@ from relume.light.gather_rays import Pattern, make_pattern
 from relume.moving.points.lattice import Lattice, num_nodes
 from relume.moving.points.vertices import Vertices
 from relume.points import Points
-from relume.scene.model import Scene, Texture
+from relume.scene.model import WRAPS, Scene, Texture
 from relume.trace.geometry import Geometry
 from relume.trace.texture import MipMap
 
@@ -25,7 +25,6 @@ F32 = NDArray[np.float32]
 
 MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
 _MOST_TEXELS = 1 << 25  # of all finest levels; values are kept as floats, 12 bytes each
-_WRAPS = ("repeat", "mirror", "clamp")
 NORMAL_MAP = len(TEXTURES)  # its column in `Textures.of_material`
 
 
@@ -61,7 +60,7 @@ def textures_of(scene: Scene) -> StoredTextures:
     }
     side = _most_side(kept)
     arrays = {f"textures/{k}": _level(texture, side).astype(np.float16) for k, texture in enumerate(kept)}
-    wraps = [[_WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
+    wraps = [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
     return StoredTextures(arrays, {**described, "wraps": wraps})
 
 

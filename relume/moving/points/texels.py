@@ -8,31 +8,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-
-@nb.njit(nogil=True, cache=True, inline="always")
-def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
-    """Fold a texel's index into an image that is mirrored outside, or clamp it."""
-    if wrap == 2:
-        return min(max(index, 0), size - 1)
-    folded = index % (2 * size)
-    return min(folded, 2 * size - 1 - folded)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _two(wrap, place, size):  # type: ignore[no-untyped-def]
-    """Find the two texels about a place along one side of an image, and the share of the second.
-
-    place: of the image's side. size: texels along it.
-    """
-    if wrap == 0:
-        place -= math.floor(place)  # so that what is outside is so by one texel at most, and nothing is divided
-    at = place * np.float32(size) - np.float32(0.5)
-    below = math.floor(at)
-    first: Any = np.int64(below)
-    second = first + 1
-    if wrap == 0:
-        return first + size if first < 0 else first, second - size if second >= size else second, np.float32(at - below)
-    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(at - below)
+from relume.trace.texture import two_texels
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -40,8 +16,8 @@ def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-u
     """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
     row = textures.first[texture] + level
     first, height, width = textures.levels[row, 0], textures.levels[row, 1], textures.levels[row, 2]
-    left, right, fx = _two(textures.wraps[texture, 0], np.float32(u), width)
-    upper, lower, fy = _two(textures.wraps[texture, 1], np.float32(v), height)
+    left, right, fx = two_texels(textures.wraps[texture, 0], np.float32(u), width)
+    upper, lower, fy = two_texels(textures.wraps[texture, 1], np.float32(v), height)
     one = np.float32(1)
     above, below = share * (one - fy), share * fy
     a, b, c, d = above * (one - fx), above * fx, below * (one - fx), below * fx

@@ -26,8 +26,7 @@ def constants(transfer: MovingTransfer) -> dict[str, Any]:
     """
     rungs = {name: field.tolist() for name, field in ladder()._asdict().items()}
     sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
-    has_holes = transfer.embree.holes is not None
-    return {**sizes, "ladder": rungs, "expansions": expansions().tolist(), "has_holes": has_holes}
+    return {**sizes, "ladder": rungs, "expansions": expansions().tolist(), "has_holes": transfer.has_holes}
 
 
 def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:

@@ -26,7 +26,7 @@ from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
 from relume.scene.model import Coding, Glass, Material, Opacity, Texture
-from relume.scene.opacity import is_nowhere, make_opacity
+from relume.scene.opacity import make_opacity
 
 _CLEAR = 0.1  # roughness of glass that blurs nothing to speak of
 MAX_TEXTURE_TEXELS = 700_000_000  # kept for the materials of one scene, 3 bytes each
@@ -124,10 +124,7 @@ class MaterialReader:
             pixels, wrap = self._images.texture(pbr.baseColorTexture.index, f"the base colour texture of {what}")
             alpha = pixels[..., 3]
         cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
-        opacity = make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff)
-        if opacity is not None and is_nowhere(opacity):
-            self._warnings.append(wrong(f"{what} is transparent everywhere, as the file says; nothing of it is seen"))
-        return opacity
+        return make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff, what, self._warnings)
 
     def _emission(self, material: GltfMaterial, layers: Layers, what: str) -> tuple[float, float, float]:
         factor = np.maximum(material.emissiveFactor, 0) * layers.emissive_strength.emissiveStrength

@@ -21,7 +21,7 @@ from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.model import Coding, Material, Opacity, Texture
-from relume.scene.opacity import is_nowhere, make_opacity
+from relume.scene.opacity import make_opacity
 
 F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
@@ -117,10 +117,7 @@ class MaterialMaker:
         pixels = self._decoded(described, "map_d", f"map_d of {what}")
         # grey, or the picture that map_Kd names as well, with the holes in its alpha
         alpha = None if pixels is None else pixels[..., 3 if np.ptp(pixels[..., 3]) else 0]
-        opacity = make_opacity(alpha, ("repeat", "repeat"), share, None)
-        if opacity is not None and is_nowhere(opacity):
-            self._warnings.append(wrong(f"{what} is transparent everywhere, as the file says; nothing of it is seen"))
-        return opacity
+        return make_opacity(alpha, ("repeat", "repeat"), share, None, what, self._warnings)
 
     def emission(self, material: Material, described: Described | None) -> F64:
         """Radiance of the surfaces of a material that was made: Ke times the mean of map_Ke. (3,) Raises SceneError."""
