@@ -84,7 +84,9 @@ def map_for_mitsuba(radiance: F32) -> F32:
     return np.asarray(0.5 * (radiance[above] + radiance[below]), np.float32).repeat(finer, axis=1)
 
 
-def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def render(
+    scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path, images: Mapping[str, F32] | None = None
+) -> dict[str, Any]:
     """Hand the scene's first view over as arrays and let the peer render.
 
     Args:
@@ -93,6 +95,7 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
             and "seen" where reflected light alone is (peer_mitsuba_render.py); "integrator" where more than direct
             light is; "emitters", of lights beside the map; both are Mitsuba's own descriptions.
         folder: where files of the exchange are written.
+        images: that descriptions of materials name as {"array": name}. (height, width, 1) each
     Returns:
         What it wrote to result.json in `folder`.
     Raises:
@@ -102,7 +105,8 @@ def render(scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: 
     arrays: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
     for k, mesh in enumerate(scene.meshes):
         arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
-    np.savez(folder / "scene.npz", allow_pickle=False, **arrays)
+        arrays[f"uvs_{k}"] = mesh.uvs
+    np.savez(folder / "scene.npz", allow_pickle=False, **arrays, **(images or {}))
     whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, **job}
     (folder / "job.json").write_text(json.dumps(whole))
     script = Path(__file__).with_name("peer_mitsuba_render.py")

@@ -21,14 +21,23 @@ sys.path.append(str(Path(__file__).parent))  # the interpreter is isolated
 plugins: Any = __import__("peer_mitsuba_plugins")
 
 
+def image(arrays: Any, value: Any) -> Any:
+    """A value of a BSDF; {"array": name} is a texture of that array of scene.npz, (height, width, 1)."""
+    if not isinstance(value, dict) or "array" not in value:
+        return value
+    return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True}
+
+
 def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
     """One mesh of the scene.
 
     Args:
         arrays: of scene.npz. k: which mesh.
-        bsdf: its material, as `bench.mitsuba.bsdf` describes it; "interior" is the medium inside.
+        bsdf: its material, as `bench.mitsuba.bsdf` describes it; "interior" is the medium inside, {"array": name} an
+            image that is handed over, its values as they are.
     """
     props = mi.Properties()
+    bsdf = {key: image(arrays, value) for key, value in bsdf.items()}
     colors = {key: mi.ScalarVector3f(value) for key, value in bsdf.items() if isinstance(value, list)}
     inside = bsdf.get("interior")
     own = {key: value for key, value in {**bsdf, **colors}.items() if key != "interior"}
@@ -36,8 +45,10 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
     if inside is not None:
         props["interior"] = mi.load_dict(inside)
     positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
-    shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), has_vertex_normals=True, props=props)
+    vertices = {"has_vertex_normals": True, "has_vertex_texcoords": True}
+    shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), **vertices, props=props)
     params = mi.traverse(shape)
+    params["vertex_texcoords"] = arrays[f"uvs_{k}"].ravel()
     params["vertex_positions"], params["vertex_normals"] = positions.ravel(), arrays[f"normals_{k}"].ravel()
     params["faces"] = faces.ravel()
     params.update()

@@ -133,6 +133,7 @@ GROUPS = (
         ),
     ),
     Group("bench.glass", ("glass.rmse",)),
+    Group("bench.rough", ("rough.rmse",)),
     Group(
         "bench.estimators",
         (

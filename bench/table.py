@@ -92,6 +92,7 @@ def document_of(name: str) -> str:
                 "gather.rmse",
                 "gather.full",
                 "glass.",
+                "rough.",
                 "lights.rmse",
                 "btf.compression_error",
                 "btf.compression_ratio",

@@ -108,7 +108,7 @@ def _move_eyes(transfer: MovingViews, picture: MovingPicture) -> None:
 def _compare(scene: Scene) -> None:
     """Find the true radiance of a point, of every texel and of a few."""
     up, aside = np.array([[0, 1, 0]], np.float32), np.array([[1, 0, 0]], np.float32)
-    points = Points(position=9 * up, normal=up, tangent=aside, wo=up, textures={"diffuse": up})
+    points = Points(position=9 * up, normal=up, tangent=aside, wo=up, textures={"diffuse": up}, roughness=up[:, 1])
     terms = [[complete_term(("warm",), {"model": "lambert"}, None)]]
     for spp in (0, 16):
         reference_radiance(merge(scene), texels_of(scene.environment), points, terms, spp)

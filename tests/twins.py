@@ -208,7 +208,7 @@ def radiance_of(transfer, view: View, look):
         if rows.start == rows.stop:
             continue
         lights, receivers = arriving(transfer, view, index, look)
-        for document in look.materials[name].terms:
+        for document, has_level in as_rough(view, index, look.materials[name].terms):
             term = TERMS[document["model"]].settled(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
             projector = Projector(term, contract(term, bands, None), lights, receivers)
@@ -218,12 +218,25 @@ def radiance_of(transfer, view: View, look):
             for curve in term.curves:
                 if curve.outgoing:
                     image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
-            out[rows] += image
+            out[rows] += image * has_level[:, None]
         out[rows] += shining(transfer, view, index, look)
     if look.transport.paths.direct:
         background = transfer.background_in(look.environment.key, view)
         out[view.num_surface_samples :] = np.array(look.environment.gain) * background
     return out
+
+
+def as_rough(view: View, index, terms):
+    """Each term with the samples that it is of: of one that follows a map of roughness, a term for every level."""
+    ratios, level = view.levels(index)
+    for term in terms:
+        if not (ratios and term.get("roughness_map")):
+            yield term, np.ones(len(level))
+            continue
+        assert term["model"] == "ggx"
+        for k, ratio in enumerate(ratios):
+            rough = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
+            yield {**term, "params": {**term["params"], "roughness": rough}}, level == k
 
 
 def shining(transfer, view: View, index, look):

@@ -97,6 +97,7 @@ describe("terms", () => {
     source: "",
     texture: "specular",
     needs_data: false,
+    width: name === "flat" ? null : "roughness",
     data_prefix: null,
     parameters: parameters.map((p) => ({
       name: p,
@@ -112,7 +113,13 @@ describe("terms", () => {
     })),
     curves: [],
   });
-  const models = [model("ggx", ["roughness", "f0"]), model("schlick", ["roughness", "r"])];
+  const models = [model("ggx", ["roughness", "f0"]), model("schlick", ["roughness", "r"]), model("flat", [])];
+
+  test("the map of roughness stays where the new model has a width", () => {
+    const term = { ...defaultTerm(models[0] as ModelBody), roughness_map: true };
+    expect(withModel(term, "schlick", models).roughness_map).toBe(true);
+    expect(withModel(term, "flat", models)).not.toHaveProperty("roughness_map");
+  });
 
   test("a new model keeps colour, texture and parameters of the same name", () => {
     const term = {

@@ -27,7 +27,7 @@ from relume.checks import (
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
 _TEXTURES = ("diffuse", "specular")
-_FIELDS = ("model", "data", "color", "texture", "params", "curves")
+_FIELDS = ("model", "data", "color", "texture", "roughness_map", "params", "curves")
 
 
 def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -56,9 +56,21 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
         **_checked_data((*pointer, "data"), given, term),
         "color": color,
         "texture": texture,
+        **_checked_map((*pointer, "roughness_map"), given, term),
         "params": _complete_params((*pointer, "params"), given.get("params", {}), term),
         "curves": _checked_curves((*pointer, "curves"), given.get("curves", {}), term, known_curves),
     }
+
+
+def _checked_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
+    """Whether the material's map of roughness scales the term's width; left out of terms that do not say."""
+    if "roughness_map" not in given:
+        return {}
+    follows = given["roughness_map"]
+    if term.width is None or not isinstance(follows, bool):
+        allowed = f"nothing: {term.model!r} has no width" if term.width is None else "true or false"
+        raise fail(pointer, follows, allowed)
+    return {"roughness_map": follows}
 
 
 def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:

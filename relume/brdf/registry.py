@@ -53,6 +53,7 @@ def describe() -> list[dict[str, Any]]:
             "source": term.source,
             "texture": term.texture,
             "needs_data": term.needs_data,
+            "width": None if term.width is None else term.width[0],
             "data_prefix": None if term.data is None else term.data.prefix,
             "parameters": [
                 asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters

@@ -109,6 +109,7 @@ class Term:
         is_lambertian: whether the quotient is one value above the horizon.
         data: where documents must name something measured that is kept there; it is fixed at freeze too.
         texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from `settle`.
+        width: the parameter that maps of roughness scale, and the power of a roughness that it grows with.
     """
 
     model: str
@@ -125,6 +126,7 @@ class Term:
     is_lambertian: bool = False
     data: AssetStore | None = None
     texels: Any = None
+    width: tuple[str, float] | None = None
 
     @property
     def needs_data(self) -> bool:

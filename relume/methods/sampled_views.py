@@ -10,6 +10,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular, uv
+    views/<k>/level                                          of roughness: relume.scene.roughness
     views/<k>/through                                        of scenes with glass: relume.trace.view_samples
     views/<k>/visibility                                     samples on surfaces only
     views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
@@ -33,6 +34,7 @@ from relume.methods import bounds
 from relume.methods.last_read import LastRead
 from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
 from relume.scene.model import Camera, Scene
+from relume.scene.roughness import levels_of
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.trace.glass import has_glass
@@ -40,7 +42,7 @@ from relume.trace.view_samples import BACKGROUND, sample_view
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
-_SURFACE_BYTES = 4 + 4 + 2 + 5 * 12 + 20
+_SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 
@@ -110,6 +112,7 @@ class SampledViews:
             "double_sided": [material.double_sided for material in scene.materials],
             "has_holes": any(material.lets_pass for material in scene.materials),
             "has_glass": has_glass(scene.materials),
+            "roughness_levels": [list(levels_of(material)) for material in scene.materials],
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -154,6 +157,7 @@ class SampledViews:
             "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
             "position": points.position, "normal": points.normal, "tangent": points.tangent,
             "diffuse": samples.surface.diffuse, "specular": samples.surface.specular, "uv": samples.surface.uv,
+            "level": samples.level,
         }  # fmt: skip
         if samples.through is not None:
             arrays["through"] = samples.through

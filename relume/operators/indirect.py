@@ -9,7 +9,7 @@ go through rows; what they leave out is a small part of a small part of the pict
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,7 @@ from relume.operators.indirect_kernel import (
     transform,
 )
 from relume.parallel import for_shares, for_steps
-from relume.project.contraction import contract
+from relume.project.levels import contract_levels, runs
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import GatherRays, Receivers
 from relume.project.sent import evenly
@@ -86,9 +86,10 @@ def rows_bytes(num_samples: int, num_channels: int) -> int:
 
 def num_channels(term: Term, bands: Mapping[str, NDArray[np.float64]]) -> int:
     """Channels that rows have: one where a term weighs all of them alike, else three."""
-    contraction = contract(term, bands, None)
     upright = np.array([0, 0, 1], np.float32).reshape(3, 1)
-    alike = np.all(contraction.num_rows == 1) and np.all(contraction.constant == contraction.constant[0])
+    alike = all(
+        np.all(c.num_rows == 1) and np.all(c.constant == c.constant[0]) for c in contract_levels(term, bands, None)
+    )
     return 1 if alike and len(term.quotients(*upright, *upright)) == 1 else 3
 
 
@@ -117,7 +118,7 @@ def freeze_rows(
     """Contract all curves of a term along the rays of points.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each
+        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) where it differs from level to level
         points: what arrives at them does not matter. rays: theirs, whatever is sent.
         expected: from `expected_light`.
         progress: called with the share done. cancelled: asked now and then.
@@ -125,7 +126,7 @@ def freeze_rows(
         CancelledError: `cancelled` said so.
     """
     lit_by_ones = replace(points, rays=(replace(rays, sent=evenly(np.ones_like(rays.sent.even))),))
-    contraction, num_samples = contract(term, bands, None), len(points.normal)
+    contractions, num_samples = contract_levels(term, bands, None), len(points.normal)
     blocks = -(-num_samples // BLOCK_SAMPLES)
     rows = IndirectOperator(
         np.empty((blocks, NUM_KEPT), np.int32),
@@ -136,7 +137,8 @@ def freeze_rows(
     )
 
     def step(first: int, last: int) -> None:
-        maker = _RowMaker(RayProjector(term, contraction, lit_by_ones, BLOCK_SAMPLES), rays, expected)
+        projectors = [RayProjector(term, contraction, lit_by_ones, BLOCK_SAMPLES) for contraction in contractions]
+        maker = _RowMaker(projectors, points.level, rays, expected)
         for block in range(first, last):
             maker.write(rows, block)
 
@@ -147,8 +149,15 @@ def freeze_rows(
 class _RowMaker:
     """Makes the rows of one block after another; holds the scratch memory of one thread."""
 
-    def __init__(self, projector: RayProjector, rays: GatherRays, expected: F32) -> None:
-        self._projector, self._links, self._expected = projector, rays.links, expected
+    def __init__(
+        self,
+        projectors: Sequence[RayProjector],
+        level: NDArray[np.uint8] | None,
+        rays: GatherRays,
+        expected: F32,
+    ) -> None:
+        self._projectors, self._level = projectors, level
+        self._links, self._expected = rays.links, expected
         self._place = np.empty(len(expected), np.int32)
         most = len(expected) + 1
         self._index = np.empty(most, np.int32)
@@ -162,7 +171,9 @@ class _RowMaker:
         if len(seen) == 0:
             rows.kept[block], rows.scale[block], rows.weights[block] = 0, 0, 0
             return
-        weight = self._projector.weigh(start, stop)[:channels]
+        of_levels = runs(self._level, len(self._projectors), start, stop)
+        weights = [self._projectors[level].weigh(first, last) for level, first, last in of_levels]
+        weight = np.concatenate(weights, axis=1)[:channels]
         sums = np.zeros((len(seen), channels, BLOCK_SAMPLES), np.float32)
         sum_by_cell(self._links, start, stop, self._place, weight, sums)
         width = channels * BLOCK_SAMPLES

@@ -27,10 +27,10 @@ from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
-from relume.operators.frozen import Frozen, tiles_of
+from relume.operators.frozen import Frozen, level_bounds, tiles_of
 from relume.parallel import for_steps
 from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.project.levels import at_level, num_levels, project_levels
 from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
@@ -83,8 +83,16 @@ class Linearised:
         return document["model"] == self.model and _others(document, self.parameter) == self.others
 
     def coefficients(self, bands: Mapping[str, F64]) -> F64:
-        """c of a term's curves, (3, J) each. (3, S)"""
+        """c of a term's curves, (3, J) each. (3, S); (L, 3, S) where moved curves differ from level to level"""
+        moved = {name: bands[name] for name in self.moves}
+        num = num_levels(moved)
+        return self._at(moved) if num == 1 else np.stack([self._at(at_level(moved, level)) for level in range(num)])
+
+    def _at(self, bands: Mapping[str, F64]) -> F64:
+        """c at one level. (3, S)"""
         moved = [bands[curve.name] for curve in self.curves]
+        if all(np.all(rows == rows[0]) for rows in moved) and self.nodes[0] is self.nodes[1] is self.nodes[2]:
+            return np.tile(self.nodes[0].coefficients(_product([rows[0] for rows in moved])), (3, 1))
         products = [_product([rows[channel] for rows in moved]) for channel in range(3)]
         return np.array([nodes.coefficients(curve) for nodes, curve in zip(self.nodes, products, strict=True)])
 
@@ -122,22 +130,26 @@ class Linearised:
         """
         at_nodes = self.bands_at_nodes()
         alone = self.moves[0] if len(self.moves) == 1 else None
-        contraction = contract(term, bands if alone else {**bands, **at_nodes}, alone)
+        held = {**bands, **at_level({name: bands[name] for name in self.moves}, 0)}  # nodes are the same at all levels
+        dormant = [at_level(held, level) for level in range(num_levels(held))]
+        contractions = [contract(term, b if alone else {**b, **at_nodes}, alone) for b in dormant]
         num_samples = len(receivers.normal)
         tiles, samples = tiles_of(num_samples)
         rows = np.zeros((tiles * samples, self.num_columns, 3), np.float32)
 
         def step(start: int, stop: int) -> None:
-            projected = Projector(term, contraction, lights, receivers).project(start, stop)
+            projected = project_levels(term, contractions, lights, receivers, start, stop)
             if alone is not None:
                 matrices = at_nodes[alone].astype(np.float32)
                 projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
             rows[start:stop] = projected
 
         for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "freezing")
-        importance = np.sqrt(np.einsum("nsc,nsc->cs", rows, rows, dtype=np.float64))
-        transport = rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1)
-        return Frozen(np.ascontiguousarray(transport), importance)
+        bounds = level_bounds(receivers, bands, self.moves)
+        cut = [rows] if bounds is None else np.split(rows[:num_samples], bounds[1:-1])
+        importance = np.sqrt([np.einsum("nsc,nsc->cs", some, some, dtype=np.float64) for some in cut])
+        transport = np.ascontiguousarray(rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1))
+        return Frozen(transport, importance[0] if bounds is None else importance, bounds)
 
 
 def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:

@@ -17,8 +17,7 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.operators.frozen import tiles_of
 from relume.parallel import for_steps
-from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.project.levels import contract_levels, project_levels
 from relume.project.receivers import Receivers
 from relume.project.texels import texel_rows
 
@@ -68,7 +67,7 @@ def shade(
     """Contract all curves of a term.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each
+        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) where it differs from level to level
         lights, receivers: what arrives, and where.
         progress: called with the share done. cancelled: asked now and then.
     Raises:
@@ -76,13 +75,13 @@ def shade(
     """
     num_samples = len(receivers.normal)
     rows = np.zeros((num_samples, 3), np.float32)
-    contraction = contract(term, bands, None)
+    contractions = contract_levels(term, bands, None)
 
     def step(start: int, stop: int) -> None:
         if term.texels is not None and receivers.uv is not None:
             rows[start:stop] = texel_rows(term.texels, lights, receivers, start, stop)
         else:
-            rows[start:stop] = Projector(term, contraction, lights, receivers).project(start, stop)[:, 0]
+            rows[start:stop] = project_levels(term, contractions, lights, receivers, start, stop)[:, 0]
 
     for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "shading")
     return Shaded.of(rows)

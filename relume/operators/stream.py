@@ -22,12 +22,12 @@ TILE_SAMPLES = 16_384
 
 @dataclass(frozen=True)
 class Columns:
-    """The coefficients that change, by channel.
+    """The coefficients that change, by level of the samples and by channel.
 
     Attributes:
-        index: columns of each channel, rising; only the first `count` of a row hold. (3, n) int32
-        change: Δc of each. (3, n) float32
-        count: (3,) int64
+        index: columns of each channel, rising; only the first `count` of a row hold. (L, 3, n) int32
+        change: Δc of each. (L, 3, n) float32
+        count: (L, 3) int64
     """
 
     index: NDArray[np.int32]
@@ -36,50 +36,60 @@ class Columns:
 
 
 def columns_of(change: NDArray[np.float64]) -> Columns:
-    """The columns with a change; change: Δc, zero where nothing is to be done. (3, J) float64"""
-    count = np.count_nonzero(change, axis=1)
-    index = np.zeros((3, max(1, int(count.max()))), np.int32)
+    """The columns with a change; change: Δc, zero where nothing is to be done. (3, J), or (L, 3, J) float64"""
+    change = change.reshape(-1, *change.shape[-2:])
+    count = np.count_nonzero(change, axis=2)
+    index = np.zeros((*count.shape, max(1, int(count.max()))), np.int32)
     values = np.zeros(index.shape, np.float32)
-    for channel in range(3):
-        used = np.nonzero(change[channel])[0]
-        index[channel, : len(used)] = used
-        values[channel, : len(used)] = change[channel, used]
+    for place in np.ndindex(count.shape):
+        used = np.nonzero(change[place])[0]
+        index[place][: len(used)] = used
+        values[place][: len(used)] = change[place][used]
     return Columns(index, values, count.astype(np.int64))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _stream(transport, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
+def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
 
     Four columns at a time, so that the image is read and written less.
     """
+    samples = image.shape[2]
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
-        sums = image[tile, channel]
-        whole = count[channel] // 4 * 4
-        for n in range(0, whole, 4):
-            a = transport[tile, channel, index[channel, n]]
-            b = transport[tile, channel, index[channel, n + 1]]
-            c = transport[tile, channel, index[channel, n + 2]]
-            d = transport[tile, channel, index[channel, n + 3]]
-            wa, wb = change[channel, n], change[channel, n + 1]
-            wc, wd = change[channel, n + 2], change[channel, n + 3]
-            for s in range(sums.shape[0]):
-                sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
-        for n in range(whole, count[channel]):
-            a, wa = transport[tile, channel, index[channel, n]], change[channel, n]
-            for s in range(sums.shape[0]):
-                sums[s] += wa * a[s]
+        for level in range(count.shape[0]):
+            first = max(bounds[level] - tile * samples, 0)
+            last = min(bounds[level + 1] - tile * samples, samples)
+            if first >= last:
+                continue
+            sums = image[tile, channel, first:last]
+            weight, which, num = change[level, channel], index[level, channel], count[level, channel]
+            whole = num // 4 * 4
+            for n in range(0, whole, 4):
+                a = transport[tile, channel, which[n], first:last]
+                b = transport[tile, channel, which[n + 1], first:last]
+                c = transport[tile, channel, which[n + 2], first:last]
+                d = transport[tile, channel, which[n + 3], first:last]
+                wa, wb, wc, wd = weight[n], weight[n + 1], weight[n + 2], weight[n + 3]
+                for s in range(sums.shape[0]):
+                    sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
+            for n in range(whole, num):
+                a, wa = transport[tile, channel, which[n], first:last], weight[n]
+                for s in range(sums.shape[0]):
+                    sums[s] += wa * a[s]
 
 
-def stream(transport: F32, columns: Columns, image: F32) -> None:
+def stream(transport: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None) -> None:
     """Add T · Δc to an image, in place.
 
     Args:
         transport: (tiles, 3, J, samples) float32. columns: what has changed, from `columns_of`.
         image: added to. (tiles, 3, samples) float32
+        bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
     Cost: reads 4 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
     """
     if columns.count.any():
-        args = (transport, columns.index, columns.change, columns.count, image)
+        if bounds is None:
+            bounds = np.array([0, image.shape[0] * image.shape[2]], np.int64)
+        args = (transport, bounds, columns.index, columns.change, columns.count, image)
         for_shares(lambda start, stop: _stream(*args, start, stop), 3 * len(image))

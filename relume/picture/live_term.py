@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.levels import Levels
 from relume.operators.edit_basis import EditBasis
 from relume.operators.frozen import tiles_of
 from relume.picture.fidelity import Fidelity, Word, word_of
@@ -30,7 +31,7 @@ class LiveTerm:
     Attributes:
         document: of the term in the newest look. light: in which it is wanted.
         term: the declaration of its model, fixed parameters put in. model: what tells it from other models.
-        target: bands of each curve in the newest look. (3, J) float64 each
+        target: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `Wanted`
         target_rows: the same as bytes, in order of the curves' names: what keys are made of.
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
         ready: the newest image of it.
@@ -38,9 +39,9 @@ class LiveTerm:
         is_composed: the picture's radiance has `displayed` in it as it is now.
     """
 
-    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, light: Light) -> None:
+    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, levels: Levels, light: Light) -> None:
         self.light = light
-        self._theta_o = np.arccos(cos_theta_o)
+        self._theta_o, self._levels = np.arccos(cos_theta_o), levels
         tiles, samples = tiles_of(len(cos_theta_o))
         self.ready = self.displayed = Shown(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
@@ -50,7 +51,7 @@ class LiveTerm:
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
-        wanted = Wanted.of(document, self._theta_o)
+        wanted = Wanted.of(document, self._theta_o, self._levels)
         if wanted.model != self.model:
             self.ready = Shown(np.zeros_like(self.ready.image))
             self.displayed = replace(self.displayed, bands={})  # of another model: none of the curves that are wanted

@@ -28,11 +28,11 @@ class MaterialImage:
         rows = view.rows(index)
         self.num_samples = rows.stop - rows.start
         self._first = rows.start
-        self._cos_theta_o = view.cos_theta_o[rows]
+        self._cos_theta_o, self._levels = view.cos_theta_o[rows], view.levels(index)
         self._textures = {name: texture[rows] for name, texture in view.textures.items()}
         self.documents = list(documents)
         self._light = light
-        self.terms = [LiveTerm(document, self._cos_theta_o, light) for document in documents]
+        self.terms = [LiveTerm(document, self._cos_theta_o, self._levels, light) for document in documents]
         self._emission = (0.0, 0.0, 0.0)
         self._shines: F32 | None = None
         self._factor: F32 | None = None
@@ -49,7 +49,7 @@ class MaterialImage:
         kept = len(self.terms)
         for k, document in enumerate(documents):
             if k >= kept:
-                self.terms.append(LiveTerm(document, self._cos_theta_o, self._light))
+                self.terms.append(LiveTerm(document, self._cos_theta_o, self._levels, self._light))
             elif document != self.documents[k]:
                 self.terms[k].set_document(document)
         del self.terms[len(documents) :]
@@ -121,6 +121,10 @@ class MaterialImage:
         if has_texture:
             factor = factor * texture[sample]
         return factor if term.outgoing is None else factor * term.outgoing[:, sample]
+
+    def level_at(self, sample: int) -> int:
+        """The level of roughness of one of the material's samples."""
+        return int(self._levels.level[sample])
 
     def _factors(self, term: LiveTerm) -> tuple[F32, F32, bool]:
         color = np.asarray(term.document["color"], np.float32)

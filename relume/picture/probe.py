@@ -79,13 +79,14 @@ def _contributions(
         return None
     rows = images.view.rows(material.index)
     curve = synthesis(ready.coefficients) if ready.coefficients is not None else term.target[ready.basis.name]
-    bands = np.zeros_like(curve)
+    bands = np.zeros(curve.shape[-2:])
     for sample, of_sample in zip(samples, gains, strict=True):
         if rows.start <= sample < rows.stop:
             row = int(sample) - rows.start
             tile, offset = divmod(row, frozen.transport.shape[3])
             columns = synthesis(frozen.transport[tile, :, :, offset].astype(np.float64))
-            bands += of_sample[:, None] * columns * material.factors_at(term, row)[:, None] * curve
+            here = curve if curve.ndim == 2 else curve[material.level_at(row)]
+            bands += of_sample[:, None] * columns * material.factors_at(term, row)[:, None] * here
     return bands
 
 
@@ -102,7 +103,7 @@ def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: fl
     if frozen is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
         raise EditNotSupportedError(images.transfer.method, "a brush over a curve that is not open; open it first")
     bands = synthesis(term.ready.coefficients)
-    edges = np.linspace(0, 90, bands.shape[1] + 1)
+    edges = np.linspace(0, 90, bands.shape[-1] + 1)
     overlap = np.clip(np.minimum(edges[1:], to_deg) - np.maximum(edges[:-1], from_deg), 0, None) / np.diff(edges)
     part = np.empty_like(term.ready.image)
     frozen.write_image(analysis(bands * overlap), part)

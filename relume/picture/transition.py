@@ -28,7 +28,7 @@ from relume.picture.routes.mix import Mix
 from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared
 from relume.picture.routes.recall import Recall
 from relume.picture.view_images import ViewImages
-from relume.project.contraction import contract
+from relume.project.levels import contract_levels
 
 
 class Transition:
@@ -281,6 +281,6 @@ def _first_lacking(route: LightRoute, places: Iterable[Place], light: Light) -> 
 def _cost(place: Place, basis: EditBasis | None, hand: Hand) -> tuple[bool, bool, int]:
     """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
     live, touched = place.live, hand.touched
-    is_flat = basis is None and contract(live.term, live.target, None).kinds.size == 0
+    is_flat = basis is None and not any(c.kinds.size for c in contract_levels(live.term, live.target, None))
     is_other = touched is None or touched.place.material is not place.material
     return is_other, not is_flat, place.material.num_samples

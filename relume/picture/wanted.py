@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.levels import PLAIN, Levels, level_bands, level_values
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
 
@@ -24,7 +24,8 @@ class Wanted:
     Attributes:
         document: of the term in a look. term: the declaration of its model, fixed parameters put in.
         model: what tells it from other models.
-        bands: of each curve that depends on where light comes from. (3, J) float64 each
+        bands: of each curve that depends on where light comes from. (3, J) float64 each, or (L, 3, J) where a map of
+            roughness makes it differ from level to level
         outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
     """
 
@@ -35,11 +36,15 @@ class Wanted:
     outgoing: F32 | None
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], theta_o: F64) -> Wanted:
-        """Read a term document. theta_o: angle at which each sample is seen, radians. (samples,)"""
+    def of(cls, document: Mapping[str, Any], theta_o: F64, levels: Levels = PLAIN) -> Wanted:
+        """Read a term document.
+
+        Args:
+            theta_o: angle at which each sample is seen, radians. (samples,) levels: of roughness, of the samples.
+        """
         declared = TERMS[document["model"]]
         term = declared.settled(document)
-        bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-        values = [curve_values(document, curve, theta_o) for curve in term.curves if curve.outgoing]
+        bands = {c.name: level_bands(document, c, levels) for c in term.curves if not c.outgoing}
+        values = [level_values(document, c, theta_o, levels) for c in term.curves if c.outgoing]
         outgoing = np.asarray(np.prod(values, axis=0), np.float32) if values else None
         return cls(document, term, (document["model"], declared.fixed_values(document)), bands, outgoing)

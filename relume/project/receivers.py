@@ -123,6 +123,7 @@ class Receivers:
         rays: light that arrives along rays; none where only the environment's triangles are meant.
         uv: where they lie in textures, see `relume.trace.surface.Surface`; None where that is not known.
             (n, 5) float32
+        level: of roughness, see `relume.project.levels`; None where all are alike. (n,) uint8
     """
 
     points: Points
@@ -130,6 +131,7 @@ class Receivers:
     visible: NDArray[np.uint8]
     rays: Sequence[Rays] = ()
     uv: F32 | None = None
+    level: NDArray[np.uint8] | None = None
 
     @property
     def normal(self) -> F32:
@@ -144,4 +146,6 @@ class Receivers:
     def places(self, chosen: NDArray[np.integer]) -> Receivers:
         """Choose some of them, without their light."""
         uv = None if self.uv is None else self.uv[chosen]
-        return Receivers(self.points.rows(chosen), self.wo[chosen], np.empty((len(chosen), 0), np.uint8), uv=uv)
+        level = None if self.level is None else self.level[chosen]
+        nothing = np.empty((len(chosen), 0), np.uint8)
+        return Receivers(self.points.rows(chosen), self.wo[chosen], nothing, uv=uv, level=level)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
 from relume.reference.indirect import reference_indirect
+from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels, texels_of
@@ -129,18 +129,22 @@ def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
 
 def _add_direct(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[float], object]) -> None:
     """Add light that comes directly from lights, and that of surfaces which shine themselves."""
-    num_samples = max(1, shot.on_surface.stop)
-    for number, material in enumerate(shot.scene.materials):
-        rows = shot.rows(number)
-        terms: list[Any] = list(shot.look.materials[material.name].terms)
+    num_samples, kinds = max(1, shot.on_surface.stop), kinds_of(shot.scene, shot.look)
+    kind = kinds.of(shot.samples.material[shot.on_surface], shot.points.roughness[shot.on_surface])
+    done = 0
+    for number, terms in enumerate(kinds.terms):
+        of_kind = np.flatnonzero(kind == number)
 
-        def share_of_all(share: float, rows: slice = rows) -> None:
-            progress((rows.start + share * (rows.stop - rows.start)) / num_samples)
+        def share_of_all(share: float, before: int = done, num: int = len(of_kind)) -> None:
+            progress((before + share * num) / num_samples)
 
-        radiance[rows] += reference_radiance(
-            shot.geometry, shot.texels, shot.points.rows(rows), [terms], draw.spp,
+        radiance[of_kind] += reference_radiance(
+            shot.geometry, shot.texels, shot.points.rows(of_kind), [terms], draw.spp,
             share_of_all, draw.cancelled, draw.pass_index, shot.lamps,
         )[0]  # fmt: skip
+        done += len(of_kind)
+    for number, material in enumerate(shot.scene.materials):
+        rows = shot.rows(number)
         if (emission := emission_of(shot.lamps, material.name)).any():
             front = shot.geometry.is_front(shot.eye.astype(np.float32), shot.points.position[rows])
             radiance[rows] += emission * (front | material.double_sided)[:, None]
@@ -175,7 +179,7 @@ def points_of(samples: ViewSamples, eye: F64) -> Points:
     towards = eye - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    return Points(points.position, points.normal, points.tangent, wo, textures)
+    return Points(points.position, points.normal, points.tangent, wo, textures, surface.roughness)
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:

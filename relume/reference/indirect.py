@@ -8,14 +8,14 @@ Every surface reflects by all its terms. It shares neither cells nor links with 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
 from relume.look import Look
+from relume.reference.kinds import Terms, kinds_of
 from relume.reference.lobes import Lobe
 from relume.reference.local import lamps_of
 from relume.reference.radiance import Points, lobes_of, reference_radiance
@@ -27,7 +27,6 @@ from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-Terms = Sequence[Mapping[str, Any]]
 
 _TEXTURE_ANGLE = 1e-3
 _LEAST_CHANCE = 0.05
@@ -62,12 +61,13 @@ def reference_indirect(
         The mean over paths and its variance. (2, n, 3) float64
     Cost: O(n · num_paths · num_bounces · spp) shadow rays.
     """
-    terms: list[Terms] = [look.materials[m.name].terms for m in scene.materials]
+    kinds = kinds_of(scene, look)
+    terms = kinds.terms
     lobes, lamps = [lobes_of(of_material) for of_material in terms], lamps_of(scene, look)
     total, squares = np.zeros((2, points.num_points, 3))
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
-        here, of = points, np.asarray(material)
+        here, of = points, kinds.of(np.asarray(material), points.roughness)
         rows, weight = np.arange(points.num_points), np.ones((points.num_points, 3))
         found = np.zeros((points.num_points, 3))
         for bounce in range(num_bounces):
@@ -75,7 +75,8 @@ def reference_indirect(
             weight = weight * share
             hits = trace_from(geometry.embree, here.position, directions)
             hit = np.nonzero(hits.face >= 0)[0]
-            here, of = _places(scene, geometry, hits, directions, hit)
+            here, hit_material = _places(scene, geometry, hits, directions, hit)
+            of = kinds.of(hit_material, here.roughness)
             rows, weight = rows[hit], weight[hit]
             here, of, rows, weight = _survivors(here, of, rows, weight, rng)
             if bounce + 1 < first_bounce:
@@ -83,6 +84,8 @@ def reference_indirect(
             arriving = np.zeros((len(rows), 3))
             for index, of_material in enumerate(terms):
                 at = np.nonzero(of == index)[0]
+                if not len(at):
+                    continue
                 drawn = (seed * num_paths + path) * _MOST_BOUNCES + bounce
                 arriving[at] = reference_radiance(
                     geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn, lamps=lamps
@@ -95,8 +98,8 @@ def reference_indirect(
 
 
 def _survivors(
-    here: Points, of: NDArray[np.integer], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
-) -> tuple[Points, NDArray[np.integer], NDArray[np.intp], F64]:
+    here: Points, of: NDArray[np.int64], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
+) -> tuple[Points, NDArray[np.int64], NDArray[np.intp], F64]:
     """Russian roulette: dim paths end early, and those that go on stand for them."""
     chance = np.clip(weight.max(axis=1, initial=0.0), _LEAST_CHANCE, 1.0)
     alive = np.nonzero(rng.random(len(rows)) < chance)[0]
@@ -110,12 +113,12 @@ def _places(
     some = hits.rows(hit)
     surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    points = Points(*surface.points[:3], -directions[hit], textures)
+    points = Points(*surface.points[:3], -directions[hit], textures, surface.roughness)
     return points, geometry.face_material[some.face]
 
 
 def _scattered(
-    terms: Sequence[Terms], lobes: Sequence[Sequence[Lobe]], points: Points, material: NDArray[np.integer],
+    terms: Sequence[Terms], lobes: Sequence[Sequence[Lobe]], points: Points, kind: NDArray[np.integer],
     rng: np.random.Generator,
 ) -> tuple[F32, F64]:  # fmt: skip
     """Draw a direction for each point by one of its material's lobes.
@@ -127,7 +130,9 @@ def _scattered(
     wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
     wi, share = np.zeros((points.num_points, 3)), np.zeros((points.num_points, 3))
     for index, (of_material, of_lobes) in enumerate(zip(terms, lobes, strict=True)):
-        at = np.nonzero(material == index)[0]
+        at = np.nonzero(kind == index)[0]
+        if not len(at):
+            continue
         chosen = rng.integers(len(of_lobes), size=len(at))
         for k, lobe in enumerate(of_lobes):
             some = at[chosen == k]

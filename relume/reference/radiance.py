@@ -43,6 +43,7 @@ class Points:
     Attributes:
         position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
         textures: what multiplies a term that names it, "diffuse" and "specular". (n, 3) float32 each
+        roughness: see `relume.trace.surface.Surface`. (n,) float32
     """
 
     position: F32
@@ -50,6 +51,7 @@ class Points:
     tangent: F32
     wo: F32
     textures: Mapping[str, F32]
+    roughness: F32
 
     @property
     def num_points(self) -> int:
@@ -65,7 +67,8 @@ class Points:
     def rows(self, index: slice | NDArray[np.intp]) -> Points:
         """Some of the points."""
         textures = {name: values[index] for name, values in self.textures.items()}
-        return Points(self.position[index], self.normal[index], self.tangent[index], self.wo[index], textures)
+        frame = self.normal[index], self.tangent[index], self.wo[index]
+        return Points(self.position[index], *frame, textures, self.roughness[index])
 
 
 @dataclass(frozen=True)
@@ -85,9 +88,9 @@ def _tabulate(document: Document) -> _Tables:
     return _tables_of(json.dumps(document, sort_keys=True))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=128)
 def _tables_of(term_text: str) -> _Tables:
-    """Paths ask for the terms of a scene at every bounce; some megabytes each."""
+    """Paths ask for the terms of a scene at every bounce, of rough and smooth texels; some megabytes each."""
     document = json.loads(term_text)
     term = TERMS[document["model"]].settled(document)
     curves = [curve for curve in term.curves if not curve.outgoing]

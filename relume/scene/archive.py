@@ -210,14 +210,15 @@ def _assemble_glass(document: dict[str, Any]) -> Glass:
 
 
 def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], coding: dict[str, Any] | None) -> Texture:
-    is_image = pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.size > 0
+    channels = 1 if coding is not None and coding["kind"] == "share" else 3
+    is_image = pixels.ndim == 3 and pixels.shape[2] == channels and pixels.size > 0
     if not is_image or pixels.dtype != (np.float32 if coding is None else np.uint8):
         raise SceneError(f"a texture of the scene has the wrong shape or type; {REMEDY}")
     wrap_u, wrap_v = map(str, wrap)
     if coding is None:
         return Texture(pixels, (wrap_u, wrap_v))
     red, green, blue = map(float, coding["scale"])
-    if coding["kind"] not in ("srgb", "normal"):
+    if coding["kind"] not in ("srgb", "normal", "share"):
         raise SceneError(f"a texture of the scene has a coding that is not known; {REMEDY}")
     return Texture(pixels, (wrap_u, wrap_v), Coding(str(coding["kind"]), (red, green, blue), float(coding["turn"])))
 

@@ -24,15 +24,17 @@ def decode(texels: NDArray[Any], coding: Coding | None) -> F32:
     """Find the values of texels.
 
     Args:
-        texels: bytes; values themselves where there is no coding. (..., 3)
+        texels: bytes; values themselves where there is no coding. (..., 3), or (..., 1) of shares
     Returns:
-        Linear RGB, or unit normals. (..., 3) float32
+        Linear RGB, unit normals, or shares. Shaped like `texels`, float32
     """
     if coding is None:
         return np.asarray(texels, np.float32)
     scale = np.array(coding.scale, np.float32)
     if coding.kind == "srgb":
         return np.asarray(SRGB_TO_LINEAR[texels] * scale)
+    if coding.kind == "share":
+        return np.asarray(texels * (scale[:1] / np.float32(255)), np.float32)
     normals = (texels.astype(np.float32) / np.float32(127.5) - np.float32(1)) * scale
     if coding.turn:
         c, s = np.cos(coding.turn), np.sin(coding.turn)
@@ -45,7 +47,7 @@ def decode(texels: NDArray[Any], coding: Coding | None) -> F32:
 
 
 def rows_of(texture: Texture) -> Iterator[F32]:
-    """The values of a texture, some rows after others. (rows, width, 3) each"""
+    """The values of a texture, some rows after others. (rows, width, 3 or 1) each"""
     for start in range(0, len(texture.pixels), ROWS_AT_ONCE):
         yield decode(texture.pixels[start : start + ROWS_AT_ONCE], texture.coding)
 

@@ -27,7 +27,7 @@ class Coding:
     """What the bytes of a texture stand for: see `relume.scene.coding.decode`.
 
     Attributes:
-        kind: "srgb", display values of colours; or "normal", normals of tangent space.
+        kind: "srgb", display values of colours; "normal", normals of tangent space; or "share", one number of [0, 1].
         scale: multiplies the values. turn: of normals about +Z, radians.
     """
 
@@ -41,7 +41,8 @@ class Texture:
     """An image, ready to be sampled.
 
     Attributes:
-        pixels: top row first. (height, width, 3) uint8 where it has a coding, else float32, the values themselves
+        pixels: top row first. (height, width, 3) uint8 where it has a coding, else float32, the values themselves;
+            (height, width, 1) of shares
         wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
         coding: what bytes stand for; None where pixels are linear RGB, or normals.
     """
@@ -112,7 +113,8 @@ class Material:
     Attributes:
         terms: the material's default terms as they stand in a look document.
         textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
-            `textures["diffuse"]`. Known channels: "diffuse", "specular".
+            `textures["diffuse"]`. Known channels: "diffuse", "specular"; and "roughness", over the roughness that
+            terms say, which scales the width of those with `"roughness_map": true`.
         normal_map: tangent-space normals in [-1, 1]; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         catcher: it is a ground that looks may show by its shadows alone, and the default look does.

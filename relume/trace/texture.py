@@ -28,7 +28,7 @@ class MipMap:
             self.levels.append(self._halved(len(self.levels) - 1))
 
     def level(self, k: int) -> F32:
-        """The values of a level. (height, width, 3) float32"""
+        """The values of a level. (height, width, channels) float32"""
         return decode(self.levels[k], self.coding if k == 0 else None)
 
     def _halved(self, k: int) -> NDArray[np.float16]:
@@ -54,12 +54,12 @@ class MipMap:
         Args:
             uv: v from the top. (n, 2) float32. footprint: side of the filter in uv. (n,) float32
         Returns:
-            (n, 3) float32
+            (n, channels) float32
         """
         texels = np.maximum(footprint * max(self.levels[0].shape[:2]), 1.0)
         level = np.minimum(np.log2(texels), len(self.levels) - 1)
         lower = np.floor(level).astype(np.int64)
-        out = np.zeros((len(uv), 3), np.float32)
+        out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)
         for k in np.unique(np.concatenate([lower, np.minimum(lower + 1, len(self.levels) - 1)])):
             share = np.maximum(1 - np.abs(level - k), 0)
             rows = np.nonzero(share > 0)[0]

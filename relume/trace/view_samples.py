@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
 from relume.scene.model import Scene
+from relume.scene.roughness import level_of, levels_of
 from relume.trace.cutout_filter import EVERYWHERE
 from relume.trace.geometry import Geometry
 from relume.trace.glass import has_glass, layers_of
@@ -31,7 +32,8 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 @dataclass(frozen=True)
 class ViewSamples:
-    """Samples sorted by material, then along a Morton curve: neighbours in memory are neighbours in the picture.
+    """Samples sorted by material, by level of roughness, then along a Morton curve: neighbours in memory are neighbours
+    in the picture.
 
     Attributes:
         pixel: row-major index. (n,) uint32
@@ -40,6 +42,7 @@ class ViewSamples:
         surface: points and textures; for background samples the position is the ray's direction and `diffuse` the
             environment's radiance in it.
         num_rays: how many were traced to find them.
+        level: of roughness, see `relume.scene.roughness`; 0 where the material has but one. (n,) uint8
         through: what glass before a sample lets through; None where there is none. Samples on glass and those behind
             it have the same shares of a pixel. (n, 3) float32
     """
@@ -49,6 +52,7 @@ class ViewSamples:
     material: NDArray[np.uint16]
     surface: Surface
     num_rays: int
+    level: NDArray[np.uint8]
     through: F32 | None = None
 
     @property
@@ -73,6 +77,22 @@ def _shared_chances(pixel: NDArray[np.int64]) -> F32:
     places = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
     offset = (pixel[:, None] * _GOLDEN) % 1  # eighths alone would be seen as steps
     return np.asarray((places + offset) / POSITIONS_A_PIXEL + 1e-6, np.float32).ravel()
+
+
+def _thresholds(pixel: NDArray[np.int64], width: int) -> F32:
+    """Numbers between 0 and 1 that differ much from pixel to pixel (interleaved gradient noise, Jimenez 2014). (n,)"""
+    y, x = np.divmod(pixel, width)
+    return np.asarray((52.9829189 * ((0.06711056 * x + 0.00583715 * y) % 1)) % 1, np.float32)
+
+
+def _levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshold: F32) -> NDArray[np.uint8]:
+    """The level of roughness of each sample, by its material. (n,)"""
+    level = np.zeros(len(material), np.uint8)
+    for index, of_scene in enumerate(scene.materials):
+        if ratios := levels_of(of_scene):
+            rows = np.flatnonzero(material == index)
+            level[rows] = level_of(ratios, roughness[rows], threshold[rows])
+    return level
 
 
 def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int]) -> ViewSamples:
@@ -105,10 +125,11 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     )
     hit = chosen.hits.face >= 0
     material = np.where(hit, geometry.face_material[np.maximum(chosen.hits.face, 0)], BACKGROUND).astype(np.uint16)
-    order = np.lexsort((_morton(chosen.pixel, width), material))
     pixel_angle = camera.yfov / height
-    towards = chosen.directions[order]
-    full = surface_at(geometry, chosen.hits.rows(order), towards, scene.materials, pixel_angle, origin)
+    seen = surface_at(geometry, chosen.hits, chosen.directions, scene.materials, pixel_angle, origin)
+    level = _levels(scene, material, seen.roughness, _thresholds(chosen.pixel, width))
+    order = np.lexsort((_morton(chosen.pixel, width), level, material))
+    full, towards = seen.rows(order), chosen.directions[order]
     outside = ~hit[order]
     full.diffuse[outside] = lookup(scene.environment.radiance, towards[outside])
     return ViewSamples(
@@ -117,5 +138,6 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
         material[order],
         full,
         sum(len(layer.ray) for layer in (*layers, *more)),
+        level[order],
         chosen.through[order] if has_glass(scene.materials) else None,
     )

@@ -90,3 +90,22 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
     except StoreError:
         return None
     return np.asarray(store.read(f"views/{k}/uv", start, stop), np.float32)
+
+
+def read_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:
+    """Read the levels of roughness of all materials: each one's roughness over the material's, none without a map."""
+    found = store.attributes.get("roughness_levels")
+    if found is None:
+        return ((),) * len(store.attributes["materials"])
+    return tuple(tuple(map(float, of_material)) for of_material in found)
+
+
+def read_levels(store: StoreReader, k: int, num_samples: int) -> NDArray[np.uint8]:
+    """Read the level of roughness of each sample on a surface.
+
+    Args:
+        store: an open store. k: number of the view. num_samples: on surfaces.
+    """
+    if not any(read_ratios(store)):
+        return np.zeros(num_samples, np.uint8)
+    return np.asarray(store.read(f"views/{k}/level", 0, num_samples), np.uint8)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
+from relume.brdf.levels import Levels
 from relume.errors import ChunkDamagedError
 from relume.memory import Memory
 from relume.points import Points
@@ -19,7 +20,16 @@ from relume.project.sent import Sent
 from relume.scene.model import Camera
 from relume.trace.view_samples import BACKGROUND
 from relume.views.sharing import sharing
-from relume.views.store_io import read_camera, read_gather_rays, read_points, read_seeds, read_uv, towards_eye
+from relume.views.store_io import (
+    read_camera,
+    read_gather_rays,
+    read_levels,
+    read_points,
+    read_ratios,
+    read_seeds,
+    read_uv,
+    towards_eye,
+)
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
@@ -38,6 +48,7 @@ class View:
         order: (n,) int32. gains: what the radiance of each is multiplied by for its pixel, in that order: its share of
             it, and what glass lets through that is before it. (n, 1) float32, or (n, 3) where there is glass
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
+        level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
     """
 
     camera: Camera
@@ -54,6 +65,8 @@ class View:
     gains: F32
     textures: dict[str, F32]
     cos_theta_o: NDArray[np.float64]
+    level: NDArray[np.uint8]
+    ratios: tuple[tuple[float, ...], ...]
 
     @property
     def name(self) -> str:
@@ -73,6 +86,10 @@ class View:
     def rows(self, material: int) -> slice:
         """Find the samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
+
+    def levels(self, material: int) -> Levels:
+        """Find how rough a material's samples are."""
+        return Levels(self.ratios[material], self.level[self.rows(material)])
 
     def points(self, material: int) -> Points:
         """Read a material's samples from the store as points."""
@@ -110,7 +127,9 @@ class View:
         points = self.points(material)
         gathered = () if reflected is None else (self.gather_rays(material, reflected),)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
-        return Receivers(points, towards_eye(self.camera, points.position), visible, (*gathered, *local), uv)
+        level = self.level[rows] if self.ratios[material] else None
+        wo = towards_eye(self.camera, points.position)
+        return Receivers(points, wo, visible, (*gathered, *local), uv, level)
 
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""
@@ -220,4 +239,6 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         gains=np.ascontiguousarray(gains[order], np.float32),
         textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
         cos_theta_o=np.clip(cosine, 0, 1),
+        level=read_levels(store, index, surface),
+        ratios=read_ratios(store),
     )

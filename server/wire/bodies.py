@@ -149,8 +149,8 @@ class MaterialMapBody(Body):
 
 
 class ModelBody(Body):
-    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, and `data_prefix`
-    how the names of such data begin (see `data`)."""
+    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the
+    parameter that maps of roughness scale, and `data_prefix` how the names of such data begin (see `data`)."""
 
     model: str
     label: str
@@ -158,6 +158,7 @@ class ModelBody(Body):
     source: str
     texture: str
     needs_data: bool
+    width: str | None
     data_prefix: str | None
     parameters: list[ParameterBody]
     curves: list[CurveBody]

@@ -249,7 +249,8 @@ def against_paths(scene, transfer, index, every, spp):
         radiance += image(document["model"], bands, None, transfer.lights, dark) * document["color"]
     position = view.store.read("views/0/position", rows.start, rows.stop)
     ones = np.ones_like(position)
-    points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}).rows(chosen)
+    points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
+    points = points.rows(chosen)
     traced = merge(scene), texels_of(scene.environment), look, points, np.full(len(chosen), index)
     return radiance[chosen], *reference_indirect(scene, *traced, 4, 48, spp, seed=index), position[chosen]
 

@@ -44,10 +44,24 @@ def test_columns_list_what_changes_and_nothing_else():
     change = np.zeros((3, 16))
     change[0, [3, 9]], change[2, 15] = [1.5, -2], 1e-20
     columns = columns_of(change)
-    assert columns.count.tolist() == [2, 0, 1]
-    assert columns.index[0, :2].tolist() == [3, 9]
-    assert columns.change[0, :2].tolist() == [1.5, -2]
-    assert columns.index[2, 0] == 15
+    assert columns.count.tolist() == [[2, 0, 1]]
+    assert columns.index[0, 0, :2].tolist() == [3, 9]
+    assert columns.change[0, 0, :2].tolist() == [1.5, -2]
+    assert columns.index[0, 2, 0] == 15
+
+
+@pytest.mark.parametrize("bounds", [[0, 96], [0, 10, 10, 61, 96], [0, 0, 48, 96], [0, 32, 64, 90]])
+def test_each_level_has_columns_of_its_own(bounds):
+    transport = RNG.normal(size=(2, 3, 8, 48)).astype(np.float32)
+    image = np.zeros((2, 3, 48), np.float32)
+    change = RNG.normal(size=(len(bounds) - 1, 3, 8)) * (RNG.random((len(bounds) - 1, 3, 8)) < 0.7)
+    stream(transport, columns_of(change), image, np.array(bounds))
+    level = np.searchsorted(bounds, np.arange(96), side="right") - 1
+    expected = np.zeros((2, 3, 48))
+    for sample in range(bounds[-1]):
+        tile, place = divmod(sample, 48)
+        expected[tile, :, place] = np.einsum("cj,cj->c", change[level[sample]], transport[tile, :, :, place])
+    np.testing.assert_allclose(image, expected, atol=1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -54,6 +54,7 @@ def test_floor_under_one_texel_has_the_closed_form() -> None:
         tangent=np.array([[1, 0, 0]] * 2, np.float32),
         wo=np.array([[0, 1, 0]] * 2, np.float32),
         textures={},
+        roughness=np.ones(2, np.float32),
     )
     found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[WHITE]])[0]
     expected = radiance[4, 16] * texel_solid_angles(16, 32)[4] / np.pi * wi[1]
@@ -82,6 +83,7 @@ def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) 
     points = Points(
         np.array([[0, 0.1, 0]], np.float32), np.array([[0, 1, 0]], np.float32), np.array([[0, 0, 1]], np.float32),
         wo[None].astype(np.float32), {"diffuse": np.array([[1.0, 0.5, 0.25]], np.float32)},
+        np.ones(1, np.float32),
     )  # fmt: skip
     found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[document]])[0, 0]
     frame = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)  # rows: tangent, n × t, normal
@@ -128,7 +130,8 @@ def test_drawn_texels_estimate_all_of_them() -> None:
     geometry, texels = merge(scene), texels_of(scene.environment)
     count = 16 * 64  # one point again and again: packets differ by their draw alone
     repeat = lambda row: np.repeat(np.array([row], np.float32), count, axis=0)  # noqa: E731
-    points = Points(repeat([0.6, 1e-3, 0.4]), repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8]), {})
+    frame = repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8])
+    points = Points(repeat([0.6, 1e-3, 0.4]), *frame, {}, repeat([1.0])[:, 0])
     terms = [WHITE, {**WHITE, "model": "cook_torrance", "params": {"sigma": 0.3}}]
     truth = reference_radiance(geometry, texels, points.rows(slice(0, 1)), [terms])[0, 0]
     spread = []

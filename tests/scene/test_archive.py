@@ -14,7 +14,7 @@ from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.remarks import simplified
 from relume.scene.archive import load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 
 def small_scene(**changes: object) -> Scene:
@@ -224,3 +224,13 @@ def test_glass_that_nothing_is_made_of_is_refused(fields: dict[str, object]) -> 
     glass = dataclasses.replace(Glass(), **fields)
     with pytest.raises(SceneError, match="glass of material"):
         small_scene(materials=[dataclasses.replace(small_scene().materials[0], glass=glass)])
+
+
+def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
+    pixels = np.arange(12, dtype=np.uint8).reshape(3, 4, 1)
+    texture = Texture(pixels, ("clamp", "mirror"), Coding("share", (2.0, 2.0, 2.0)))
+    material = dataclasses.replace(small_scene().materials[0], textures={"roughness": texture})
+    save_scene(small_scene(materials=[material]), tmp_path)
+    kept = load_scene(tmp_path).materials[0].textures["roughness"]
+    np.testing.assert_array_equal(kept.pixels, pixels)
+    assert (kept.wrap, kept.coding) == (texture.wrap, texture.coding)

@@ -13,6 +13,7 @@ from texture_values import values_of
 
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
+from relume.scene.coding import mean_of
 from relume.scene.gltf import import_gltf
 from relume.scene.model import Material, Mesh, Scene
 
@@ -193,14 +194,23 @@ def test_metallic_textures_share_out_base_colour() -> None:
     assert ggx["texture"] == "specular"
 
 
-def test_a_varying_roughness_texture_becomes_its_mean_with_a_warning() -> None:
+def test_a_varying_roughness_texture_scales_the_width_and_a_plain_one_is_its_mean() -> None:
     glb = Glb()
     packed = glb.texture([[[0, 0, 0], [0, 255, 0]]])
     pbr = {"metallicRoughnessTexture": {"index": packed}, "roughnessFactor": 0.8}
     scene = imported(glb.quad({"name": "Clay", "pbrMetallicRoughness": pbr}))
     assert scene.materials[0].terms[1]["params"]["roughness"] == pytest.approx(0.4)
-    assert len(scene.warnings) == 1
-    assert "'Clay'" in scene.warnings[0]
+    assert scene.materials[0].terms[1]["roughness_map"] is True
+    assert scene.materials[0].textures["roughness"].pixels.tolist() == [[[0], [255]]]
+    assert mean_of(scene.materials[0].textures["roughness"]).tolist() == pytest.approx([1.0])
+    assert not scene.warnings
+
+    glb = Glb()
+    plain = glb.texture([[[0, 200, 0], [0, 201, 0]]])
+    pbr = {"metallicRoughnessTexture": {"index": plain}}
+    material = material_of({"pbrMetallicRoughness": pbr}, glb)
+    assert "roughness" not in material.textures
+    assert "roughness_map" not in material.terms[1]
 
 
 def test_webp_textures_are_read() -> None:

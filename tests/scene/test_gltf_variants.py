@@ -126,3 +126,17 @@ def test_too_many_variants_are_refused() -> None:
     glb.document["extensions"]["KHR_materials_variants"]["variants"] = [{}] * 101
     with pytest.raises(SceneError, match="variants"):
         imported(glb)
+
+
+def test_a_variant_as_rough_follows_the_map_and_one_with_another_has_its_mean() -> None:
+    glb = Glb()
+    own, other = (glb.texture([[[0, low, 0], [0, high, 0]]]) for low, high in ((50, 200), (10, 30)))
+    rough = [{"metallicRoughnessTexture": {"index": index}} for index in (own, own, other)]
+    materials = [plain(name, 1, 1, 1, **of) for name, of in zip(("own", "same", "smooth"), rough, strict=True)]
+    mappings = [[{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]]
+    scene = imported(dressed(glb, materials, mappings))
+    day, night = (scene.variants[name]["materials"]["own"]["terms"][1] for name in ("day", "night"))
+    assert day["roughness_map"] is True
+    assert "roughness_map" not in night
+    assert night["params"]["roughness"] == pytest.approx(20 / 255, abs=1e-6)
+    assert any("roughness" in warning for warning in scene.warnings)

@@ -118,6 +118,20 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     assert len(scene.warnings) == 1
 
 
+def test_a_map_of_roughness_scales_the_width_and_its_mean_is_what_terms_say(tmp_path: Path) -> None:
+    encoded = io.BytesIO()
+    PIL.Image.fromarray(np.array([[51, 153]], np.uint8)).save(encoded, "PNG")
+    (tmp_path / "rough.png").write_bytes(encoded.getvalue())
+    (tmp_path / "m.mtl").write_text("newmtl a\nPr 0.5\nmap_Pr rough.png\nnewmtl b\nPr 0\nmap_Pr rough.png\n")
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n")
+    half, whole = import_scene(path, "thing", LIGHT).materials
+    assert half.terms[1]["params"]["roughness"] == pytest.approx(0.2)
+    assert whole.terms[1]["params"]["roughness"] == pytest.approx(0.4)
+    assert half.terms[1]["roughness_map"] is True
+    np.testing.assert_allclose(values_of(half.textures["roughness"]), [[[0.5], [1.5]]], rtol=1e-6)
+
+
 def shining(tmp_path: Path, library: str, faces: str) -> Scene:
     (tmp_path / "m.mtl").write_text(library)
     path = tmp_path / "thing.obj"

@@ -27,6 +27,7 @@ def make_view(width=100, height=70, seed=0):
         camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, memory=None, key="",
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         order=order, gains=weight[order, None].astype(np.float32), textures={}, cos_theta_o=np.ones(len(pixel)),
+        level=np.zeros(len(pixel), np.uint8), ratios=((),),
     )  # fmt: skip
 
 

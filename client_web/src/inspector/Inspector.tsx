@@ -72,7 +72,7 @@ function Catcher({ material }: { material: string }) {
 /** What of glass is edited here, and what is not. */
 function Glass({ material }: { material: string }) {
   if (materialOf(material)?.is_glass !== true) return null;
-  return <p class="glass">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
+  return <p class="aside">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
 }
 
 export function Inspector() {

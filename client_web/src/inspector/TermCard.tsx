@@ -9,11 +9,12 @@ import type { ModelBody, Rgb, Term } from "../protocol";
 import { defaultLook } from "../state/look";
 import { modelOf, models } from "../state/scene";
 import { selectedCurve, selectedTerm, selectTerm } from "../state/selection";
+import { moves } from "../state/views";
 import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
 import { InMotion } from "./InMotion";
 import { ParamRow } from "./ParamRow";
-import { modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
+import { hasRoughnessMap, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 
 interface Props {
   material: string;
@@ -84,6 +85,35 @@ function Texture({ channels, value, onChange }: TextureProps) {
   );
 }
 
+interface RoughnessProps {
+  label: string;
+  /** Of the width's curves some are drawn. */
+  isDrawn: boolean;
+  value: boolean;
+  onChange(value: boolean): void;
+}
+
+/** Whether the term is as rough as the material's image says. */
+function RoughnessMap({ label, isDrawn, value, onChange }: RoughnessProps) {
+  return (
+    <>
+      <label class="param texture">
+        <span class="param-label">Roughness map</span>
+        <select value={value ? "map" : ""} onChange={(event) => onChange(event.currentTarget.value === "map")}>
+          <option value="">None</option>
+          <option value="map">As in the scene</option>
+        </select>
+      </label>
+      {value && (
+        <p class="aside">
+          {isDrawn ? "Curves that are drawn replace the map." : `“${label}” scales the map; curves show its mean`}
+          {!isDrawn && (moves.value ? ", and so does the view while the eye moves." : ".")}
+        </p>
+      )}
+    </>
+  );
+}
+
 export function TermCard({ material, term, index, onRemove }: Props) {
   const model = modelOf(term);
   const path = pointer("materials", material, "terms", index);
@@ -134,6 +164,14 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             value={term.texture ?? null}
             onChange={(value) => edit("Texture", `${path}/texture`, value)}
           />
+          {model?.width != null && hasRoughnessMap(material) && (
+            <RoughnessMap
+              label={model.parameters.find((info) => info.name === model.width)?.label ?? model.width}
+              isDrawn={model.curves.some((curve) => curve.parameters.includes(model.width as string) && term.curves?.[curve.name] !== undefined)}
+              value={term.roughness_map === true}
+              onChange={(value) => edit("Roughness map", `${path}/roughness_map`, value)}
+            />
+          )}
           {model?.parameters.map((info) => (
             <ParamRow
               key={info.name}

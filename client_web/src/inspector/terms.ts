@@ -11,6 +11,11 @@ export function texturesOf(material: string): string[] {
   return Object.keys(TEXTURES).filter((channel) => own.some((term) => term.texture === channel));
 }
 
+/** Whether a material of the scene has a map that its terms' widths may follow. */
+export function hasRoughnessMap(material: string): boolean {
+  return materialOf(material)?.terms.some((term) => term.roughness_map !== undefined) ?? false;
+}
+
 export function defaultTerm(model: ModelBody): Term {
   return {
     model: model.model,
@@ -26,15 +31,17 @@ export function modelsFor(term: Term | null, models: readonly ModelBody[]): read
   return models.filter(({ data_prefix: prefix }) => prefix === null || term?.data?.startsWith(prefix) === true);
 }
 
-/** The term under another model: colour and texture stay, and parameters of the same name. Drawn curves belong to
- * the old model's angles and go; a measured material stays where the new model is measured too. */
+/** The term under another model: colour and texture stay, and parameters of the same name; the map of roughness where
+ * the new model has a width. Drawn curves belong to the old model's angles and go; a measured material stays where the
+ * new model is measured too. */
 export function withModel(term: Term, name: string, models: readonly ModelBody[]): Term {
   const model = models.find((m) => m.model === name);
   if (model === undefined) return term;
   const params = Object.fromEntries(
     model.parameters.map((info) => [info.name, term.params?.[info.name] ?? info.default]),
   );
-  const { data, ...others } = term;
+  const { data, roughness_map: follows, ...others } = term;
   const measured = model.data_prefix !== null && data?.startsWith(model.data_prefix) === true ? { data } : {};
-  return { ...others, ...measured, model: name, params, curves: {} };
+  const mapped = follows === undefined || model.width === null ? {} : { roughness_map: follows };
+  return { ...others, ...measured, ...mapped, model: name, params, curves: {} };
 }

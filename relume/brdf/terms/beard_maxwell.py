@@ -82,4 +82,5 @@ BEARD_MAXWELL = Term(
     help="Painted surfaces as remote sensing knows them: tilted facets hide and shade each other.",
     fixed=("tau", "omega"),
     settle=settle,
+    width=("sigma", 2),
 )

@@ -27,4 +27,5 @@ BLINN_PHONG = Term(
     source="Nguyen 2010, tables 3 and 4: f = (s+2)/(2π) cos^s θh",
     texture="specular",
     help="A simple round highlight without Fresnel effect; reflects up to four times its colour at high exponents.",
+    width=("exponent", -4),
 )

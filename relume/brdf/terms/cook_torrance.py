@@ -57,4 +57,5 @@ COOK_TORRANCE = Term(
     source="Ben-Artzi 2006, eq. 10: f = D F G / (4π (n·wi)(n·wo))",
     texture="specular",
     help="Rough metal or plastic: a highlight of Beckmann-distributed facets with the Fresnel effect.",
+    width=("sigma", 2),
 )

@@ -69,4 +69,5 @@ GGX = Term(
     source="Walter 2007, eqs. 20, 33, 34: f = D F G1(wi) G1(wo) / (4 (n·wi)(n·wo))",
     texture="specular",
     help="The highlight of glTF materials, with a long soft tail.",
+    width=("roughness", 1),
 )

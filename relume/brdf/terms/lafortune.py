@@ -39,4 +39,5 @@ LAFORTUNE = Term(
     help="A highlight that leans away from the mirror direction, or back to the light.",
     fixed=("c_x", "c_y", "c_z"),
     settle=settle,
+    width=("exponent", -4),
 )

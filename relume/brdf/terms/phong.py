@@ -27,4 +27,5 @@ PHONG = Term(
     source="Phong 1975, as Mahajan 2008, eq. 5: f = (s+1)/(2π) cos^s θr",
     texture="specular",
     help="The oldest highlight: round at every angle, and never more light than arrives.",
+    width=("exponent", -4),
 )

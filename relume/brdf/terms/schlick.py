@@ -53,4 +53,5 @@ SCHLICK = Term(
     source="Schlick 1994, without masking: f = Z(θh) F(θd) / (4π (n·wi)(n·wo))",
     texture="specular",
     help="A cheap cousin of Cook–Torrance with a long tail; at the very horizon more light than arrives.",
+    width=("roughness", 4),
 )

@@ -45,4 +45,5 @@ WARD = Term(
     source="Ward 1992, eq. 4: f = exp(-tan² θh / α²) / (4π α² √((n·wi)(n·wo)))",
     texture="specular",
     help="A highlight fitted to measurements of paints, plastics and metals; darkens towards the rim.",
+    width=("alpha", 2),
 )

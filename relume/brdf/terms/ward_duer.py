@@ -30,4 +30,5 @@ WARD_DUER = Term(
     source="Dür 2006: f = exp(-tan² θh / α²) / (4π α² (n·wi)(n·wo))",
     texture="specular",
     help="Ward's highlight, as bright at the rim as in the middle; at the very horizon more than arrives.",
+    width=("alpha", 2),
 )

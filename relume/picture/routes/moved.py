@@ -21,6 +21,7 @@ from relume.picture.material_image import MaterialImage
 from relume.picture.view_images import ViewImages
 from relume.points import Points
 from relume.project.contraction import contract
+from relume.project.levels import contract_levels, runs
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import LocalRays, Receivers
 from relume.project.texels import texel_rows
@@ -100,14 +101,17 @@ class MovedLights:
 
     def _shaded(self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays]) -> Shaded:
         """What rays bring a term, in the threads of frames."""
-        points, contraction = replace(self._receivers(material), rays=rays), contract(live.term, live.target, None)
+        points = replace(self._receivers(material), rays=rays)
+        contractions = contract_levels(live.term, live.target, None)
         rows = np.zeros((material.num_samples, 3, 1), np.float32)
 
         def add(start: int, stop: int) -> None:
             if live.term.texels is not None and points.uv is not None:
                 rows[start:stop, :, 0] = texel_rows(live.term.texels, None, points, start, stop)
             else:
-                RayProjector(live.term, contraction, points, stop - start).add(start, stop, rows[start:stop])
+                for level, first, last in runs(points.level, len(contractions), start, stop):
+                    projector = RayProjector(live.term, contractions[level], points, last - first)
+                    projector.add(first, last, rows[first:last])
 
         for_shares(add, len(rows))
         return Shaded.of(rows[:, :, 0])
@@ -133,8 +137,10 @@ class MovedLights:
 
 def _even_factor(live: LiveTerm) -> NDArray[np.float64] | None:
     """What a term makes of all light that arrives; None where it asks where that comes from. (3,)"""
+    if not live.term.is_lambertian:
+        return None
     contraction = contract(live.term, live.target, None)
-    if not live.term.is_lambertian or contraction.kinds.size:
+    if contraction.kinds.size:
         return None
     upright = live.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))
     return np.asarray(contraction.constant * upright, np.float64)

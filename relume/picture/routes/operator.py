@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.operators.frozen import Frozen
-from relume.operators.stream import columns_of, stream
 from relume.picture.jobs import Place, Settle
 from relume.picture.shown import UNIT_ROUNDOFF, Shown, length_of
 
@@ -85,7 +84,7 @@ def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Frozen, max_coef
     assert ready.coefficients is not None
     shown, perfect = ready.coefficients, ready.basis.coefficients(moved)
     change = perfect - shown
-    budget = change.size if max_coefficients is None else 3 * max_coefficients
+    budget = change.size if max_coefficients is None else change.size // change.shape[-1] * max_coefficients
     if np.count_nonzero(change) > budget:
         weight = np.abs(change) * frozen.importance
         change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
@@ -93,7 +92,7 @@ def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Frozen, max_coef
         unsaid = {name: np.full_like(moved[name], np.nan) for name in ready.basis.moves}  # shows no curve exactly
         moved = {**moved, **unsaid}
     length = length_of(ready.image)
-    stream(frozen.transport, columns_of(change), ready.image)
+    frozen.add(change, ready.image)
     rounding = float(np.hypot(ready.rounding, _rounding(length, change, frozen)))
     after = replace(ready, bands=moved, coefficients=perfect, rounding=rounding)
     return after if rounding <= MAX_ROUNDING * length else _anew(after, frozen)
@@ -111,6 +110,6 @@ def _rounding(length: float, change: F64, frozen: Frozen) -> float:
 
     √n u (‖R‖ + Σ_j |Δc_j| ‖T_j‖); n in place of √n bounds it always, and is never met (Higham and Mary 2019).
     """
-    num = int(np.count_nonzero(change, axis=1).max())
-    added = float(np.sum(np.abs(change) * frozen.importance))
+    num = int(np.count_nonzero(change, axis=-1).max())
+    added = float(np.linalg.norm((np.abs(change) * frozen.importance).reshape(-1, 3 * change.shape[-1]).sum(axis=1)))
     return math.sqrt(num / _COLUMNS_A_SUM + _COLUMNS_A_SUM) * UNIT_ROUNDOFF * (length + added) if num else 0.0

@@ -66,6 +66,7 @@ def choose_sparse(transfer: Transfer, view: View, material: int) -> Sparse:
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
     _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
+    chosen.sort()  # samples of one level of roughness lie together
     turn = _PIXELS_A_TURN * step * view.points(material).normal
     place = np.concatenate([np.stack([x, y], axis=1), turn], axis=1)
     num = min(_NUM_NEIGHBOURS, len(chosen))

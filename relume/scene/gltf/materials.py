@@ -72,6 +72,8 @@ class MaterialReader:
         transmission = self._transmission(layers, what)
         glass = self._glass(surface, layers, transmission, what) if transmission > 0 else None
         surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
+        if strength > 0 and "roughness" in surface.textures:
+            self._warnings.append(simplified(f"the roughness texture of {what}, which is anisotropic, is its mean"))
         over = self._over(layers, strength, what)
         normal_map = self._normal_map(material.normalTexture, turn, what)
         if over.coat > 0 and normal_map is not None:
@@ -140,10 +142,6 @@ class MaterialReader:
         dielectric = _f0(layers.ior.ior) * np.array(specular.specularColorFactor)
         raster = self._raster(material, layers, what)
         roughness = raster.mean("packed", 1) * pbr.roughnessFactor
-        if raster.varies("packed", 1):
-            self._warnings.append(
-                simplified(f"the roughness texture of {what} is replaced by its mean, {roughness:.2f}")
-            )
         reflected = dielectric_share(
             float(np.minimum(dielectric, 1).max()) * specular.specularFactor, specular.specularFactor
         )
@@ -153,6 +151,8 @@ class MaterialReader:
             return Surface(factor * (1 - metallic), f0, mix(weight, 1, metallic), roughness, reflected)
         blend = Blend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
         textures = {"diffuse": self._kept(blend.diffuse())}
+        if roughness > 0 and raster.varies("packed", 1):
+            textures["roughness"] = self._kept(_over_mean(raster))
         lowest, highest, mean_f0, f90 = blend.f0_and_f90()
         if (highest - lowest).max() < 1e-6:
             return Surface(factor, lowest, f90, roughness, reflected, textures)
@@ -260,6 +260,13 @@ def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:
     pbr, specular = material.pbrMetallicRoughness, layers.specular
     images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
     return [*images, specular.specularTexture, specular.specularColorTexture]
+
+
+def _over_mean(raster: Raster) -> Texture:
+    """Roughness over its mean, texel by texel."""
+    most = 1 / raster.mean("packed", 1)
+    pixels = np.ascontiguousarray(raster.channel("packed", 1))
+    return Texture(pixels, raster.wrap, Coding("share", (most, most, most)))
 
 
 def _f0(ior: float) -> float:

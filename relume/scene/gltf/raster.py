@@ -10,7 +10,7 @@ import PIL.Image
 from relume.scene.gltf.images import U8
 
 Wrap = tuple[str, str]
-_NOISE = 2  # that lossy coding makes of one value
+NOISE = 2  # that lossy coding makes of one value
 
 
 class Raster:
@@ -37,7 +37,7 @@ class Raster:
         if (key, channel) not in self._channels:
             values = self.pixels(key)[..., channel, None]
             alike = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
-            self._channels[key, channel] = values if np.ptp(values) > _NOISE else alike
+            self._channels[key, channel] = values if np.ptp(values) > NOISE else alike
         return self._channels[key, channel]
 
     def mean(self, key: str, channel: int) -> float:
@@ -46,7 +46,7 @@ class Raster:
 
     def varies(self, key: str, channel: int) -> bool:
         """Whether a channel differs from texel to texel by more than the noise of its coding."""
-        return key in self._images and bool(np.ptp(self._images[key][..., channel]) > _NOISE)
+        return key in self._images and bool(np.ptp(self._images[key][..., channel]) > NOISE)
 
     def pixels(self, key: str) -> U8:
         """(height, width, 4); (1, 1, 4) white where there is no such image."""

@@ -34,7 +34,7 @@ class Surface:
         diffuse: albedo. f0, f90: reflectance head-on and at the horizon. (3,), (3,), one
         roughness: as artists know it.
         reflected: mean share that what is not metal reflects before light comes to what scatters it.
-        textures: multipliers of the two terms.
+        textures: multipliers of the two terms, and of the roughness.
     """
 
     diffuse: F64
@@ -89,7 +89,8 @@ def _highlight(surface: Surface, anisotropy: float) -> dict[str, Any]:
     f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
     if anisotropy == 0:
         params = _within(TERMS["ggx"], roughness=surface.roughness, f0=f0)
-        return {"model": "ggx", "color": color, "params": params}
+        follows = {"roughness_map": True} if "roughness" in surface.textures else {}
+        return {"model": "ggx", "color": color, "params": params, **follows}
     across = max(surface.roughness**2, 1e-3)
     along = across + (1 - across) * anisotropy**2
     params = _within(TERMS["ashikhmin_shirley"], nu=2 / along**2 - 2, nv=2 / across**2 - 2, f0=f0)

@@ -108,7 +108,8 @@ def _dressed(own: Understood, other: Understood, variant: str, warnings: list[Re
     if not _same_normals(own, other):
         warnings.append(simplified(f"{what} keeps the normal map it was baked with"))
     terms = []
-    for term in other.material.terms:
+    for given in other.material.terms:
+        term = _smoothed(own, other, given, what, warnings)
         channel = term.get("texture")
         if channel is None:
             terms.append(term)
@@ -121,6 +122,23 @@ def _dressed(own: Understood, other: Understood, variant: str, warnings: list[Re
         terms.append(term | {"color": [round(float(value), 6) for value in color], "texture": kept})
     pointer = ("materials", own.material.name, "terms")
     return [complete_term((*pointer, number), term, None) for number, term in enumerate(terms)]
+
+
+def _smoothed(
+    own: Understood, other: Understood, term: dict[str, Any], what: str, warnings: list[Remark]
+) -> dict[str, Any]:
+    """A term that follows a map of roughness follows none where the own material has not the same."""
+    if not term.get("roughness_map") or _same_image(own, other, "roughness"):
+        return term
+    warnings.append(simplified(f"{what} has a roughness texture of its own; its mean stands for it"))
+    return {name: value for name, value in term.items() if name != "roughness_map"}
+
+
+def _same_image(own: Understood, other: Understood, channel: str) -> bool:
+    mine, theirs = own.material.textures.get(channel), other.material.textures.get(channel)
+    if mine is None or theirs is None or own.uv_use != other.uv_use:
+        return False
+    return mine.coding == theirs.coding and np.array_equal(mine.pixels, theirs.pixels)
 
 
 def _kept_channel(own: Understood, other: Understood, image: Texture) -> tuple[str | None, F32]:

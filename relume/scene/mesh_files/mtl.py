@@ -19,6 +19,7 @@ from relume.scene.coding import mean_of
 from relume.scene.companions import Companions
 from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
+from relume.scene.gltf.raster import NOISE
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.model import Coding, Material, Opacity, Texture
 from relume.scene.opacity import make_opacity
@@ -106,7 +107,20 @@ class MaterialMaker:
         self._warn_of_the_rest(described, what)
         normal_map = self._image(described, "norm", f"the normal map of {what}", Coding("normal"))
         opacity = self._opacity(described, what)
-        return Material(own_name, _terms(described, textures), textures, normal_map, opacity=opacity)
+        terms = _terms(described, textures, self._roughness(described, textures, what))
+        return Material(own_name, terms, textures, normal_map, opacity=opacity)
+
+    def _roughness(self, described: Described, textures: dict[str, Texture], what: str) -> float | None:
+        """Pr times the mean of map_Pr, which becomes a texture where it says more; None where there are neither."""
+        given = described.numbers.get("Pr", [None])[0]
+        pixels = self._decoded(described, "map_Pr", f"map_Pr of {what}")
+        if pixels is None:
+            return given
+        mean = float(pixels[..., 0].mean()) / 255
+        if mean > 0 and np.ptp(pixels[..., 0]) > NOISE:
+            share = Coding("share", (1 / mean, 1 / mean, 1 / mean))
+            textures["roughness"] = Texture(np.ascontiguousarray(pixels[..., :1]), coding=share)
+        return (given or 1.0) * mean  # exporters write zeros where they mean the image
 
     def _opacity(self, described: Described, what: str) -> Opacity | None:
         """Where the material has holes: d, or 1 − Tr, times map_d."""
@@ -161,18 +175,18 @@ class MaterialMaker:
         return self._pixels[path]
 
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
-        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "map_d", "norm"}):
+        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", "norm"}):
             self._warnings.append(simplified(f"{keyword[:40]} of {what} is not used"))
 
 
-def _terms(described: Described, textures: dict[str, Texture]) -> tuple[dict[str, Any], ...]:
+def _terms(described: Described, textures: dict[str, Texture], roughness: float | None) -> tuple[dict[str, Any], ...]:
     numbers = described.numbers
     base = numbers.get("Kd", GREY)
     if "diffuse" in textures and not any(base):
         base = [1.0, 1.0, 1.0]  # exporters write zeros where they mean the image
-    if "Pr" in numbers or "Pm" in numbers:
+    if roughness is not None or "Pm" in numbers:
         metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
-        return make_terms(_plastic(np.array(base), metallic, numbers.get("Pr", [0.5])[0], textures), Over())
+        return make_terms(_plastic(np.array(base), metallic, 0.5 if roughness is None else roughness, textures), Over())
     diffuse = {"model": "lambert", "color": base, "texture": "diffuse" if "diffuse" in textures else None}
     tint = numbers.get("Ks", [0.0, 0.0, 0.0])
     if not any(tint):
