@@ -72,7 +72,7 @@ def _tiles(side: int = 256) -> F32:
 
 def _spots(side: int = 256) -> F32:
     y, x = np.mgrid[0:side, 0:side] * (2 * np.pi / side)
-    return (0.6 + 0.3 * np.sin(5 * x) * np.cos(4 * y)).astype(np.float32)
+    return np.asarray(0.6 + 0.3 * np.sin(5 * x) * np.cos(4 * y), np.float32)
 
 
 def _map(texels: F32) -> Texture:

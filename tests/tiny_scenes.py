@@ -6,6 +6,7 @@ import numpy as np
 
 from relume.environments.equirect import texel_directions
 from relume.environments.model import Environment
+from relume.light.local import Triangles
 from relume.points import Points
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene, Texture
@@ -70,6 +71,11 @@ def torus(name, radius, tube, material, steps=192, around=24, tilt=0.5):
     b = a + around + 1
     faces = np.concatenate([np.stack([a, a + 1, b], axis=1), np.stack([a + 1, b + 1, b], axis=1)])
     return mesh(name, positions @ turn, faces, material, normals @ turn)
+
+
+def shining(corners, is_two_sided):
+    """Triangles that shine evenly. corners: (T, 3, 3)"""
+    return Triangles(np.asarray(corners, np.float32), np.ones(len(corners), np.float32), is_two_sided)
 
 
 def looking(name, eye, target, yfov):

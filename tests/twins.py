@@ -246,7 +246,10 @@ def shining(transfer, view: View, index, look):
     if not of_it or not look.transport.paths.direct:
         return np.zeros((len(position), 3))
     eye = view.camera.to_world[:3, 3].astype(np.float32)
-    return np.outer(transfer.local.shines_at(index, eye, position), sum(np.array(light.gain) for light in of_it))
+    shines = np.outer(transfer.local.shines_at(index, eye, position), sum(np.array(light.gain) for light in of_it))
+    if transfer.store.attributes.get("has_emission_images"):
+        shines = shines * view.store.read("views/0/emission", view.rows(index).start, view.rows(index).stop)
+    return shines
 
 
 def resolve(view: View, radiance):

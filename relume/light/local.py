@@ -44,7 +44,7 @@ class LocalLight(NamedTuple):
         position: of points. (3,) float32. axis: unit, of spots, and the way that directional light goes. (3,)
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
         corner, edges, normal: of parallelograms or triangles. (T, 3), (T, 2, 3), (T, 3) float32; the last unit
-        share: of the area, up to each piece and with it. (T,) float32. area: of all, m².
+        share: of the power, up to each piece and with it. (T,) float32. area: of all, m², where it shines evenly.
         is_rectangle: a parallelogram, else triangles. is_two_sided: shines to both sides.
     """
 
@@ -63,9 +63,15 @@ class LocalLight(NamedTuple):
 
 
 class Triangles(NamedTuple):
-    """Triangles that shine. corners: (T, 3, 3) float32. is_two_sided: whether they do to both sides."""
+    """Triangles that shine.
+
+    Attributes:
+        corners: (T, 3, 3) float32. shares: how brightly each shines, over the mean of all. (T,) float32
+        is_two_sided: whether they do to both sides.
+    """
 
     corners: F32
+    shares: F32
     is_two_sided: bool
 
 
@@ -85,6 +91,8 @@ def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> L
     corner, edges = _outline(geometry, triangles)
     across = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(across, axis=1) * (1.0 if is_rectangle else 0.5)
+    if triangles is not None:
+        areas = areas * triangles.shares
     kept, area = areas > 0, areas.sum()
     across = across[kept] / np.linalg.norm(across[kept], axis=1, keepdims=True)
     scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)

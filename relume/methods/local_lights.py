@@ -188,8 +188,12 @@ class LocalLights:
         if geometry.kind != "mesh":
             return make_local(geometry)
         material = list(self._store.attributes["materials"]).index(geometry.material)
-        faces = self.faces[self._store.read("scene/face_material") == material]
-        return make_local(geometry, Triangles(self.positions[faces], self._is_two_sided(material)))
+        chosen = self._store.read("scene/face_material") == material
+        shares = np.ones(np.count_nonzero(chosen), np.float32)
+        if self._store.attributes.get("has_emission_images"):
+            shares = self._store.read("scene/face_emission")[chosen]
+        corners = self.positions[self.faces[chosen]]
+        return make_local(geometry, Triangles(corners, shares, self._is_two_sided(material)))
 
     def _is_two_sided(self, material: int) -> bool:
         return bool(self._store.attributes["double_sided"][material])

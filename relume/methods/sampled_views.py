@@ -10,6 +10,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     lights/nodes, direction, power                           relume.light.triangles.TriangleLights
     views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular, uv
+    scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
     views/<k>/level                                          of roughness: relume.scene.roughness
     views/<k>/through                                        of scenes with glass: relume.trace.view_samples
     views/<k>/visibility                                     samples on surfaces only
@@ -33,6 +34,7 @@ from relume.look import default_look
 from relume.methods import bounds
 from relume.methods.last_read import LastRead
 from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
+from relume.scene.emission import has_images, shares_of_faces
 from relume.scene.model import Camera, Scene
 from relume.scene.roughness import levels_of
 from relume.trace.coherent import Targets, targets_of, trace_coherent
@@ -112,6 +114,7 @@ class SampledViews:
             "double_sided": [material.double_sided for material in scene.materials],
             "has_holes": any(material.lets_pass for material in scene.materials),
             "has_glass": has_glass(scene.materials),
+            "has_emission_images": has_images(scene),
             "roughness_levels": [list(levels_of(material)) for material in scene.materials],
             "views": [_described(cameras[view]) for view in recipe.views],
         }
@@ -150,7 +153,7 @@ class SampledViews:
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
-            return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene))}, 0, 0.0)
+            return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene), scene)}, 0, 0.0)
         samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
         points = samples.surface.points
         arrays: dict[str, NDArray[Any]] = {
@@ -161,6 +164,8 @@ class SampledViews:
         }  # fmt: skip
         if samples.through is not None:
             arrays["through"] = samples.through
+        if has_images(scene):
+            arrays["emission"] = samples.surface.emission
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
 
@@ -201,9 +206,11 @@ def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     }
 
 
-def triangles_of(geometry: Geometry) -> dict[str, NDArray[Any]]:
-    """A scene's triangles, as arrays of a store."""
+def triangles_of(geometry: Geometry, scene: Scene) -> dict[str, NDArray[Any]]:
+    """The triangles of a scene, merged, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+    if has_images(scene):
+        arrays["scene/face_emission"] = shares_of_faces(scene)
     holes = geometry.embree.holes
     if holes is not None:
         arrays |= {"scene/uvs": holes.uvs, **{f"cutouts/{k}": array for k, array in holes.cutouts._asdict().items()}}

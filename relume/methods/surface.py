@@ -155,7 +155,7 @@ class SurfaceMethod:
             "scene/uvs": geometry.uvs,
             "scene/tangents": tangents_of(scene, geometry),
         }
-        return {**lights_of(scene, recipe), **triangles_of(geometry), **of_corners, **textures_of(scene).arrays}
+        return {**lights_of(scene, recipe), **triangles_of(geometry, scene), **of_corners, **textures_of(scene).arrays}
 
     def _points(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         geometry = self._views.geometry_of(scene)

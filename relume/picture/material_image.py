@@ -62,13 +62,13 @@ class MaterialImage:
         for term in self.terms:
             term.set_light(light)
 
-    def set_emission(self, emission: tuple[float, float, float], shines: Callable[[int], NDArray[np.bool_]]) -> None:
-        """The surfaces send this out themselves, where `shines` says so of the material's samples."""
+    def set_emission(self, emission: tuple[float, float, float], shines: Callable[[int], F32]) -> None:
+        """The surfaces send this out themselves, as `shines` says of the material's samples, (n, 1 or 3)."""
         if emission == self._emission:
             return
         self._emission, self._is_current = emission, False
         if self._shines is None:
-            self._shines = shines(self.index).astype(np.float32)
+            self._shines = shines(self.index)
 
     def set_factor(self, key: Hashable, factor: F32 | None, most: F32 | None, unlit: F32 | None) -> None:
         """Every sample's finished radiance is multiplied, as on a ground that only catches shadows; None: by one.
@@ -104,7 +104,7 @@ class MaterialImage:
         if self._unlit is not None:
             own += self._unlit
         if self._shines is not None and any(self._emission):
-            own += np.outer(np.array(self._emission, np.float32), self._shines)
+            own += np.array(self._emission, np.float32)[:, None] * self._shines.T
         self._is_current = True
         self.num_composed += 1
         return True

@@ -24,6 +24,7 @@ from relume.picture.pointer import CurvePointer, ParameterPointer
 from relume.picture.transfer import Axis, Transfer
 from relume.project.receivers import Receivers
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
@@ -98,9 +99,9 @@ class ViewImages:
         has_bounces = Axis.BOUNCES in self.transfer.axes
         return light_of(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
 
-    def _shines(self, material: int) -> NDArray[np.bool_]:
-        """Which samples of a material show a side that shines, where it does."""
-        return self.transfer.shines_at(self.view, material)
+    def _shines(self, material: int) -> F32:
+        """How brightly the samples of a material shine, over its mean; nothing on sides that do not. (n, 1 or 3)"""
+        return self.transfer.shines_at(self.view, material)[:, None] * self.view.shining(material)
 
     def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
         """The material and the term of a pointer in the look as it is now.

@@ -147,7 +147,8 @@ def _add_direct(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[flo
         rows = shot.rows(number)
         if (emission := emission_of(shot.lamps, material.name)).any():
             front = shot.geometry.is_front(shot.eye.astype(np.float32), shot.points.position[rows])
-            radiance[rows] += emission * (front | material.double_sided)[:, None]
+            shown = (front | material.double_sided)[:, None]
+            radiance[rows] += emission * shown * shot.samples.surface.emission[rows]
 
 
 def _add_background(radiance: F64, shot: _Shot) -> None:

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from relume.look import LightLook, Look
 from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SpotLook
-from relume.scene.model import Scene
+from relume.scene.model import Scene, Texture
 from relume.trace.geometry import Geometry
 from relume.trace.primary import trace_from
+from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -35,11 +36,18 @@ class Arriving:
 
 @dataclass(frozen=True)
 class LocalLamp:
-    """A light of a look in a scene. triangles: of one of kind "mesh". (T, 3, 3) float64"""
+    """A light of a look in a scene.
+
+    Attributes:
+        triangles: of one of kind "mesh". (T, 3, 3) float64. is_two_sided: whether they shine to both sides.
+        uvs: of their corners. (T, 3, 2) image: of what they shine, over its mean; None where that is even.
+    """
 
     look: LightLook
     triangles: F64
     is_two_sided: bool
+    uvs: F64
+    image: Texture | None
 
     def arriving(self, geometry: Geometry, position: F64, num: int, rng: np.random.Generator) -> Arriving:
         """Light that arrives at points from places of the lamp's surface, or from the one place that it has.
@@ -57,48 +65,52 @@ class LocalLamp:
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
         free = free_distance(geometry, start, flat).reshape(distance.shape)
         is_seen = free > distance - _SLACK * geometry.epsilon - 1e-5 * distance
-        return Arriving(direction, (factor * is_seen)[..., None] * np.array(self.look.gain))
+        return Arriving(direction, factor * is_seen[..., None] * np.array(self.look.gain))
 
     def _towards(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:
-        """Vectors to places of the lamp (n, m, 3), and what a unit of emission gives from there. (n, m)"""
+        """Vectors to places of the lamp (n, m, 3), and what a unit of emission gives from there. (n, m, 1 or 3)"""
         light = self.look
         if isinstance(light, DirectionalLook):
             away = np.broadcast_to(-_BEHIND * _unit(light.direction), (len(position), 1, 3))
-            return away, np.ones((len(position), 1))
+            return away, np.ones((len(position), 1, 1))
         if isinstance(light, RectangleLook):
             return self._from_surface(position, *_places_of_rectangle(light, len(position), num, rng))
         if isinstance(light, MeshLook):
-            return self._from_surface(position, *_places_of_triangles(self.triangles, len(position), num, rng))
+            places = _places_of_triangles(self.triangles, self.uvs, len(position), num, rng)
+            away, factor = self._from_surface(position, *places[:3])
+            return away, factor if self.image is None else factor * _looked_up(self.image, places[3])
         away = (np.array(light.position) - position)[:, None]
         squared = (away**2).sum(axis=2)
         if not isinstance(light, SpotLook):
-            return away, 1 / squared
+            return away, 1 / squared[..., None]
         inner, outer = np.cos(np.radians(light.cone))
         cosine = -(away @ _unit(light.direction)) / np.sqrt(squared)
         falloff = np.clip((cosine - outer) / max(1e-3, inner - outer), 0, 1)
-        return away, falloff**2 / squared
+        return away, (falloff**2 / squared)[..., None]
 
     def _from_surface(self, position: F64, place: F64, normal: F64, area: float) -> tuple[F64, F64]:
         away = place - position[:, None]
         squared = np.maximum((away**2).sum(axis=2), 1e-20)
         cosine = -(away * normal).sum(axis=2) / np.sqrt(squared)
         facing = np.abs(cosine) if self.is_two_sided else np.maximum(cosine, 0)
-        return away, area * facing / squared / place.shape[1]
+        return away, (area * facing / squared / place.shape[1])[..., None]
 
 
 def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
     """The local lights of a look that give any light."""
     lamps = []
     for light in look.lights.values():
-        triangles, is_two_sided = np.zeros((0, 3, 3)), False
+        triangles, uvs, is_two_sided, image = np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), False, None
         if isinstance(light, MeshLook):
             material = next(k for k, m in enumerate(scene.materials) if m.name == light.material)
             meshes = [mesh for mesh in scene.meshes if mesh.material == material]
             corners = [mesh.positions[mesh.faces].astype(np.float64) for mesh in meshes]
             triangles, is_two_sided = np.concatenate([triangles, *corners]), scene.materials[material].double_sided
+            uvs = np.concatenate([uvs, *(mesh.uvs[mesh.faces].astype(np.float64) for mesh in meshes)])
+            image = scene.materials[material].textures.get("emission")
         is_dark = isinstance(light, MeshLook) and not _areas(triangles).any()
         if any(light.gain) and not is_dark:
-            lamps.append(LocalLamp(light, triangles, is_two_sided))
+            lamps.append(LocalLamp(light, triangles, is_two_sided, uvs, image))
     return lamps
 
 
@@ -149,8 +161,17 @@ def _places_of_rectangle(
     return np.array(light.position) + offset, facing, light.size[0] * light.size[1]
 
 
-def _places_of_triangles(triangles: F64, num_points: int, num: int, rng: np.random.Generator) -> tuple[F64, F64, float]:
-    """Places (n, m, 3), evenly by area; their normals (n, m, 3); the area."""
+def _looked_up(image: Texture, uv: F64) -> F64:
+    """The texels of an image at places (n, m, 2), unfiltered but for the nearest four. (n, m, 3)"""
+    flat = uv.reshape(-1, 2).astype(np.float32)
+    found = MipMap.of(image).sample(flat, np.zeros(len(flat), np.float32))
+    return np.asarray(found.reshape(*uv.shape[:2], 3), np.float64)
+
+
+def _places_of_triangles(
+    triangles: F64, uvs: F64, num_points: int, num: int, rng: np.random.Generator
+) -> tuple[F64, F64, float, F64]:
+    """Places (n, m, 3), evenly by area; their normals (n, m, 3); the area; their places in images (n, m, 2)."""
     areas = _areas(triangles)
     strata = (np.arange(num) + rng.random((num_points, num))) / num
     chosen = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), strata, side="right"), len(areas) - 1)
@@ -159,4 +180,7 @@ def _places_of_triangles(triangles: F64, num_points: int, num: int, rng: np.rand
     a, b, c = triangles[chosen].transpose(2, 0, 1, 3)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
-    return a * (1 - root) + b * root * (1 - v) + c * root * v, normal, float(areas.sum())
+    weights = 1 - root, root * (1 - v), root * v
+    place = sum(weight * corner for weight, corner in zip(weights, (a, b, c), strict=True))
+    uv = sum(weight * uvs[chosen][:, :, k] for k, weight in enumerate(weights))
+    return np.asarray(place), normal, float(areas.sum()), np.asarray(uv)

@@ -73,3 +73,17 @@ def made_of(values: Callable[[slice], F32], size: tuple[int, int], most: F64, wr
         pixels[rows] = np.round(np.float32(255) * srgb_encode(shares))
     red, green, blue = scale.tolist()
     return Texture(pixels, wrap, Coding("srgb", (red, green, blue)))
+
+
+def wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int64]:
+    """Wrap texel indices into the image. Indices far outside stay exact: they are reduced in float64.
+
+    Args:
+        index: whole numbers. (n,) size: texels along the axis. wrap: see `relume.scene.model.Texture`.
+    """
+    if wrap == "clamp":
+        return np.clip(index, 0, size - 1).astype(np.int64)
+    if wrap == "mirror":
+        folded = np.mod(index, 2 * size)
+        return np.asarray(np.minimum(folded, 2 * size - 1 - folded), np.int64)
+    return np.asarray(np.mod(index, size), np.int64)

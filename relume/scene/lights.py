@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, unused
 from relume.scene.checks import MAX_EMISSION, MAX_LIGHTS
+from relume.scene.emission import lit_surfaces
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import Light, Material, Mesh
 
@@ -48,22 +49,32 @@ class LightCollector:
             self._warnings.append(simplified(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that"))
         self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
 
-    def shine(self, materials: Sequence[Material], emissions: Sequence[F64], meshes: Sequence[Mesh]) -> None:
+    def shine(
+        self, materials: Sequence[Material], emissions: Sequence[F64], meshes: Sequence[Mesh]
+    ) -> tuple[Material, ...]:
         """A light for each material with an emission, which is radiance as it stands: files mean by 1 what a white
         surface under an environment of 1 has, not a candela per square metre.
 
         Args:
             materials: those of the scene.
-            emissions: of each material. (3,)
+            emissions: of each material, which its image multiplies. (3,)
             meshes: those of the scene; a material without any is no light.
+        Returns:
+            The materials; images of what they shine are over its mean from now on.
         Raises:
             SceneError: there are more lights than a look may have.
         """
-        shown = {mesh.material for mesh in meshes}
-        for number, (material, emission) in enumerate(zip(materials, emissions, strict=True)):
-            if emission.max() <= 0:
+        found = []
+        for number, (given, factor) in enumerate(zip(materials, emissions, strict=True)):
+            worn = [mesh for mesh in meshes if mesh.material == number]
+            has_image = "emission" in given.textures
+            material, emission = lit_surfaces(given, factor, worn) if has_image else (given, factor)
+            found.append(material)
+            if factor.max() <= 0:
                 continue
-            if number in shown:
+            if worn and emission.max() > 0:
                 self.add(self.name(material.name), {"kind": "mesh", "material": material.name}, emission)
             else:
-                self._warnings.append(unused(f"material {material.name!r} shines, but no surface is left of it"))
+                why = "its image is black on all of them" if worn else "no surface is left of it"
+                self._warnings.append(unused(f"material {material.name!r} shines, but {why}"))
+        return tuple(found)

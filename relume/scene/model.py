@@ -114,7 +114,8 @@ class Material:
         terms: the material's default terms as they stand in a look document.
         textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
             `textures["diffuse"]`. Known channels: "diffuse", "specular"; and "roughness", over the roughness that
-            terms say, which scales the width of those with `"roughness_map": true`.
+            terms say, which scales the width of those with `"roughness_map": true`; and "emission", over the mean of
+            what the material's surfaces shine.
         normal_map: tangent-space normals in [-1, 1]; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         catcher: it is a ground that looks may show by its shadows alone, and the default look does.

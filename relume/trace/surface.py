@@ -17,6 +17,7 @@ from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
 
+_IMAGES = ("diffuse", "specular", "emission")
 _RAYS_A_RANGE = 16_384
 _OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; many times what positions are rounded by
 
@@ -32,6 +33,7 @@ class Surface:
             in radians, −1 where the texture is seen mirrored, else 1. Where a triangle has no place in textures, it
             is that of a projection along the axis of the world that it faces most, in metres. (n, 5) float32
         roughness: over what the material's terms say, 1 where it has no map. (n,) float32
+        emission: over the mean of the material's surfaces, 1 where it has no image. (n, 3) float32
     """
 
     points: Points
@@ -39,12 +41,13 @@ class Surface:
     specular: F32
     uv: F32
     roughness: F32
+    emission: F32
 
     def rows(self, chosen: NDArray[np.integer]) -> Surface:
         """Choose some of them; their seeds are their new numbers."""
         points = self.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
         textures = self.diffuse[chosen], self.specular[chosen]
-        return Surface(points, *textures, self.uv[chosen], self.roughness[chosen])
+        return Surface(points, *textures, self.uv[chosen], self.roughness[chosen], self.emission[chosen])
 
 
 def _unit(v: F32, otherwise: F32) -> F32:
@@ -93,9 +96,9 @@ def surface_at(
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
     columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
-    position, normal, tangent, diffuse, specular, uv, roughness = map(np.concatenate, columns)
+    position, normal, tangent, diffuse, specular, uv, roughness, emission = map(np.concatenate, columns)
     seed = np.arange(len(directions), dtype=np.uint32)
-    return Surface(Points(position, normal, tangent, seed), diffuse, specular, uv, roughness)
+    return Surface(Points(position, normal, tangent, seed), diffuse, specular, uv, roughness, emission)
 
 
 def _surface_at(
@@ -106,7 +109,7 @@ def _surface_at(
     pixel_angle: float,
     origin: F32 | None,
 ) -> tuple[F32, ...]:
-    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular, uv, roughness."""
+    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular, uv, roughness, emission."""
     hit = hits.face >= 0
     corners = geometry.faces[np.maximum(hits.face, 0)]
     p = geometry.positions[corners]
@@ -121,8 +124,9 @@ def _surface_at(
     tangents = (geometry.tangents[corners] * b).sum(axis=1)
     uv = (geometry.uvs[corners] * b).sum(axis=1)
     position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
-    diffuse, specular = np.ones((2, *position.shape), np.float32)
-    footprint, roughness = np.zeros(len(uv), np.float32), np.ones((len(uv), 1), np.float32)
+    channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
+    channels["roughness"] = np.ones((len(uv), 1), np.float32)
+    footprint = np.zeros(len(uv), np.float32)
     if materials and origin is not None:
         (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
         uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
@@ -133,7 +137,7 @@ def _surface_at(
         material = np.where(hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
         for index, m in enumerate(materials):
             rows = np.nonzero(material == index)[0]
-            for name, out in (("diffuse", diffuse), ("specular", specular), ("roughness", roughness)):
+            for name, out in channels.items():
                 if name in m.textures and len(rows):
                     out[rows] = MipMap.of(m.textures[name]).sample(uv[rows], footprint[rows])
             if m.normal_map is not None and len(rows):
@@ -151,10 +155,11 @@ def _surface_at(
         np.where(hit[:, None], position, directions).astype(np.float32),
         np.where(hit[:, None], normal, -directions).astype(np.float32),
         tangent,
-        diffuse,
-        specular,
+        channels["diffuse"],
+        channels["specular"],
         place.astype(np.float32),
-        roughness[:, 0],
+        channels["roughness"][:, 0],
+        channels["emission"],
     )
 
 

@@ -10,7 +10,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.coding import ROWS_AT_ONCE, decode
+from relume.scene.coding import ROWS_AT_ONCE, decode, wrapped
 from relume.scene.model import WRAPS, Texture
 
 F32 = NDArray[np.float32]
@@ -73,8 +73,8 @@ class MipMap:
         y = uv[:, 1].astype(np.float64) * height - 0.5
         x0, y0 = np.floor(x), np.floor(y)
         fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-        columns = [_wrapped(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
-        rows = [_wrapped(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
+        columns = [wrapped(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
+        rows = [wrapped(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
         of = [[decode(image[row, column], coding) for column in columns] for row in rows]
         top, bottom = (left * (1 - fx) + right * fx for left, right in of)
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
@@ -92,16 +92,6 @@ def _halve(image: F32) -> F32:
     return np.asarray(
         (padded[0::2, 0::2] + padded[1::2, 0::2] + padded[0::2, 1::2] + padded[1::2, 1::2]) / 4, np.float32
     )
-
-
-def _wrapped(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int64]:
-    """Wrap texel indices into the image. Indices far outside stay exact: they are reduced in float64."""
-    if wrap == "clamp":
-        return np.clip(index, 0, size - 1).astype(np.int64)
-    if wrap == "mirror":
-        folded = np.mod(index, 2 * size)
-        return np.asarray(np.minimum(folded, 2 * size - 1 - folded), np.int64)
-    return np.asarray(np.mod(index, size), np.int64)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")

@@ -91,6 +91,13 @@ class View:
         """Find how rough a material's samples are."""
         return Levels(self.ratios[material], self.level[self.rows(material)])
 
+    def shining(self, material: int) -> F32:
+        """Read how brightly a material's samples shine, over its mean. (n, 1) float32, (n, 3) where images say it"""
+        rows = self.rows(material)
+        if not self.store.attributes.get("has_emission_images"):
+            return np.ones((rows.stop - rows.start, 1), np.float32)
+        return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
+
     def points(self, material: int) -> Points:
         """Read a material's samples from the store as points."""
         return self._points(self.rows(material))

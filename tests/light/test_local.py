@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import points_at
+from tiny_scenes import points_at, shining
 
 from relume.light.gather_rays import shift_of
-from relume.light.local import Triangles, light_sample, make_local, pattern_of, rectangle
+from relume.light.local import light_sample, make_local, pattern_of, rectangle
 from relume.look import LightGeometry
 from relume.trace.local_shadows import arriving
 
@@ -26,7 +26,7 @@ GEOMETRIES = {
 
 
 def light_of(name):
-    triangles = Triangles(PIECES.astype(np.float32), name == "two-sided") if "sided" in name else None
+    triangles = shining(PIECES, name == "two-sided") if "sided" in name else None
     return make_local(GEOMETRIES[name], triangles)
 
 
@@ -130,14 +130,19 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
     at, seen = points_at(points, normals), np.full((400, 8), 255, np.uint8)
     pattern = pattern_of(geometry, 64)
     as_one = arriving(make_local(geometry), pattern, at, seen)
-    as_two = arriving(make_local(GEOMETRIES["one-sided"], Triangles(triangles, False)), pattern, at, seen)
+    as_two = arriving(
+        make_local(GEOMETRIES["one-sided"], shining(triangles, False)),
+        pattern,
+        at,
+        seen,
+    )
     np.testing.assert_allclose(as_two, as_one, rtol=0.05)
     np.testing.assert_allclose(as_two.mean(), as_one.mean(), rtol=2e-3)
 
 
 @pytest.mark.parametrize("corners", [np.zeros((0, 3, 3)), np.ones((2, 3, 3)), np.zeros((1, 3, 3))])
 def test_emitter_without_area_gives_no_light(corners):
-    light = make_local(GEOMETRIES["one-sided"], Triangles(corners.astype(np.float32), True))
+    light = make_local(GEOMETRIES["one-sided"], shining(corners, True))
     pattern = pattern_of(GEOMETRIES["one-sided"], 64)
     up = np.array([[0, 1, 0]], np.float32)
     seen = np.full((1, 32), 255, np.uint8)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from glb_builder import Glb
+from texture_values import values_of
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -70,7 +71,19 @@ def test_materials_shine_with_their_factor_their_strength_and_their_texture_s_me
     panel = default_look(scene.materials, scene.lights)["lights"]["Panel"]
     assert (panel["kind"], panel["material"]) == ("mesh", "Panel")
     np.testing.assert_allclose(panel["emission"], [4, 2, 0])
-    assert any("emission texture" in warning and "mean" in warning for warning in scene.warnings)
+    np.testing.assert_allclose(values_of(scene.materials[0].textures["emission"]), [[[2, 2, 2], [0, 0, 0]]])
+    assert not scene.warnings
+
+
+def test_an_image_that_is_black_where_it_is_seen_shines_not() -> None:
+    glb = Glb()
+    half = glb.texture(np.repeat([[[0, 0, 0]] * 8 + [[255, 255, 255]] * 8], 16, axis=0))
+    shrunk = {"extensions": {"KHR_texture_transform": {"scale": [0.25, 1]}}}
+    glb.quad({"name": "Panel", "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": half, **shrunk}})
+    scene = imported(glb)
+    assert not scene.lights
+    assert not scene.materials[0].textures
+    assert any("black" in warning for warning in scene.warnings)
 
 
 def test_material_without_emission_is_no_light() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import points_at, quad, still_life
+from tiny_scenes import points_at, quad, shining, still_life
 
 from relume.light.gather_rays import shift_of
-from relume.light.local import Triangles, light_sample, make_local, pattern_of
+from relume.light.local import light_sample, make_local, pattern_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
@@ -92,11 +92,11 @@ def test_surface_that_shines_does_not_shadow_itself():
     """The ceiling is the lamp: as bright as a rectangle where nothing is."""
     corners = CEILING.positions[CEILING.faces]
     lamp = LightGeometry("mesh", material="Lamp")
-    shining = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, Triangles(corners, False))
-    assert np.all(shining > 0.3)
+    found = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, shining(corners, False))
+    assert np.all(found > 0.3)
     open_air = embree_of(quad("far", [[90, 0, 0], [91, 0, 0], [91, 1, 0], [90, 1, 0]], 0))
-    free = irradiance(open_air, lamp, FLOOR, NORMALS, Triangles(corners, False))
-    np.testing.assert_array_equal(shining, free)
+    free = irradiance(open_air, lamp, FLOOR, NORMALS, shining(corners, False))
+    np.testing.assert_array_equal(found, free)
 
 
 @pytest.mark.parametrize("height", [2.0, 2.0 - 1e-6])

@@ -90,7 +90,9 @@ class _Reading:
         if not self.meshes:
             raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
         emissions = [np.array(understood.emission) for understood in self.materials]
-        self._collector.shine([understood.material for understood in self.materials], emissions, self.meshes)
+        own = [understood.material for understood in self.materials]
+        lit = self._collector.shine(own, emissions, self.meshes)
+        self.materials = [replace(u, material=material) for u, material in zip(self.materials, lit, strict=True)]
         self.lights = self._collector.lights
         self.variants = self._read_variants()
         if not self.cameras:

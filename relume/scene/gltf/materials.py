@@ -38,7 +38,7 @@ class Understood:
 
     Attributes:
         turn: radians, from the tangent towards the bitangent; None where the material is isotropic.
-        emission: radiance.
+        emission: radiance, which the image of that name multiplies.
     """
 
     material: Material
@@ -76,6 +76,7 @@ class MaterialReader:
             self._warnings.append(simplified(f"the roughness texture of {what}, which is anisotropic, is its mean"))
         over = self._over(layers, strength, what)
         normal_map = self._normal_map(material.normalTexture, turn, what)
+        shining = self._shining(material, what)
         if over.coat > 0 and normal_map is not None:
             self._warnings.append(
                 simplified(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
@@ -83,7 +84,7 @@ class MaterialReader:
         made = Material(
             name,
             make_terms(surface, over),
-            surface.textures,
+            surface.textures | shining,
             normal_map,
             material.doubleSided,
             opacity=self._opacity(material, what),
@@ -130,10 +131,15 @@ class MaterialReader:
 
     def _emission(self, material: GltfMaterial, layers: Layers, what: str) -> tuple[float, float, float]:
         factor = np.maximum(material.emissiveFactor, 0) * layers.emissive_strength.emissiveStrength
-        if factor.any():
-            factor = factor * self._mean_color(material.emissiveTexture, f"emission texture of {what}")
         red, green, blue = factor.tolist()
         return red, green, blue
+
+    def _shining(self, material: GltfMaterial, what: str) -> dict[str, Texture]:
+        """The image of what surfaces shine, as it is in the file."""
+        if material.emissiveTexture is None or max(material.emissiveFactor) <= 0:
+            return {}
+        pixels, wrap = self._images.texture(material.emissiveTexture.index, f"the emission texture of {what}")
+        return {"emission": self._kept(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, Coding("srgb")))}
 
     def _surface(self, material: GltfMaterial, layers: Layers, what: str) -> Surface:
         """The base layer; images only where a texture says more than one value."""
@@ -259,7 +265,7 @@ def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:
     """The textures that are kept as images, first those that the others should follow."""
     pbr, specular = material.pbrMetallicRoughness, layers.specular
     images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
-    return [*images, specular.specularTexture, specular.specularColorTexture]
+    return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
 
 
 def _over_mean(raster: Raster) -> Texture:

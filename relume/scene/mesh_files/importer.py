@@ -56,8 +56,8 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
         mesh = make_mesh(corners, own_name, number, materials[number], f"mesh {own_name!r}", warnings)
         meshes.extend([] if mesh is None else [mesh])
     collector = LightCollector(warnings)
-    collector.shine(materials, emissions, meshes)
-    return _scene(name, meshes, materials, environment, warnings, collector.lights)
+    lit = collector.shine(materials, emissions, meshes)
+    return _scene(name, meshes, lit, environment, warnings, collector.lights)
 
 
 def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
@@ -99,7 +99,7 @@ def _library(obj: Obj, companions: Companions, warnings: list[Remark]) -> dict[s
 def _scene(
     name: str,
     meshes: list[Mesh],
-    materials: list[Material],
+    materials: Sequence[Material],
     environment: Environment | None,
     warnings: list[Remark],
     lights: Sequence[Light] = (),

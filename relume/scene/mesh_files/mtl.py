@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, wrong
-from relume.scene.coding import mean_of
 from relume.scene.companions import Companions
 from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
@@ -134,21 +133,16 @@ class MaterialMaker:
         return make_opacity(alpha, ("repeat", "repeat"), share, None, what, self._warnings)
 
     def emission(self, material: Material, described: Described | None) -> F64:
-        """Radiance of the surfaces of a material that was made: Ke times the mean of map_Ke. (3,) Raises SceneError."""
+        """Radiance of the surfaces of a material that was made, which its image multiplies: Ke. (3,)"""
         if described is None:
             return np.zeros(3)
         factor = np.array(described.numbers.get("Ke", [0.0, 0.0, 0.0]))
-        texture = self._image(described, "map_Ke", f"map_Ke of material {material.name!r}", Coding("srgb"))
-        if texture is None:
-            return factor
-        if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() > 2:
-            self._warnings.append(simplified(f"map_Ke of material {material.name!r} is replaced by its mean"))
-        factor = factor if factor.any() else np.ones(3)  # exporters write zeros where they mean the image
-        return factor * mean_of(texture)
+        # exporters write zeros where they mean the image
+        return np.ones(3) if "emission" in material.textures and not factor.any() else factor
 
     def _textures(self, described: Described, what: str) -> dict[str, Texture]:
         textures = {}
-        for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular")):
+        for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular"), ("map_Ke", "emission")):
             texture = self._image(described, keyword, f"{keyword} of {what}", Coding("srgb"))
             if texture is not None:
                 textures[channel] = texture
