@@ -20,8 +20,7 @@ from relume.asset_store import AssetStore
 from relume.environments.model import Environment
 from relume.environments.reading import read_environment
 from relume.errors import SceneError
-from relume.imageio.shrink import shrink
-from relume.remarks import Remark, remark_of, simplified
+from relume.remarks import Remark, remark_of
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
 MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
@@ -59,7 +58,7 @@ def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
     """
     from relume.environments.thumbnail import write_thumbnail  # compiled kernels, which readers of scenes do without
 
-    environment = _reduced(read_environment(source, name))
+    environment = read_environment(source, name, MAX_WIDTH)
 
     def fill(made: Path) -> dict[str, Any]:
         np.save(made / _RADIANCE, environment.radiance)
@@ -108,13 +107,3 @@ def _load(path: Path) -> Environment:
     if height == 0 or radiance.shape != (height, 2 * height, 3) or radiance.dtype != np.float32:
         raise STORE.damaged(path)
     return Environment(STORE.read(path)["name"], radiance)
-
-
-def _reduced(environment: Environment) -> Environment:
-    """The environment halved until it is narrow enough to be weighed in seconds."""
-    height, width, _ = environment.radiance.shape
-    if width <= MAX_WIDTH:
-        return environment
-    size = MAX_WIDTH, MAX_WIDTH // 2
-    said = simplified(f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}")
-    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, said))

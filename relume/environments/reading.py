@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
+from relume.imageio.shrink import shrink
 from relume.remarks import simplified, wrong
 
 F32 = NDArray[np.float32]
 
 MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
+OF_SCENES = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
 MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near it
@@ -28,16 +30,17 @@ HDR_RESOLUTION = re.compile(rb"-Y\s+(\d{1,9})\s+\+X\s+(\d{1,9})\s*\Z")
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 
-def read_environment(source: str | Path | bytes, name: str) -> Environment:
+def read_environment(source: str | Path | bytes, name: str, most_width: int = OF_SCENES) -> Environment:
     """Read an equirectangular .hdr or .exr image.
 
     Args:
         source: a path or the file's bytes.
         name: what people call it.
+        most_width: it is kept at most so many texels wide, each the mean of those that it stands for.
 
     Returns:
         The environment with one warning for each thing that was repaired: texels that are not finite become black,
-        negative values 0, and radiance is held below 1e6.
+        negative values 0, and radiance is held below 1e6; and one where it was reduced.
 
     Raises:
         SceneError: no such file, neither format, damaged, too large, not 2:1, or without any light.
@@ -51,7 +54,7 @@ def read_environment(source: str | Path | bytes, name: str) -> Environment:
         suffix = ".exr"
     else:
         raise SceneError(f"environment {name!r} is neither Radiance .hdr nor OpenEXR; convert it to one of them")
-    return _repaired(_read_pixels(data, suffix, name), name)
+    return _reduced(_repaired(_read_pixels(data, suffix, name), name), most_width)
 
 
 def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
@@ -147,7 +150,8 @@ def _read_open_image(image: oiio.ImageInput, data: bytes, name: str) -> F32:
     if pixels is None:
         _forget_error(image.geterror)
         raise SceneError(f"environment {name!r} ends early or is damaged; export it again")
-    return np.ascontiguousarray(np.asarray(pixels, np.float32)[..., [channel - first for channel in order]])
+    found = np.asarray(pixels, np.float32)
+    return found if order == [first, first + 1, first + 2] else found[..., [channel - first for channel in order]]
 
 
 def _forget_error(take_error: Callable[[], str]) -> None:
@@ -173,7 +177,16 @@ def _repaired(pixels: F32, name: str) -> Environment:
         warnings.append(
             simplified(f"environment {name!r} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that")
         )
-    pixels = np.clip(pixels, 0, MAX_RADIANCE)
+    np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map of 16k is 1.6 GB
     if not pixels.any():
         raise SceneError(f"environment {name!r} is black everywhere; choose one with light in it")
     return Environment(name, pixels, tuple(warnings))
+
+
+def _reduced(environment: Environment, most_width: int) -> Environment:
+    height, width, _ = environment.radiance.shape
+    if width <= most_width:
+        return environment
+    size = most_width, most_width // 2
+    said = simplified(f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}")
+    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, said))

@@ -39,8 +39,9 @@ ROWS = {
     "side of an image in a scene; texels of all; of what materials make of them": (
         f"{images.MAX_SIDE:,} pixels; {images.MAX_TEXELS // MILLION} million; {MAX_TEXTURE_TEXELS // MILLION} million"
     ),
-    "environment; its file": (
-        f"{environment.MAX_WIDTH:,} × {environment.MAX_HEIGHT:,}; {environment.MAX_FILE_BYTES // MILLION} MB"
+    "environment; its file; kept with a scene at most": (
+        f"{environment.MAX_WIDTH:,} × {environment.MAX_HEIGHT:,}; {environment.MAX_FILE_BYTES // MILLION} MB; "
+        f"{environment.OF_SCENES:,} wide"
     ),
     "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
     "imported measured materials": f"{materials.STORE.max_entries}",

@@ -117,3 +117,12 @@ def test_real_environments_are_read(shared_data: Path) -> None:
         environment = read_environment(path, path.stem)
         assert environment.warnings == (), path
         assert environment.radiance.mean() > 0.01
+
+
+def test_maps_wider_than_asked_for_are_means_and_say_so(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(3).uniform(0, 9, (32, 64, 3)).astype(np.float32)
+    path = written(tmp_path / "sky.exr", pixels)
+    environment = read_environment(path, "sky", 16)
+    np.testing.assert_allclose(environment.radiance, pixels.reshape(8, 4, 16, 4, 3).mean(axis=(1, 3)), rtol=1e-5)
+    assert environment.warnings == ("environment 'sky' is 64×32; it is kept as 16×8",)
+    assert not read_environment(path, "sky").warnings
