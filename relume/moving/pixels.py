@@ -14,7 +14,7 @@ from relume.moving.between_points import SkyLight
 from relume.moving.bumps import leaning, shading_ratio, unit
 from relume.moving.glints import along_lobe
 from relume.moving.look_up import Seen
-from relume.moving.points.surface import NORMAL_MAP, Surface
+from relume.moving.points.surface import EMISSION, NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
 from relume.moving.sky import sky_about
 from relume.parallel import for_shares
@@ -162,8 +162,12 @@ def _combine(  # type: ignore[no-untyped-def]
             n = leant
         if lobe >= 0:
             row, share = _mirror(mirrored, about, shares, d, outward, lobe, n, light)
+        texture_value[:] = 1
+        if textures.of_material[material, EMISSION] >= 0:
+            image = textures.of_material[material, EMISSION]
+            sample_texture(textures, image, place[0], place[1], footprint, texture_value)
         for channel in range(3):
-            out[p, channel] = emission[material, channel]
+            out[p, channel] = emission[material, channel] * texture_value[channel]
         for group in range(NUM_GROUPS):
             if not sends[material, group]:
                 continue
@@ -211,7 +215,7 @@ def combine(
         surface: that is seen. seen: what rays see of it.
         pixel_angle: angle that a pixel spans, radians.
         sent: by every vertex. mirrored: what lobes send besides.
-        emission: radiance of each material's own. (materials, 3) float32
+        emission: radiance of each material's own, the mean over its surfaces. (materials, 3) float32
     Returns:
         (rays, 3) float32
     """

@@ -247,6 +247,12 @@ void main() {
   }`
       : ""
   }
+  ${
+    hasTextures
+      ? `int shining = texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0).w;
+  if (shining >= 0) color *= textureAt(shining, place, footprint);`
+      : ""
+  }
   int row = 0;
   float share = 0.0;
   vec3 light = vec3(0.0);

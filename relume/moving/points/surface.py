@@ -25,7 +25,8 @@ F32 = NDArray[np.float32]
 
 MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
 _MOST_TEXELS = 1 << 25  # of all finest levels; values are kept as floats, 12 bytes each
-NORMAL_MAP = len(TEXTURES)  # its column in `Textures.of_material`
+NORMAL_MAP, EMISSION = len(TEXTURES), len(TEXTURES) + 1  # their columns in `Textures.of_material`
+_MOST_VALUE = 6e4  # of half precision
 
 
 class StoredTextures(NamedTuple):
@@ -33,8 +34,8 @@ class StoredTextures(NamedTuple):
 
     Attributes:
         arrays: "textures/<k>", (height, width, 3) float16.
-        described: attributes of the store: which texture each material has in each of `TEXTURES` and which normal map,
-            −1 for none, and how each texture continues outside.
+        described: attributes of the store: which texture each material has in each of `TEXTURES`, which normal map and
+            which image of what it shines, −1 for none, and how each texture continues outside.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -57,9 +58,11 @@ def textures_of(scene: Scene) -> StoredTextures:
     described = {
         "textures": [[number_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
         "normal_maps": [number_of(m.normal_map) for m in scene.materials],
+        "emission_images": [number_of(m.textures.get("emission")) for m in scene.materials],
     }
     side = _most_side(kept)
-    arrays = {f"textures/{k}": _level(texture, side).astype(np.float16) for k, texture in enumerate(kept)}
+    finest = [np.minimum(_level(texture, side), _MOST_VALUE) for texture in kept]
+    arrays = {f"textures/{k}": pixels.astype(np.float16) for k, pixels in enumerate(finest)}
     wraps = [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in kept]
     return StoredTextures(arrays, {**described, "wraps": wraps})
 
@@ -99,8 +102,8 @@ class Textures(NamedTuple):
         levels: first texel, height, width of each level, finest first. (levels, 3) int64
         first: of each texture, where its levels begin; one more at the end. (textures + 1,) int64
         wraps: how u and v continue: repeat, mirror, clamp. (textures, 2) int64
-        of_material: texture of each material in each of `TEXTURES`, then its normal map, −1 for none.
-            (materials, 3) int64
+        of_material: texture of each material in each of `TEXTURES`, then its normal map, then the image of what it
+            shines, −1 for none. (materials, 4) int64
     """
 
     texels: F32
@@ -203,7 +206,8 @@ def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArr
 def _read_textures(store: StoreReader) -> Textures:
     try:
         of_channels = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
-        of_material = np.column_stack([of_channels, np.array(store.attributes["normal_maps"], np.int64)])
+        shining = store.attributes.get("emission_images", [-1] * len(of_channels))  # older stores do not say
+        of_material = np.column_stack([of_channels, np.array([store.attributes["normal_maps"], shining], np.int64).T])
         wraps = np.array(store.attributes["wraps"], np.int64).reshape(-1, 2)
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error

@@ -130,7 +130,7 @@ def _show(  # type: ignore[no-untyped-def]
                 one += of_texel[channel * WIDTH + k] * arriving[channel, k]
                 mean += of_mean[channel * WIDTH + k] * arriving[channel, k]
             ratio = min(max(one, np.float32(0)) / max(mean, _LEAST), _MOST)
-            whole = out[ray, channel] - emission[channel]
+            whole = max(out[ray, channel] - emission[channel], np.float32(0))
             share = np.float32(1)
             if not is_alone:
                 share = min(max(color[channel] * mean, np.float32(0)) / max(whole, _LEAST), np.float32(1))

@@ -13,7 +13,7 @@ from relume.brdf.albedo import TEXTURES
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.frame import Materials, Wanted
-from relume.moving.points.surface import NORMAL_MAP
+from relume.moving.points.surface import EMISSION, NORMAL_MAP
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import emission_of
@@ -127,7 +127,7 @@ def _lobes(lobes: Lobes) -> F32:
 def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDArray[np.int32]:
     """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
     lobe, its normal map, whether it is a catcher, how many texels of its light vectors it needs; then the bits of its
-    emission. (materials · (groups + 2), 4) int32, −1 for none"""
+    emission, and the image of that. (materials · (groups + 2), 4) int32, −1 for none"""
     tables, lobes, sends, _ = materials
     of_material = transfer.surface.textures.of_material
     out = np.full((len(sends), NUM_GROUPS + 2, 4), -1, np.int32)
@@ -145,6 +145,7 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
         out[k, NUM_GROUPS, 3] = -(-num_functions(int(degree)) // 4)
     emission = [(*emission_of(wanted.light, name), 0) for name in transfer.material_names]
     out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
+    out[:, NUM_GROUPS + 1, 3] = of_material[:, EMISSION]
     return out.reshape(-1, 4)
 
 
