@@ -17,7 +17,7 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.operators.stream import TILE_SAMPLES, columns_of, stream
 from relume.parallel import for_steps
-from relume.project.levels import at_level, contract_levels, num_levels, project_levels, runs
+from relume.project.levels import contract_levels, freed, num_levels, project_levels, runs
 from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
@@ -92,7 +92,7 @@ def freeze(
     Raises:
         CancelledError: `cancelled` said so.
     """
-    contractions = contract_levels(term, {**bands, **at_level({active: bands[active]}, 0)}, active)
+    contractions = contract_levels(term, freed(bands, [active]), active)
     num_samples, num_bands = len(receivers.normal), contractions[0].num_columns
     tiles, samples = tiles_of(num_samples)
     transport = np.empty((tiles, 3, num_bands, samples), np.float32)

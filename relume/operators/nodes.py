@@ -30,7 +30,7 @@ from relume.light.triangles import TriangleLights
 from relume.operators.frozen import Frozen, level_bounds, tiles_of
 from relume.parallel import for_steps
 from relume.project.contraction import contract
-from relume.project.levels import at_level, num_levels, project_levels
+from relume.project.levels import at_level, freed, num_levels, project_levels
 from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
@@ -130,7 +130,7 @@ class Linearised:
         """
         at_nodes = self.bands_at_nodes()
         alone = self.moves[0] if len(self.moves) == 1 else None
-        held = {**bands, **at_level({name: bands[name] for name in self.moves}, 0)}  # nodes are the same at all levels
+        held = freed(bands, self.moves)  # nodes are the same at all levels
         dormant = [at_level(held, level) for level in range(num_levels(held))]
         contractions = [contract(term, b if alone else {**b, **at_nodes}, alone) for b in dormant]
         num_samples = len(receivers.normal)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +25,15 @@ def at_level(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
         bands: of each curve, (3, J), or (L, 3, J) where it differs.
     """
     return {name: rows[level] if rows.ndim == 3 else rows for name, rows in bands.items()}
+
+
+def freed(bands: Mapping[str, F64], free: Iterable[str]) -> dict[str, F64]:
+    """The same curves, the free ones as at the first level: their values do not matter, and they need no levels.
+
+    Args:
+        bands: as `at_level` takes them. free: names of the curves.
+    """
+    return {**bands, **at_level({name: bands[name] for name in free}, 0)}
 
 
 def num_levels(bands: Mapping[str, F64]) -> int:

@@ -33,10 +33,9 @@ def lit_surfaces(material: Material, emission: F64, meshes: Sequence[Mesh]) -> t
         The material, without the image where it is the same all over; and the mean radiance of its surfaces. (3,)
     """
     texture = material.textures["emission"]
-    of_faces = [(of_mesh, _areas(mesh)) for mesh in meshes for of_mesh in [shine_of_faces(texture, mesh)]]
-    area = sum(float(areas.sum()) for _, areas in of_faces)
-    total = sum(np.einsum("fc,f->c", of_mesh, areas) for of_mesh, areas in of_faces)
-    mean = np.asarray(total / max(area, 1e-30), np.float64)
+    areas = [_areas(mesh) for mesh in meshes]
+    total = sum(of_mesh @ shine_of_faces(texture, mesh) for of_mesh, mesh in zip(areas, meshes, strict=True))
+    mean = np.asarray(total / max(sum(float(of_mesh.sum()) for of_mesh in areas), 1e-30) * np.ones(3))
     others = {name: image for name, image in material.textures.items() if name != "emission"}
     if np.ptp(texture.pixels.reshape(-1, 3), axis=0).max() <= 2 or mean.max() <= 0:
         return replace(material, textures=others), emission * mean

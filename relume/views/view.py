@@ -227,6 +227,10 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         raise ChunkDamagedError(prefix, "its samples do not fit its size")
     if surface and int(material[surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
+    bounds = np.searchsorted(material[:surface], np.arange(num_materials + 1)).astype(np.int64)
+    level, ratios = read_levels(store, index, surface), read_ratios(store)
+    if any(not _are_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
+        raise ChunkDamagedError(prefix, "its levels of roughness do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     towards = camera.to_world[:3, 3] - store.read(f"{prefix}/position", 0, surface)
     normal = store.read(f"{prefix}/normal", 0, surface)
@@ -239,13 +243,18 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         store=store,
         memory=memory,
         key=key,
-        bounds=np.searchsorted(material[:surface], np.arange(num_materials + 1)).astype(np.int64),
+        bounds=bounds,
         pixel=pixel,
         first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
         order=order,
         gains=np.ascontiguousarray(gains[order], np.float32),
         textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
         cos_theta_o=np.clip(cosine, 0, 1),
-        level=read_levels(store, index, surface),
-        ratios=read_ratios(store),
+        level=level,
+        ratios=ratios,
     )
+
+
+def _are_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:
+    """Whether the levels of a material's samples rise, and are among those that it has."""
+    return len(level) == 0 or (int(level[-1]) < max(1, len(ratios)) and bool(np.all(level[1:] >= level[:-1])))

@@ -10,6 +10,7 @@ from sessions import BUDGET, bake_corner, look_of, make_next, relative_rmse, set
 from tiny_scenes import looking, quad, scene_of, sphere
 
 from relume.bake import Recipe
+from relume.errors import ChunkDamagedError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
@@ -18,6 +19,7 @@ from relume.picture.routes.preview import Preview
 from relume.reference import reference_image
 from relume.scene.model import Coding, Material, Texture
 from relume.store import bake_here
+from relume.views.view import open_view
 
 FLOOR = "/materials/Floor/terms/1/"
 
@@ -215,3 +217,18 @@ def test_probe_and_brush_know_the_level_of_a_pixel(direct) -> None:
     assert np.median(np.abs(summed - radiance) / radiance) < 1e-4  # pixels of edges see other surfaces as well
     share = picture.brush(pointer, 0, 90)
     assert np.median(share[y, x]) == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("damage", ["none of the material's", "not sorted"])
+def test_levels_that_do_not_fit_are_damage(direct, damage) -> None:
+    class Damaged:
+        attributes, shape = direct.store.attributes, direct.store.shape
+
+        def read(self, path, *rows):
+            found = direct.store.read(path, *rows)
+            if path.endswith("/level"):
+                found = found[::-1].copy() if damage == "not sorted" else found + np.uint8(200)
+            return found
+
+    with pytest.raises(ChunkDamagedError, match="levels of roughness"):
+        open_view(Damaged(), 0, Memory(BUDGET), "damaged")
