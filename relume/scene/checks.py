@@ -58,6 +58,18 @@ def check_glass(material: Material) -> None:
         raise SceneError(f"the glass of material {material.name!r} is out of range; import the scene again")
 
 
+def check_maps(material: Material) -> None:
+    """Raises SceneError where a texture is not of bytes that its channel stands for, or its scale is no number."""
+    for channel, texture in material.textures.items():
+        kind = None if texture.coding is None else texture.coding.kind
+        fits = kind == "share" if channel == "roughness" else kind in ("srgb", None)
+        scale = (1.0,) if texture.coding is None else texture.coding.scale
+        if not fits or not all(0 <= value < np.inf for value in scale):
+            raise SceneError(
+                f"the {channel} texture of material {material.name!r} is of no use; import the scene again"
+            )
+
+
 def check_camera(camera: Camera) -> None:
     """Raises SceneError unless the frame is rigid and finite and the field of view lies between 0 and 180°."""
     to_world = camera.to_world
@@ -98,7 +110,8 @@ def check_scene(
 
     Args:
         meshes: their shapes, indices and values are checked, and that they have at most `MAX_TRIANGLES` together.
-        materials: checked to have names of their own, opacity that is an image, and glass that bends and dims.
+        materials: checked to have names of their own, textures that fit, opacity that is an image, and glass that bends
+            and dims.
         cameras: checked to be rigid and to have names of their own.
         environment: its size and values are checked.
         lights: their number and names are checked; their fields are the look's to check.
@@ -120,6 +133,7 @@ def check_scene(
     for mesh in meshes:
         check_mesh(mesh, len(materials))
     for material in materials:
+        check_maps(material)
         check_opacity(material)
         check_glass(material)
     for camera in cameras:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.coding import rows_of
+from relume.scene.coding import decode
 from relume.scene.model import Material, Texture
 
 F32 = NDArray[np.float32]
@@ -15,7 +15,6 @@ MAX_LEVELS = 24
 # Levels are even in the root of the roughness: evenly rough ones would be told apart where they are smooth, and even
 # ratios where they are rough.
 _STEP = 0.02
-_BINS = 1024
 _STRAYS = 1e-3  # share of texels at each end that no level is made for
 
 
@@ -49,10 +48,6 @@ def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5
 
 
 def _histogram(texture: Texture) -> tuple[F64, F64]:
-    """How many texels have each root of a ratio, from none to the largest. (bins,) each"""
-    highest = np.sqrt(max(float(rows.max()) for rows in rows_of(texture)))
-    count = np.zeros(_BINS)
-    for rows in rows_of(texture):
-        place = np.rint(np.sqrt(rows) * ((_BINS - 1) / max(highest, 1e-6)))
-        count += np.bincount(place.astype(int).ravel(), minlength=_BINS)
-    return np.linspace(0, highest, _BINS), count
+    """The root of the ratio that each byte stands for, rising, and how many texels have it. (256,) each"""
+    values = decode(np.arange(256, dtype=np.uint8)[:, None], texture.coding)[:, 0]
+    return np.sqrt(values, dtype=np.float64), np.bincount(texture.pixels.ravel(), minlength=256).astype(np.float64)

@@ -234,3 +234,19 @@ def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
     kept = load_scene(tmp_path).materials[0].textures["roughness"]
     np.testing.assert_array_equal(kept.pixels, pixels)
     assert (kept.wrap, kept.coding) == (texture.wrap, texture.coding)
+
+
+@pytest.mark.parametrize(
+    ("channel", "texture"),
+    [
+        ("roughness", Texture(np.zeros((2, 2, 3), np.float32))),
+        ("roughness", Texture(np.zeros((2, 2, 3), np.uint8), coding=Coding("srgb"))),
+        ("roughness", Texture(np.zeros((2, 2, 1), np.uint8), coding=Coding("share", (float("nan"),) * 3))),
+        ("diffuse", Texture(np.zeros((2, 2, 1), np.uint8), coding=Coding("share"))),
+        ("emission", Texture(np.zeros((2, 2, 3), np.uint8), coding=Coding("srgb", (1.0, float("inf"), 1.0)))),
+    ],
+)
+def test_textures_that_their_channel_cannot_use_are_refused(channel: str, texture: Texture) -> None:
+    material = dataclasses.replace(small_scene().materials[0], textures={channel: texture})
+    with pytest.raises(SceneError, match=channel):
+        small_scene(materials=[material])
