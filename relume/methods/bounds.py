@@ -12,6 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from relume.bake import Recipe
+from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
 from relume.trace.glass import MAX_LAYERS, MOST_SHOWN, has_glass
 from relume.trace.merged import POSITIONS_A_PIXEL
@@ -46,8 +47,10 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Of the store: the triangles, their corners and the material of each; where rays pass some, which and where."""
-    triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + 4 * len(mesh.faces) for mesh in scene.meshes)
+    """Of the store: the triangles, their corners and the material of each, how brightly they shine where images say it;
+    where rays pass some, which and where."""
+    of_face = 8 if has_images(scene) else 4
+    triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + of_face * len(mesh.faces) for mesh in scene.meshes)
     if not any(material.lets_pass for material in scene.materials):
         return triangles
     return triangles + sum(mesh.uvs.nbytes for mesh in scene.meshes) + opacity_bytes(scene)

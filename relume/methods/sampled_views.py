@@ -45,6 +45,7 @@ from relume.trace.view_samples import BACKGROUND, sample_view
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
+_EMISSION_BYTES = 12
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 
@@ -87,7 +88,8 @@ class SampledViews:
             raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
         samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
-        in_store = samples * (bits + _SURFACE_BYTES) + bounds.lights_bytes(scene, recipe)
+        surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
+        in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
         return Plan(
             num_view_samples=samples,
             num_rays=samples * recipe.num_lights + bounds.camera_rays(scene, recipe),

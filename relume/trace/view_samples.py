@@ -125,11 +125,14 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
     )
     hit = chosen.hits.face >= 0
     material = np.where(hit, geometry.face_material[np.maximum(chosen.hits.face, 0)], BACKGROUND).astype(np.uint16)
+    order = np.lexsort((_morton(chosen.pixel, width), material))
     pixel_angle = camera.yfov / height
-    seen = surface_at(geometry, chosen.hits, chosen.directions, scene.materials, pixel_angle, origin)
-    level = _levels(scene, material, seen.roughness, _thresholds(chosen.pixel, width))
-    order = np.lexsort((_morton(chosen.pixel, width), level, material))
-    full, towards = seen.rows(order), chosen.directions[order]
+    hits, towards = chosen.hits.rows(order), chosen.directions[order]
+    full = surface_at(geometry, hits, towards, scene.materials, pixel_angle, origin)
+    level = _levels(scene, material[order], full.roughness, _thresholds(chosen.pixel[order], width))
+    if level.any():
+        by_level = np.lexsort((level, material[order]))
+        order, full, towards, level = order[by_level], full.rows(by_level), towards[by_level], level[by_level]
     outside = ~hit[order]
     full.diffuse[outside] = lookup(scene.environment.radiance, towards[outside])
     return ViewSamples(
@@ -138,6 +141,6 @@ def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, in
         material[order],
         full,
         sum(len(layer.ray) for layer in (*layers, *more)),
-        level[order],
+        level,
         chosen.through[order] if has_glass(scene.materials) else None,
     )
