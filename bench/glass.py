@@ -51,7 +51,7 @@ def measure(tiny: bool) -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
         ours, theirs = _ours(scene, size, tiny, Path(folder)), _theirs(scene, size, spp, Path(folder))
     found = over_passes(ours, theirs)
-    parts = {name: _said(_part(ours, theirs, *share)) for name, share in _PARTS.items()}
+    parts = {name: _part(ours, theirs, *share).said for name, share in _PARTS.items()}
     about = {**found.context, "size": list(size), "spp": PASSES * spp, **parts}
     return [Figure(_NAME, found.error.value, _UNIT, about, found.error.standard_error)]
 
@@ -61,10 +61,6 @@ def _part(ours: F64, theirs: F32, left: float, right: float, top: float, bottom:
     height, width, _ = ours.shape
     rows, columns = slice(int(top * height), int(bottom * height)), slice(int(left * width), int(right * width))
     return over_passes(ours[rows, columns], theirs[:, rows, columns])
-
-
-def _said(found: NoiseFree) -> str:
-    return f"{100 * found.error.value:.1f} % (bias {100 * found.bias.value:.1f} %)"
 
 
 def glass_scene() -> Scene:

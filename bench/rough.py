@@ -47,8 +47,13 @@ def measure(tiny: bool) -> list[Figure]:
         ours, mean = _ours(scene, size, 60 if tiny else _LIGHTS, Path(folder))
         theirs = _theirs(scene, size, spp, Path(folder))
     found, without = over_passes(ours, theirs), over_passes(mean, theirs)
-    said = f"{100 * without.error.value:.1f} % (bias {100 * without.bias.value:.1f} %)"
-    about = {**found.context, "size": list(size), "spp": PASSES * spp, "lights": _LIGHTS, "mean_roughness": said}
+    about = {
+        **found.context,
+        "size": list(size),
+        "spp": PASSES * spp,
+        "lights": _LIGHTS,
+        "mean_roughness": without.said,
+    }
     return [Figure(_NAME, found.error.value, _UNIT, about, found.error.standard_error)]
 
 

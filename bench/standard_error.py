@@ -41,6 +41,11 @@ class NoiseFree(NamedTuple):
         return self.error.value > 0 and self.limit**2 < 2 * self.error.value**2
 
     @property
+    def said(self) -> str:
+        """Error and bias in words, for the row of another figure."""
+        return f"{100 * self.error.value:.1f} % (bias {100 * self.bias.value:.1f} %)"
+
+    @property
     def context(self) -> dict[str, float]:
         """All but the error, for the row of a figure."""
         return {

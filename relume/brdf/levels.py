@@ -41,9 +41,10 @@ def follows_map(document: Mapping[str, Any]) -> bool:
 
 
 def at_ratio(document: Mapping[str, Any], ratio: float) -> dict[str, Any]:
-    """The document of a term where its material is `ratio` times as rough, within the range of its parameter."""
+    """The document of a term where its material is `ratio` times as rough, within the range of its parameter; the same
+    where it follows no map."""
     term = TERMS[document["model"]]
-    if term.width is None:
+    if term.width is None or not follows_map(document):
         return dict(document)
     name, power = term.width
     declared = term.parameter(name)

@@ -60,9 +60,5 @@ def kinds_of(scene: Scene, look: Look) -> Kinds:
         ratios = tuple(np.square(np.linspace(levels[0] ** 0.5, levels[-1] ** 0.5, num)).tolist()) if levels else ()
         kinds.first.append(len(kinds.terms))
         kinds.ratios.append(ratios)
-        kinds.terms.extend(_at(terms, ratio) for ratio in ratios or (1.0,))
+        kinds.terms.extend([at_ratio(term, ratio) for term in terms] for ratio in ratios or (1.0,))
     return kinds
-
-
-def _at(terms: Terms, ratio: float) -> Terms:
-    return [at_ratio(term, ratio) if follows_map(term) else term for term in terms]
