@@ -10,6 +10,7 @@ import math
 from functools import partial
 from typing import Any
 
+from relume.brdf.angles import acos_clamped
 from relume.brdf.local import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
 from relume.brdf.terms.lambert import one
@@ -28,9 +29,11 @@ def quotient(sigma, albedo, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     """
     if wi_z <= ZERO or wo_z <= ZERO:
         return ZERO
-    # tangents overflow within 2e-4 degrees of the horizon
-    theta_i, theta_o = math.acos(min(max(wi_z, MIN_COSINE), ONE)), math.acos(min(max(wo_z, MIN_COSINE), ONE))
-    alpha, beta = max(theta_i, theta_o), min(theta_i, theta_o)
+    # tangents overflow within 2e-4 degrees of the horizon; α is the larger of the two angles, β the smaller
+    cos_i, cos_o = min(max(wi_z, MIN_COSINE), ONE), min(max(wo_z, MIN_COSINE), ONE)
+    cos_alpha, cos_beta = min(cos_i, cos_o), max(cos_i, cos_o)
+    alpha, beta = acos_clamped(cos_alpha), acos_clamped(cos_beta)
+    sin_alpha, sin_beta = math.sqrt(ONE - cos_alpha * cos_alpha), math.sqrt(ONE - cos_beta * cos_beta)
     sines = math.sqrt((wi_x * wi_x + wi_y * wi_y) * (wo_x * wo_x + wo_y * wo_y))
     # straight from above there is no azimuth, and no tan β for it to multiply
     cos_phi = (wi_x * wo_x + wi_y * wo_y) / max(sines, 1e-12)
@@ -39,9 +42,10 @@ def quotient(sigma, albedo, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     share = variance / (variance + 0.09)
     low = beta * _PER_HALF_PI
     c1 = ONE - HALF * variance / (variance + 0.33)
-    c2 = 0.45 * share * (math.sin(alpha) - (low * low * low if cos_phi < ZERO else ZERO))
+    c2 = 0.45 * share * (sin_alpha - (low * low * low if cos_phi < ZERO else ZERO))
     c3 = 0.125 * share * (alpha * _PER_HALF_PI * low) ** 2
-    once = c1 + cos_phi * c2 * math.tan(beta) + c3 * (ONE - abs(cos_phi)) * math.tan(HALF * (alpha + beta))
+    tan_of_half = (sin_alpha + sin_beta) / (cos_alpha + cos_beta)  # of α + β
+    once = c1 + cos_phi * c2 * sin_beta / cos_beta + c3 * (ONE - abs(cos_phi)) * tan_of_half
     twice = albedo * 0.17 * variance / (variance + 0.13) * (ONE - cos_phi * low * low)
     # the published fit falls below zero where very rough facets are seen against grazing light
     return _PER_PI * max(once + twice, ZERO)
