@@ -2,8 +2,8 @@
 
 17,700 view samples of the teapot × 4,000 light triangles; pairs are those of a sample and a light that it sees. The
 limit: as many pairs whose angles at three nodes, one for each curve, are computed from arrays in a row by the same
-threads: arithmetic alone, nothing listed, looked up or weighed. `shade.vs_leaves`: the time of the sums that operators are
-made by (`Projector` with no curve free), over that of `shade`. The smallest of three terms counts.
+threads: arithmetic alone, nothing listed, looked up or weighed. `shade.vs_leaves`: the time of the sums that operators
+are made by (`Projector` with no curve free), over that of `shade`. The smallest of three terms counts.
 """
 
 from __future__ import annotations

@@ -13,10 +13,6 @@ _HALF = np.float32(0.5)
 _ZERO = np.float32(0)
 # float32 holds an arc cosine near one to 5e-4
 _SLACK = np.float32(1e-3)
-# of each byte: its set bits, then the others, and how many are set
-_BITS = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").astype(bool)
-_NUM_SET = _BITS.sum(axis=1)
-_SET_BITS = np.argsort(~_BITS, axis=1, kind="stable").astype(np.int32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -98,7 +94,7 @@ def list_lights(  # type: ignore[no-untyped-def]
         kinds: angles of the curves. support: radians beyond which each is nothing. (C,) float32
         start, stop: the points.
         first: written, where the entries of each point begin. (points + 1,) int64
-        light: written, number of the light of each entry. (K + 8,) int32
+        light: written, number of the light of each entry. (K + 1,) int32
         wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
     Returns:
         K, the number of entries.
@@ -109,11 +105,9 @@ def list_lights(  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         begin = end
         first[p - start] = begin
-        for byte in range((num_lights + 7) // 8):
-            seen = visible[p, byte]
-            for k in range(8):  # always all of them: a branch would be guessed wrong at shadow edges
-                light[end + k] = 8 * byte + _SET_BITS[seen, k]
-            end += _NUM_SET[seen]
+        for m in range(num_lights):
+            light[end] = m  # kept where the light is seen; a branch would be guessed wrong at shadow edges
+            end += (visible[p, m >> 3] >> (m & 7)) & 1
         nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
         bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx

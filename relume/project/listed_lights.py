@@ -36,7 +36,7 @@ class ListedLights:
         self._support = contraction.support * np.float32(np.pi / 2) / contraction.num_bands.astype(np.float32)
         capacity = POINTS_A_BLOCK * lights.num_lights
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
-        self.light = np.empty(capacity + 8, np.int32)
+        self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
 
     def list(self, start: int, stop: int) -> tuple[F32, F32]:
