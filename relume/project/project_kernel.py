@@ -90,9 +90,7 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
 def _append(gamma, which, count, nodes, bent, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
     """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
 
-    An angle bends a little over a leaf, nearly always the same way: what is linear between its corners would lie too
-    high. All three are moved by as much as the mean of the midpoints differs from theirs, times `bent`, so that the
-    mean angle is right to the third order of the leaf's size instead of the second.
+    Corners move by `bent` times as much as angles bend, which is nearly always one way (docs/method.md, "Overlap").
     """
     for k in range(gamma.shape[0]):
         a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]

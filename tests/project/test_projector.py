@@ -267,3 +267,14 @@ def test_extreme_directions_stay_finite(lights):
         transport = project(model, default_bands(model), name, lights, receivers)
         assert np.isfinite(transport).all()
         assert transport.min() >= -1e-6 * max(transport.max(), 1e-6)
+
+
+def test_highlights_are_those_of_finely_divided_light():
+    """An angle bends over a leaf nearly always the same way: uncorrected, these were 1 % too dark."""
+    lights = subdivide(studio(), 1000)
+    receivers = twins.only_above(twins.make_receivers(24, lights.num_lights, seed=4), lights)
+    bands = default_bands("ggx", roughness=0.2)
+    expected = twins.project(TERMS["ggx"], bands, None, lights, receivers, depth=4)[:, 0]
+    found = image("ggx", bands, None, lights, receivers)
+    assert np.sqrt(np.square(found - expected).mean() / np.square(expected).mean()) < 3e-3
+    assert abs(found.sum() / expected.sum() - 1) < 1.5e-3

@@ -10,7 +10,6 @@ import math
 from functools import partial
 from typing import Any
 
-from relume.brdf.angles import acos_clamped
 from relume.brdf.local import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
 from relume.brdf.terms.lambert import one
@@ -32,7 +31,7 @@ def quotient(sigma, albedo, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     # tangents overflow within 2e-4 degrees of the horizon; α is the larger of the two angles, β the smaller
     cos_i, cos_o = min(max(wi_z, MIN_COSINE), ONE), min(max(wo_z, MIN_COSINE), ONE)
     cos_alpha, cos_beta = min(cos_i, cos_o), max(cos_i, cos_o)
-    alpha, beta = acos_clamped(cos_alpha), acos_clamped(cos_beta)
+    alpha, beta = math.acos(cos_alpha), math.acos(cos_beta)
     sin_alpha, sin_beta = math.sqrt(ONE - cos_alpha * cos_alpha), math.sqrt(ONE - cos_beta * cos_beta)
     sines = math.sqrt((wi_x * wi_x + wi_y * wi_y) * (wo_x * wo_x + wo_y * wo_y))
     # straight from above there is no azimuth, and no tan β for it to multiply
