@@ -24,6 +24,7 @@ from bench.figure import Figure
 from bench.gather import bake, recipe_of, settle
 from bench.rays import embreex_scene
 from bench.timing import in_turn, seconds
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.look import validate
 from relume.memory import Memory
 from relume.methods.registry import open_transfer
@@ -32,7 +33,6 @@ from relume.picture.transfer import Transfer
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
 from relume.trace.geometry import merge
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 _NAMES = ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")
 _SPEED = "frames/s"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.triangles import TriangleLights, subdivide
 from relume.operators.frozen import Frozen, freeze
 from relume.operators.stream import columns_of, stream
@@ -20,7 +21,6 @@ from relume.reference import Points
 from relume.reference.image import points_of
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
-from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 
 
@@ -50,7 +50,7 @@ def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights:
     rows = np.nonzero(wanted)[0]
     rng = np.random.default_rng(5)
     chosen = np.sort(rng.permutation(rows)[:num_points])
-    points = points_of(samples, camera.to_world[:3, 3]).rows(chosen)
+    points = points_of(samples).rows(chosen)
     lights = subdivide(scene.environment.radiance, num_lights)
     visible = trace_visibility(geometry.embree, points.position, points.normal, lights.direction).visible
     return Lit(geometry, points, lights, Receivers(samples.surface.points.rows(chosen), points.wo, visible))

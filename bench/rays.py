@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure
 from bench.timing import in_turn
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.triangles import subdivide
 from relume.parallel import for_ranges, num_threads
 from relume.scene.demo import demo_scene
 from relume.trace.geometry import Geometry, merge
-from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 
 F32 = NDArray[np.float32]

@@ -12,10 +12,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from relume.bake import Recipe
+from relume.eye.layers import most_layers, most_shown
+from relume.eye.merged import POSITIONS_A_PIXEL
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
-from relume.trace.glass import MAX_LAYERS, MOST_SHOWN, has_glass
-from relume.trace.merged import POSITIONS_A_PIXEL
 
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 
@@ -29,16 +29,15 @@ _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power,
 
 
 def samples_of_view(scene: Scene, recipe: Recipe) -> int:
-    """View samples of one view: every position of every pixel sees something else, and glass before it."""
+    """View samples of one view: every position of every pixel sees something else, glass before it, more in mirrors."""
     width, height = recipe.size
-    return POSITIONS_A_PIXEL * width * height * (1 + MOST_SHOWN if has_glass(scene.materials) else 1)
+    return POSITIONS_A_PIXEL * width * height * most_shown(scene.materials)
 
 
 def camera_rays(scene: Scene, recipe: Recipe) -> int:
-    """Rays that find the samples of all views: one through each pixel, then all positions of each, and on by glass."""
+    """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
     width, height = recipe.size
-    ways = MAX_LAYERS if has_glass(scene.materials) else 1
-    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views) * ways
+    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views) * most_layers(scene.materials)
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:

@@ -34,7 +34,7 @@ from relume.trace.cell_tree import MAX_CELLS
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.coherent import trace_coherent
 from relume.trace.links import trace_links
-from relume.views.store_io import pattern_of_material, read_camera, read_points, towards_eye
+from relume.views.store_io import pattern_of_material, read_eyes, read_points, towards
 
 CELLS_A_SHARD = 4096
 RAYS_A_SAMPLE, RAYS_A_POINT = 610, 55
@@ -158,7 +158,7 @@ class GatherMethod:
         k = recipe.views.index(task.view)
         seed, parts = np.arange(task.start, task.stop, dtype=np.uint32), []
         points = read_points(store, k, task.start, task.stop, seed)
-        wo = towards_eye(read_camera(store, k), points.position)
+        wo = towards(read_eyes(store, k, task.start, task.stop), points.position)
         material = store.read(f"views/{k}/material", task.start, task.stop)
         geometry, tree = self._views.geometry_of(scene), self._tree_of(store)
         for index in np.unique(material):

@@ -171,7 +171,8 @@ class LocalLights:
         """Whether points of a material that shines are seen from a side that does.
 
         Args:
-            material: its index. eye: place that they are seen from. (3,) position: of the points. (n, 3) float32
+            material: its index. eye: places that they are seen from. (n, 3) or (1, 3) float32
+            position: of the points. (n, 3) float32
         """
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)

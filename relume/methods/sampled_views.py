@@ -12,7 +12,8 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     views/<k>/position, normal, tangent, diffuse, specular, uv
     scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
     views/<k>/level                                          of roughness: relume.scene.roughness
-    views/<k>/through                                        of scenes with glass: relume.trace.view_samples
+    views/<k>/through, eye, is_mirrored, mirror, mirror_cosine, mirror_tint
+                                                             of scenes with glass or mirrors: relume.eye.view_samples
     views/<k>/visibility                                     samples on surfaces only
     views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
 """
@@ -28,6 +29,9 @@ from numpy.typing import NDArray
 
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.errors import PlanError
+from relume.eye.layers import has_layers
+from relume.eye.mirrors import MOST_MIRRORS
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import weigh
 from relume.look import default_look
@@ -39,13 +43,12 @@ from relume.scene.model import Camera, Scene
 from relume.scene.roughness import levels_of
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
-from relume.trace.glass import has_glass
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES = 12
+_LAYER_BYTES = 12 + 12 + 1 + MOST_MIRRORS * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 
@@ -89,6 +92,7 @@ class SampledViews:
         samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
+        surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
         return Plan(
             num_view_samples=samples,
@@ -115,7 +119,7 @@ class SampledViews:
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
             "has_holes": any(material.lets_pass for material in scene.materials),
-            "has_glass": has_glass(scene.materials),
+            "has_layers": has_layers(scene.materials),
             "has_emission_images": has_images(scene),
             "roughness_levels": [list(levels_of(material)) for material in scene.materials],
             "views": [_described(cameras[view]) for view in recipe.views],
@@ -164,8 +168,12 @@ class SampledViews:
             "diffuse": samples.surface.diffuse, "specular": samples.surface.specular, "uv": samples.surface.uv,
             "level": samples.level,
         }  # fmt: skip
-        if samples.through is not None:
-            arrays["through"] = samples.through
+        if has_layers(scene.materials):
+            chain = samples.chain
+            arrays |= {
+                "through": samples.through, "eye": samples.eye, "is_mirrored": samples.is_mirrored,
+                "mirror": chain.material, "mirror_cosine": chain.cos_theta_i, "mirror_tint": chain.tint,
+            }  # fmt: skip
         if has_images(scene):
             arrays["emission"] = samples.surface.emission
         prefix = f"views/{recipe.views.index(task.view)}"

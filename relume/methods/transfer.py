@@ -190,8 +190,7 @@ class BakedViews:
 
     def shines_at(self, view: View, material: int) -> NDArray[np.bool_]:
         """Whether the samples of a material that shines are seen from a side that does."""
-        eye = view.camera.to_world[:3, 3].astype(np.float32)
-        return self.local.shines_at(material, eye, view.points(material).position)
+        return self.local.shines_at(material, view.eyes(view.rows(material)), view.points(material).position)
 
     def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
         """Radiance of a view's samples of an environment. (n, 3) float32"""

@@ -1,6 +1,6 @@
 """Smooth edges while the eye moves: pixels across which what is seen changes get a few more rays, and the mean of all.
 
-A cheaper kin of what fixed views do (`relume.trace.view_samples`): the pixels are found from the middles of their
+A cheaper kin of what fixed views do (`relume.eye.view_samples`): the pixels are found from the middles of their
 neighbours, and the rays are as many as a frame has time for.
 """
 

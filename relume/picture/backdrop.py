@@ -25,6 +25,7 @@ from relume.picture.view_images import ViewImages
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
+_MAP = BackgroundLook(kind="map", color=(0, 0, 0), blur=0)
 MOST_SHARE = 8.0  # times what is behind: where next to nothing but reflected light arrives there is no measure
 _LEAST_GAIN = 1e-12  # what is not the environment's is divided by its gain, which multiplies the finished picture
 
@@ -80,6 +81,10 @@ class Backdrop:
         self._shown, self.is_transparent = shown, background.kind == "transparent"
         first = self._view.num_surface_samples
         radiance[:, first:] = self._behind(shown, None).T if shown.is_direct else 0
+        if self._view.mirrored is not None and shown.is_direct:  # mirrors show the light, whatever is put behind
+            seen = self._view.mirrored.sample[self._view.mirrored.sample >= first]
+            light_itself = shown._replace(background=_MAP, factor=light.environment_gain)
+            radiance[:, seen] = self._behind(light_itself, None)[seen - first].T
         return True
 
     def alpha(self, *, for_display: bool) -> F32:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.mirror import mirrored_share
 from relume.picture.light import Light
 from relume.picture.live_term import LiveTerm
 from relume.views.compose import add_term
@@ -29,6 +30,7 @@ class MaterialImage:
         self.num_samples = rows.stop - rows.start
         self._first = rows.start
         self._cos_theta_o, self._levels = view.cos_theta_o[rows], view.levels(index)
+        self._is_mirrored = view.is_mirrored[rows] if view.is_mirrored[rows].any() else None
         self._textures = {name: texture[rows] for name, texture in view.textures.items()}
         self.documents = list(documents)
         self._light = light
@@ -93,7 +95,7 @@ class MaterialImage:
             return False
         for k, term in enumerate(self.terms):
             color, texture, has_texture = self._factors(term)
-            outgoing = term.outgoing if self._factor is None else self._factor
+            outgoing = self._outgoing(term) if self._factor is None else self._factor
             add_term(term.displayed.image, color, texture, outgoing, has_texture, self._first, k == 0, radiance)
             term.is_composed = True
         own = radiance[:, self._first : self._first + self.num_samples]
@@ -112,7 +114,7 @@ class MaterialImage:
     def term_radiance(self, term: LiveTerm, image: F32, radiance: F32) -> None:
         """Write what another image of one term would give alone to `radiance`, (3, samples); the term stays."""
         color, texture, has_texture = self._factors(term)
-        add_term(image, color, texture, term.outgoing, has_texture, self._first, True, radiance)
+        add_term(image, color, texture, self._outgoing(term), has_texture, self._first, True, radiance)
 
     def factors_at(self, term: LiveTerm, sample: int) -> NDArray[np.float64]:
         """What multiplies a term's image at one of the material's samples. (3,) float64"""
@@ -120,11 +122,20 @@ class MaterialImage:
         factor = color.astype(np.float64)
         if has_texture:
             factor = factor * texture[sample]
-        return factor if term.outgoing is None else factor * term.outgoing[:, sample]
+        outgoing = self._outgoing(term)
+        return factor if outgoing is None else factor * outgoing[:, sample]
 
     def level_at(self, sample: int) -> int:
         """The level of roughness of one of the material's samples."""
         return int(self._levels.level[sample])
+
+    def _outgoing(self, term: LiveTerm) -> F32 | None:
+        """What multiplies a term's finished samples, None for one: its outgoing curves; of mirrors, whose picture other
+        samples have, the share that is none. (3, n)"""
+        if self._is_mirrored is None or not (share := mirrored_share(term.document)).any():
+            return term.outgoing
+        lobe = np.where(self._is_mirrored, (1 - share)[:, None], 1).astype(np.float32)
+        return lobe if term.outgoing is None else lobe * term.outgoing
 
     def _factors(self, term: LiveTerm) -> tuple[F32, F32, bool]:
         color = np.asarray(term.document["color"], np.float32)

@@ -151,6 +151,8 @@ class Picture:
         for index, material in enumerate(images.by_name.values()):
             if material.num_samples and material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
+        for index in images.follow_mirrors(self._look):
+            tiles.update(self._view.tiles_of_material[index])
         if is_new_behind or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
@@ -165,7 +167,7 @@ class Picture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
-        return encode(self._view, self._radiance, tiles, form, self._gain)
+        return encode(self._view, self._radiance, tiles, form, self._gain, self._images.mirrors.gains)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
@@ -181,7 +183,7 @@ class Picture:
     def image(self) -> F32:
         """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
         whole = [(0, 0, self._view.width, self._view.height)]
-        pixels = resolve(self._view, self._radiance, whole, self._gain)
+        pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.mirrors.gains)
         return pixels.reshape(self._view.height, self._view.width, 3)
 
     def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

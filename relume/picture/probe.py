@@ -41,9 +41,9 @@ def probe(
         raise ParameterError("pixel", [x, y], f"x below {view.width} and y below {view.height}")
     pixel = y * view.width + x
     entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
-    samples, gains = view.order[entries], view.gains[entries]
+    samples, gains = view.order[entries], images.mirrors.gains[entries]
     seen = gain * (radiance[:, samples] * gains.T).sum(axis=1)
-    heaviest = int(samples[np.argmax(gains.max(axis=1))])
+    heaviest = int(samples[np.argmax(view.gains[entries].max(axis=1))])
     index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
     found = {"material": None, "position": None, "normal": None, "radiance": seen, "bands": None, "curve": None}
     if index >= len(images.by_name):
@@ -111,7 +111,7 @@ def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: fl
     material.term_radiance(term, part, lit_radiance)
     view = images.view
     whole = [(0, 0, view.width, view.height)]
-    lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0), 0))
-    total = luminance(resolve(view, radiance, whole, 1.0))
+    lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0, images.mirrors.gains), 0))
+    total = luminance(resolve(view, radiance, whole, 1.0, images.mirrors.gains))
     share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 1e-9)
     return np.clip(share, 0, 1).reshape(view.height, view.width).astype(np.float32)

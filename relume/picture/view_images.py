@@ -20,6 +20,7 @@ from relume.operators.shade import Shaded, shaded_bytes
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of
 from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
+from relume.picture.mirrors import Mirrors
 from relume.picture.pointer import CurvePointer, ParameterPointer
 from relume.picture.transfer import Axis, Transfer
 from relume.project.receivers import Receivers
@@ -42,7 +43,7 @@ class ViewImages:
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: what arrives at them. default_light: what does under the scene's own look.
-        gain: what multiplies the finished picture.
+        gain: what multiplies the finished picture. mirrors: what they send on of it.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
@@ -55,6 +56,7 @@ class ViewImages:
             for index, name in enumerate(transfer.material_names)
         }
         self.gain = gain_of(self.default)
+        self.mirrors = Mirrors(self.view)
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
         """All that this view sees anything of."""
@@ -85,6 +87,12 @@ class ViewImages:
         """Surfaces send out themselves what they do in this light."""
         for name, material in self.by_name.items():
             material.set_emission(emission_of(light, name), self._shines)
+
+    def follow_mirrors(self, look: Look) -> list[int]:
+        """Bring mirrors to a look; returns the materials that send on something else than before."""
+        names = self.transfer.material_names
+        looks = {index: look.materials[names[index]] for index in self.mirrors.materials}
+        return self.mirrors.follow({k: None if one.catcher else one.terms for k, one in looks.items()})
 
     def arriving(self, material: MaterialImage, light: Light) -> tuple[TriangleLights, Receivers]:
         """What arrives at the samples of a material in a light; shadows that the memory lacks are traced."""

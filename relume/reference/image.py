@@ -13,6 +13,7 @@ from relume.bake import Recipe
 from relume.environments.equirect import lookup, turned
 from relume.environments.model import Environment
 from relume.errors import CancelledError
+from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
@@ -23,7 +24,6 @@ from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels, texels_of
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry, merge
-from relume.trace.view_samples import BACKGROUND, ViewSamples, sample_view
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -81,7 +81,7 @@ class _Shot:
     """What a view sees of a scene, and by which light.
 
     Attributes:
-        points: those of `samples`, which are sorted by material. eye: where they are seen from. (3,)
+        points: those of `samples`, which are sorted by material.
         light: the environment that the look names; texels: it as the look turns and weighs it.
     """
 
@@ -90,7 +90,6 @@ class _Shot:
     look: Look
     samples: ViewSamples
     points: Points
-    eye: F64
     light: Environment
     texels: Texels
     lamps: Sequence[LocalLamp]
@@ -118,12 +117,11 @@ class _Draw:
 def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
     """Trace a view's samples and find the look's light."""
     geometry = merge(scene)
-    samples = sample_view(scene, geometry, view, size)
+    samples = sample_view(scene, geometry, view, size, follows_mirrors=False)  # here mirrors are lobes like others
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
     texels = texels_of(light, look.environment.rotation).times(look.environment.gain)
-    eye = next(camera for camera in scene.cameras if camera.name == view).to_world[:3, 3]
     return _Shot(
-        scene, geometry, look, samples, points_of(samples, eye), eye, light, texels, lamps_of(scene, look)
+        scene, geometry, look, samples, points_of(samples), light, texels, lamps_of(scene, look)
     )  # fmt: skip
 
 
@@ -146,7 +144,7 @@ def _add_direct(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[flo
     for number, material in enumerate(shot.scene.materials):
         rows = shot.rows(number)
         if (emission := emission_of(shot.lamps, material.name)).any():
-            front = shot.geometry.is_front(shot.eye.astype(np.float32), shot.points.position[rows])
+            front = shot.geometry.is_front(shot.samples.eye[rows], shot.points.position[rows])
             shown = (front | material.double_sided)[:, None]
             radiance[rows] += emission * shown * shot.samples.surface.emission[rows]
 
@@ -174,10 +172,10 @@ def _add_reflected(radiance: F64, shot: _Shot, paths: Paths, draw: _Draw, progre
         progress((block + 1) / num_blocks)
 
 
-def points_of(samples: ViewSamples, eye: F64) -> Points:
+def points_of(samples: ViewSamples) -> Points:
     """View samples as points; those of the background have no surface and are not meant."""
     surface, points = samples.surface, samples.surface.points
-    towards = eye - points.position
+    towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
     return Points(points.position, points.normal, points.tangent, wo, textures, surface.roughness)

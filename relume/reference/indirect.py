@@ -111,7 +111,7 @@ def _places(
 ) -> tuple[Points, NDArray[np.int32]]:
     """What some of the rays have hit, seen from where they come, and its materials."""
     some = hits.rows(hit)
-    surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
+    surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE)
     textures = {"diffuse": surface.diffuse, "specular": surface.specular}
     points = Points(*surface.points[:3], -directions[hit], textures, surface.roughness)
     return points, geometry.face_material[some.face]

@@ -93,7 +93,7 @@ def choose_cells(
     evenly = (np.arange(POINTS_A_CELL) + 0.5) / POINTS_A_CELL
     chosen = np.array([rows[(evenly * len(rows)).astype(np.int64)] for rows in members], np.int64).reshape(-1)
     some = hits.rows(chosen)
-    surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE, np.zeros(3, np.float32))
+    surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE)
     shape = (len(members), POINTS_A_CELL, 3)
     return Cells(
         tree,

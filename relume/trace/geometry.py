@@ -49,7 +49,7 @@ class Geometry:
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
 
     def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
-        """Tell which points on surfaces (n, 3) are seen from a place (3,) on their outer side."""
+        """Tell which points on surfaces (n, 3) are seen from places, (3,) or (n, 3), on their outer side."""
         return is_front(self.embree, self.positions, self.faces, eye, points)
 
 
@@ -66,7 +66,7 @@ def is_front(
 
     Args:
         embree: the triangles. positions: their vertices. (num_vertices, 3) float32. faces: (num_faces, 3) uint32
-        eye: where they are seen from. (3,) float32. points: on the triangles. (n, 3) float32
+        eye: where they are seen from. (3,) float32, or (n, 3). points: on the triangles. (n, 3) float32
     Returns:
         (n,)
     """

@@ -76,7 +76,6 @@ def surface_at(
     directions: F32,
     materials: Sequence[Material] = (),
     pixel_angle: float = 0.0,
-    origin: F32 | None = None,
 ) -> Surface:
     """Interpolate the surface at ray hits.
 
@@ -84,7 +83,7 @@ def surface_at(
         geometry: the triangles. hits: the first hits of n rays.
         directions: unit, of the rays. (n, 3) float32
         materials: where given, textures and normal maps are evaluated, filtered over the pixel.
-        pixel_angle: angle that a pixel spans, radians. origin: of the rays. (3,) float32
+        pixel_angle: angle that a pixel spans, radians.
     Returns:
         Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
     """
@@ -92,7 +91,7 @@ def surface_at(
 
     def interpolate(start: int, stop: int) -> None:
         some = slice(start, stop)
-        parts[start] = _surface_at(geometry, hits.rows(some), directions[start:stop], materials, pixel_angle, origin)
+        parts[start] = _surface_at(geometry, hits.rows(some), directions[start:stop], materials, pixel_angle)
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
     columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
@@ -107,7 +106,6 @@ def _surface_at(
     directions: F32,
     materials: Sequence[Material],
     pixel_angle: float,
-    origin: F32 | None,
 ) -> tuple[F32, ...]:
     """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular, uv, roughness, emission."""
     hit = hits.face >= 0
@@ -127,7 +125,7 @@ def _surface_at(
     channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
     channels["roughness"] = np.ones((len(uv), 1), np.float32)
     footprint = np.zeros(len(uv), np.float32)
-    if materials and origin is not None:
+    if materials:
         (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
         uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
         distance = np.where(hit, hits.distance, 1.0)

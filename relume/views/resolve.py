@@ -67,13 +67,14 @@ def _pack(pixels, start, stop, out):  # type: ignore[no-untyped-def]
         out[p] = pack_rgb9e5(pixels[p, 0], pixels[p, 1], pixels[p, 2])
 
 
-def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike) -> F32:
+def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, gains: F32) -> F32:
     """Sum view samples to the pixels of tiles, one tile after another, row-major.
 
     Args:
         view: whose samples they are. tiles: which pixels are wanted.
         radiance: of every view sample. (3, samples) float32
         gain: multiplies each channel, as the environment's scale and colour do: a number or three.
+        gains: multiply the samples, in the view's order; `View.gains`, with those of what is seen in mirrors.
     Returns:
         (pixels, 3) float32
     """
@@ -82,20 +83,20 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike) -
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
     factors = np.array(np.broadcast_to(np.asarray(gain, np.float32), 3))
-    args = (radiance, factors, view.first, view.order, view.gains, view.width, table, offsets)
+    args = (radiance, factors, view.first, view.order, gains, view.width, table, offsets)
     for_shares(lambda start, stop: _resolve(*args, start, stop, out), len(table))
     return out
 
 
-def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: ArrayLike) -> bytes:
+def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: ArrayLike, gains: F32) -> bytes:
     """Encode pixels of tiles as a frame's payload.
 
     Args:
-        view, radiance, tiles, gain: as in `resolve`. form: "rgb9e5" or "f32" (see docs/api.md).
+        view, radiance, tiles, gain, gains: as in `resolve`. form: "rgb9e5" or "f32" (see docs/api.md).
     Raises:
         ParameterError: another format.
     """
-    return encode_pixels(resolve(view, radiance, tiles, gain), form)
+    return encode_pixels(resolve(view, radiance, tiles, gain, gains), form)
 
 
 def encode_coverage(alpha: F32, tiles: Sequence[Tile]) -> bytes:

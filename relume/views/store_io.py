@@ -71,10 +71,23 @@ def read_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray
     return Points(position, normal, tangent, seed)
 
 
-def towards_eye(camera: Camera, position: F32) -> F32:
-    """Find the unit directions from places (n, 3) to a camera: the wo of what it sees there. (n, 3) float32"""
-    towards = camera.to_world[:3, 3].astype(np.float32) - position
-    return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float32)
+def read_eyes(store: StoreReader, k: int, start: int, stop: int) -> F32:
+    """Read where samples are seen from: the camera, or what turned the way to them.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+    Returns:
+        (stop - start, 3) float32, or (1, 3) where it is the same for all
+    """
+    if store.attributes.get("has_layers"):
+        return np.asarray(store.read(f"views/{k}/eye", start, stop), np.float32)
+    return read_camera(store, k).to_world[None, :3, 3].astype(np.float32)
+
+
+def towards(eye: F32, position: F32) -> F32:
+    """Find the unit directions from places (n, 3) to eyes (n or 1, 3): the wo of what they see. (n, 3) float32"""
+    away = eye - position
+    return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True), np.float32)
 
 
 def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:

@@ -13,22 +13,24 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.brdf.levels import Levels
 from relume.errors import ChunkDamagedError
+from relume.eye.view_samples import BACKGROUND
 from relume.memory import Memory
 from relume.points import Points
 from relume.project.receivers import GatherRays, LocalRays, Receivers
 from relume.project.sent import Sent
 from relume.scene.model import Camera
-from relume.trace.view_samples import BACKGROUND
+from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
 from relume.views.store_io import (
     read_camera,
+    read_eyes,
     read_gather_rays,
     read_levels,
     read_points,
     read_ratios,
     read_seeds,
     read_uv,
-    towards_eye,
+    towards,
 )
 
 F32 = NDArray[np.float32]
@@ -46,7 +48,11 @@ class View:
         key: of the bake in `memory`.
         first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int64
         order: (n,) int32. gains: what the radiance of each is multiplied by for its pixel, in that order: its share of
-            it, and what glass lets through that is before it. (n, 1) float32, or (n, 3) where there is glass
+            it, and what glass lets through that is before it; nothing of samples that are seen in mirrors, for looks
+            say how much these send on. (n, 1) float32, or (n, 3) where there is glass or a mirror
+        eye: where the samples on surfaces are seen from. (surface samples, 3) float32, or (1, 3)
+        mirrored: samples that are seen in mirrors; None where none is.
+        is_mirrored: which samples on surfaces are mirrors whose picture others have. (surface samples,)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
     """
@@ -63,6 +69,9 @@ class View:
     first: NDArray[np.int64]
     order: NDArray[np.int32]
     gains: F32
+    eye: F32
+    mirrored: Mirrored | None
+    is_mirrored: NDArray[np.bool_]
     textures: dict[str, F32]
     cos_theta_o: NDArray[np.float64]
     level: NDArray[np.uint8]
@@ -97,6 +106,10 @@ class View:
         if not self.store.attributes.get("has_emission_images"):
             return np.ones((rows.stop - rows.start, 1), np.float32)
         return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
+
+    def eyes(self, rows: slice) -> F32:
+        """Find where samples on surfaces are seen from. (n, 3) float32, or (1, 3)"""
+        return self.eye if len(self.eye) == 1 else self.eye[rows]
 
     def points(self, material: int) -> Points:
         """Read a material's samples from the store as points."""
@@ -135,7 +148,7 @@ class View:
         gathered = () if reflected is None else (self.gather_rays(material, reflected),)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         level = self.level[rows] if self.ratios[material] else None
-        wo = towards_eye(self.camera, points.position)
+        wo = towards(self.eyes(rows), points.position)
         return Receivers(points, wo, visible, (*gathered, *local), uv, level)
 
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
@@ -160,10 +173,10 @@ class View:
         return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
 
     def directions_to(self, material: int) -> NDArray[np.float64]:
-        """Find the unit directions in which the camera sees a material's samples, from the store. (n, 3)"""
+        """Find the unit directions in which a material's samples are seen, from the store. (n, 3)"""
         rows = self.rows(material)
-        towards = self.store.read(f"views/{self.index}/position", rows.start, rows.stop) - self.camera.to_world[:3, 3]
-        return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True), np.float64)
+        position = self.store.read(f"views/{self.index}/position", rows.start, rows.stop)
+        return -towards(self.eyes(rows), position).astype(np.float64)
 
     def surface_at(self, sample: int) -> tuple[F32, F32]:
         """Read position and unit normal of a sample on a surface, world space. (3,) float32 each"""
@@ -219,7 +232,8 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
     pixel = store.read(f"{prefix}/pixel")
     material = store.read(f"{prefix}/material")
     gains = store.read(f"{prefix}/weight")[:, None]
-    if store.attributes.get("has_glass"):
+    has_layers = store.attributes.get("has_layers")
+    if has_layers or store.attributes.get("has_glass"):  # so stores said it that knew of no mirrors
         gains = gains * store.read(f"{prefix}/through")
     num_materials = len(store.attributes["materials"])
     surface = int(np.searchsorted(material, BACKGROUND))
@@ -232,9 +246,13 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
     if any(not _are_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
         raise ChunkDamagedError(prefix, "its levels of roughness do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
-    towards = camera.to_world[:3, 3] - store.read(f"{prefix}/position", 0, surface)
-    normal = store.read(f"{prefix}/normal", 0, surface)
-    cosine = np.einsum("nc,nc->n", normal, towards) / np.linalg.norm(towards, axis=1)
+    eye = read_eyes(store, index, 0, surface)
+    wo = towards(eye, store.read(f"{prefix}/position", 0, surface))
+    cosine = np.einsum("nc,nc->n", store.read(f"{prefix}/normal", 0, surface), wo.astype(np.float64))
+    mirrored = read_mirrored(store, index, order, gains, num_materials)
+    is_mirrored = store.read(f"{prefix}/is_mirrored", 0, surface) if has_layers else np.zeros(surface, np.bool_)
+    if mirrored is not None:
+        gains[mirrored.sample] = 0
     return View(
         camera=camera,
         index=index,
@@ -248,6 +266,9 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
         order=order,
         gains=np.ascontiguousarray(gains[order], np.float32),
+        eye=eye,
+        mirrored=mirrored,
+        is_mirrored=is_mirrored.astype(np.bool_),
         textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
         cos_theta_o=np.clip(cosine, 0, 1),
         level=level,

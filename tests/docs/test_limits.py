@@ -6,6 +6,7 @@ from pathlib import Path
 from relume.brdf import document as terms
 from relume.environments import asset_store as environments
 from relume.environments import reading as environment
+from relume.eye.merged import POSITIONS_A_PIXEL
 from relume.light import tiles
 from relume.look import document, patch
 from relume.measured import asset_store as materials
@@ -14,7 +15,6 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
-from relume.trace.merged import POSITIONS_A_PIXEL
 from server.queues.work_queue import MAX_QUEUED
 from server.records import looks, shares
 from server.wire import bodies, protocol, renders

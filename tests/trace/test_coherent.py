@@ -7,12 +7,12 @@ import pytest
 from tiny_scenes import looking, quad, scene_of, still_life, studio
 
 from relume.color import luminance
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.neighbours import neighbours_of
 from relume.light.triangles import TriangleLights, subdivide
 from relume.scene.demo import demo_scene
 from relume.trace.coherent import targets_of, trace_coherent
 from relume.trace.geometry import merge
-from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 
 UNKNOWN, LIT, HIDDEN, BELOW = range(4)

@@ -10,6 +10,7 @@ from tiny_scenes import looking, points_at, quad, scene_of
 from twins import opacity_at, unit
 
 from relume.errors import ChunkDamagedError
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.local import make_local, pattern_of
 from relume.look import LightGeometry
 from relume.scene.model import Glass, Material, Opacity
@@ -18,7 +19,6 @@ from relume.trace.cutouts import Cutouts, check_cutouts, cutouts_of
 from relume.trace.geometry import merge
 from relume.trace.local_shadows import trace_local
 from relume.trace.primary import trace_from
-from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 
 WHITE = ({"model": "lambert", "color": [1, 1, 1]},)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from tiny_scenes import points_at, quad, shining, still_life
 
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.gather_rays import shift_of
 from relume.light.local import light_sample, make_local, pattern_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
 from relume.trace.local_shadows import arriving, trace_local
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 UP = np.array([0, 1, 0], np.float32)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from tiny_scenes import points_at, still_life
 
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.local import make_local, pattern_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
 from relume.trace.local_shadows import arriving, trace_local
 from relume.trace.preview_light import BLOCK, preview_light
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 FAR = EmbreeScene.build(np.array([[90, 0, 0], [91, 0, 0], [91, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32))
 CORNERS = np.array([0, 5, 10, 15])

@@ -8,10 +8,10 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
 
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.triangles import subdivide
 from relume.trace.geometry import merge
 from relume.trace.primary import camera_directions, trace_from
-from relume.trace.view_samples import BACKGROUND, sample_view
 from relume.trace.visibility import trace_visibility
 
 GRAZING_SHARE = 2e-5  # of the rays; those that pass within rounding of an edge may go either way

@@ -68,7 +68,7 @@ def test_images_depend_on_the_code_of_frames_and_bakes_do_not():
     bakes = names(package, sources_of(code_version._BAKES, code_version._AFTER_BAKES))
     of_both = {"brdf/terms/ggx", "light/tiles", "light/triangles", "scene/model", "trace/cells", "views/store_io"}
     of_images = {"project/project_kernel", "operators/shade", "trace/local_shadows", "light/blur", "views/view"}
-    of_bakes = {"trace/coherent_kernel", "trace/photons", "trace/view_samples", "methods/gather", "store/writer"}
+    of_bakes = {"trace/coherent_kernel", "trace/photons", "eye/view_samples", "methods/gather", "store/writer"}
     assert of_both <= images & bakes
     assert of_images <= images - bakes
     assert of_bakes | {"scene/archive"} <= bakes

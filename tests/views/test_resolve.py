@@ -26,7 +26,8 @@ def make_view(width=100, height=70, seed=0):
     return View(
         camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, memory=None, key="",
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
-        order=order, gains=weight[order, None].astype(np.float32), textures={}, cos_theta_o=np.ones(len(pixel)),
+        order=order, gains=weight[order, None].astype(np.float32), eye=np.zeros((1, 3), np.float32),
+        mirrored=None, is_mirrored=np.zeros(len(pixel), np.bool_), textures={}, cos_theta_o=np.ones(len(pixel)),
         level=np.zeros(len(pixel), np.uint8), ratios=((),),
     )  # fmt: skip
 
@@ -43,7 +44,9 @@ def radiance(view):
 
 @pytest.mark.parametrize("gain", [0.0, 1.0, 2.5, (2.0, 0.0, 0.5)])
 def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
-    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain).reshape(view.height, view.width, 3)
+    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain, view.gains).reshape(
+        view.height, view.width, 3
+    )
     np.testing.assert_allclose(pixels, np.array(gain) * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
 
 
@@ -52,8 +55,8 @@ def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, coun
     tiles = view.all_tiles[::-1][:count]
     whole = twins.resolve(view, radiance.T.astype(float))
     expected = np.concatenate([whole[y : y + h, x : x + w].reshape(-1, 3) for x, y, w, h in tiles])
-    np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0), expected, rtol=2e-6)
-    payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0), "<f4").reshape(-1, 3)
+    np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0, view.gains), expected, rtol=2e-6)
+    payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0, view.gains), "<f4").reshape(-1, 3)
     np.testing.assert_allclose(payload, expected, rtol=2e-6)
 
 
@@ -69,15 +72,15 @@ def test_tiles_cover_the_picture_once():
 
 
 def test_no_tiles_are_no_bytes(view, radiance):
-    assert resolve(view, radiance, [], 1.0).shape == (0, 3)
-    assert encode(view, radiance, [], "f32", 1.0) == b""
-    assert encode(view, radiance, [], "rgb9e5", 1.0) == b""
+    assert resolve(view, radiance, [], 1.0, view.gains).shape == (0, 3)
+    assert encode(view, radiance, [], "f32", 1.0, view.gains) == b""
+    assert encode(view, radiance, [], "rgb9e5", 1.0, view.gains) == b""
 
 
 def test_packed_payload_is_the_packed_picture(view, radiance):
     tiles = view.all_tiles
-    pixels = resolve(view, radiance, tiles, 1.0)
-    words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0), "<u4")
+    pixels = resolve(view, radiance, tiles, 1.0, view.gains)
+    words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0, view.gains), "<u4")
     np.testing.assert_array_equal(words, rgb9e5_pack(pixels))
     error = np.abs(rgb9e5_unpack(words) - pixels)
     assert (error <= pixels.max(axis=1, keepdims=True) * 2**-9).all()
@@ -86,7 +89,7 @@ def test_packed_payload_is_the_packed_picture(view, radiance):
 @pytest.mark.parametrize("form", ["jpeg", "", "F32", "../x"])
 def test_other_formats_are_refused(view, radiance, form):
     with pytest.raises(ParameterError, match="'rgb9e5' or 'f32'"):
-        encode(view, radiance, view.all_tiles, form, 1.0)
+        encode(view, radiance, view.all_tiles, form, 1.0, view.gains)
 
 
 def packed(rgb):
@@ -139,7 +142,7 @@ def test_hostile_radiance_in_one_sample_stays_in_its_pixel(view, radiance):
     hurt = radiance.copy()
     hurt[0, 17], hurt[1, 17], hurt[2, 17] = np.nan, np.inf, -1e30
     whole = [(0, 0, view.width, view.height)]
-    words, clean = (np.frombuffer(encode(view, r, whole, "rgb9e5", 1.0), "<u4") for r in (hurt, radiance))
+    words, clean = (np.frombuffer(encode(view, r, whole, "rgb9e5", 1.0, view.gains), "<u4") for r in (hurt, radiance))
     others = np.arange(len(words)) != view.pixel[17]
     np.testing.assert_array_equal(words[others], clean[others])
     assert np.isfinite(rgb9e5_unpack(words)).all()

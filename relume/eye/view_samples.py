@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
+from relume.eye.layers import Layer, layers_of
+from relume.eye.merged import POSITIONS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
+from relume.eye.mirrors import MOST_MIRRORS
+from relume.eye.pixel_edges import edges_of, is_partly_there
+from relume.eye.ways import Chain
 from relume.scene.model import Scene
 from relume.scene.roughness import level_of, levels_of
 from relume.trace.cutout_filter import EVERYWHERE
 from relume.trace.geometry import Geometry
-from relume.trace.glass import has_glass, layers_of
-from relume.trace.merged import POSITIONS, POSITIONS_A_PIXEL, alone, joined, merged
-from relume.trace.pixel_edges import edges_of, is_partly_there
 from relume.trace.primary import camera_directions
 from relume.trace.surface import Surface, surface_at
 
@@ -43,8 +45,11 @@ class ViewSamples:
             environment's radiance in it.
         num_rays: how many were traced to find them.
         level: of roughness, see `relume.scene.roughness`; 0 where the material has but one. (n,) uint8
-        through: what glass before a sample lets through; None where there is none. Samples on glass and those behind
-            it have the same shares of a pixel. (n, 3) float32
+        through: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and those
+            seen in them, have the same shares of a pixel. (n, 3) float32
+        eye: where each is seen from: the camera, or the last surface that turned the way to it. (n, 3) float32
+        chain: the mirrors that it is seen in, `NO_MIRROR` where it is seen in fewer.
+        is_mirrored: whether its surface is a mirror, and other samples have what is seen in it. (n,)
     """
 
     pixel: NDArray[np.uint32]
@@ -53,12 +58,15 @@ class ViewSamples:
     surface: Surface
     num_rays: int
     level: NDArray[np.uint8]
-    through: F32 | None = None
+    through: F32
+    eye: F32
+    chain: Chain
+    is_mirrored: NDArray[np.bool_]
 
     @property
     def gains(self) -> F32:
-        """What the radiance of each sample is multiplied by for its pixel. (n, 1) float32, or (n, 3) behind glass"""
-        return self.weight[:, None] if self.through is None else self.weight[:, None] * self.through
+        """What the radiance of each sample is multiplied by for its pixel, mirrors apart. (n, 3) float32"""
+        return self.weight[:, None] * self.through
 
 
 def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
@@ -95,52 +103,60 @@ def _levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshol
     return level
 
 
-def sample_view(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int]) -> ViewSamples:
+def sample_view(
+    scene: Scene, geometry: Geometry, view: str, size: tuple[int, int], *, follows_mirrors: bool = True
+) -> ViewSamples:
     """Find the view samples of one camera.
 
     Args:
         scene: what is seen. geometry: its triangles.
         view: name of the camera. size: width and height in pixels.
+        follows_mirrors: whether what is seen in mirrors has samples.
     """
     width, height = size
     camera = next(camera for camera in scene.cameras if camera.name == view)
-    origin = camera.to_world[:3, 3].astype(np.float32)
+    origin, pixel_angle = camera.to_world[:3, 3].astype(np.float32), camera.yfov / height
+
+    def layers(directions: F32, chance: F32 | np.float32) -> list[Layer]:
+        return layers_of(
+            geometry, scene.materials, origin, directions, chance, pixel_angle, follows_mirrors=follows_mirrors
+        )
+
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    layers = layers_of(geometry, scene.materials, origin, directions, EVERYWHERE)
-    is_edge = np.any([edges_of(geometry, layer, size) for layer in layers], axis=0)
+    coarse = layers(directions, EVERYWHERE)
+    is_edge = np.any([edges_of(geometry, layer, size) for layer in coarse], axis=0)
     if geometry.embree.holes is not None and geometry.embree.holes.blends:
         is_edge |= is_partly_there(geometry, origin, directions)
 
     edge_pixel = np.nonzero(is_edge)[0]
     more_x = (x[edge_pixel, None] + POSITIONS[:, 0]).astype(np.float32).ravel()
     more_y = (y[edge_pixel, None] + POSITIONS[:, 1]).astype(np.float32).ravel()
-    more_directions = camera_directions(camera, size, more_x, more_y)
-    more = layers_of(geometry, scene.materials, origin, more_directions, _shared_chances(edge_pixel))
-    chosen = joined(
-        [
-            *(alone(layer, is_edge) for layer in layers),
-            *(merged(geometry, layer, edge_pixel) for layer in more),
-        ]
-    )
-    hit = chosen.hits.face >= 0
-    material = np.where(hit, geometry.face_material[np.maximum(chosen.hits.face, 0)], BACKGROUND).astype(np.uint16)
+    fine = layers(camera_directions(camera, size, more_x, more_y), _shared_chances(edge_pixel))
+    parts = [alone(layer, is_edge) for layer in coarse], [merged(geometry, layer, edge_pixel) for layer in fine]
+    chosen = joined([part for of_rays in parts for part in of_rays], MOST_MIRRORS)
+    num_rays = sum(len(layer.ray) for layer in (*coarse, *fine))
+    return _sorted_samples(scene, geometry, chosen, width, pixel_angle, num_rays)
+
+
+def _sorted_samples(
+    scene: Scene, geometry: Geometry, chosen: Chosen, width: int, pixel_angle: float, num_rays: int
+) -> ViewSamples:
+    """Make samples of rays. width: of the picture. pixel_angle: that a pixel spans. num_rays: that were traced."""
+    hit = chosen.seen.hits.face >= 0
+    face = np.maximum(chosen.seen.hits.face, 0)
+    material = np.where(hit, geometry.face_material[face], BACKGROUND).astype(np.uint16)
     order = np.lexsort((_morton(chosen.pixel, width), material))
-    pixel_angle = camera.yfov / height
-    hits, towards = chosen.hits.rows(order), chosen.directions[order]
-    full = surface_at(geometry, hits, towards, scene.materials, pixel_angle, origin)
+    seen = chosen.seen.rows(order)
+    full = surface_at(geometry, seen.hits, seen.directions, scene.materials, pixel_angle)
     level = _levels(scene, material[order], full.roughness, _thresholds(chosen.pixel[order], width))
     if level.any():
         by_level = np.lexsort((level, material[order]))
-        order, full, towards, level = order[by_level], full.rows(by_level), towards[by_level], level[by_level]
+        order, full, seen, level = order[by_level], full.rows(by_level), seen.rows(by_level), level[by_level]
     outside = ~hit[order]
-    full.diffuse[outside] = lookup(scene.environment.radiance, towards[outside])
+    full.diffuse[outside] = lookup(scene.environment.radiance, seen.directions[outside])
+    assert seen.chain is not None
     return ViewSamples(
-        chosen.pixel[order].astype(np.uint32),
-        chosen.weight[order],
-        material[order],
-        full,
-        sum(len(layer.ray) for layer in (*layers, *more)),
-        level,
-        chosen.through[order] if has_glass(scene.materials) else None,
-    )
+        chosen.pixel[order].astype(np.uint32), chosen.weight[order], material[order], full, num_rays, level,
+        seen.through, seen.eyes, seen.chain, seen.is_mirrored,
+    )  # fmt: skip

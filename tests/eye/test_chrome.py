@@ -10,10 +10,10 @@ import pytest
 from tiny_scenes import looking, mesh, scene_of, studio, torus
 
 from relume.environments.equirect import lookup
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.trace.geometry import merge
 from relume.trace.primary import Hits, camera_directions, trace_from
 from relume.trace.surface import surface_at
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 SIZE = (96, 72)
 FINE = 12

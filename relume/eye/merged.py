@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.eye.layers import Layer
+from relume.eye.pixel_edges import COS_TURN, is_off_plane
+from relume.eye.ways import Chain
 from relume.trace.geometry import Geometry
-from relume.trace.glass import Layer
-from relume.trace.pixel_edges import COS_TURN, is_off_plane
 from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
 
@@ -26,14 +27,12 @@ class Chosen(NamedTuple):
 
     Attributes:
         pixel: that each is of. (n,) int64. weight: share of it. (n,) float32
-        hits, directions, through: see `relume.trace.glass.Layer`.
+        seen: what each meets.
     """
 
     pixel: NDArray[np.int64]
     weight: F32
-    hits: Hits
-    directions: F32
-    through: F32
+    seen: Layer
 
 
 def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chosen:
@@ -44,51 +43,58 @@ def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chose
     Args:
         geometry: the triangles. layer: of the rays, eight of a pixel in a row. pixels: whose they are. (p,)
     """
-    shape = len(pixels), POSITIONS_A_PIXEL
-    row = layer.ray[layer.is_shown]
-    hits, directions = layer.hits.rows(layer.is_shown), layer.directions[layer.is_shown]
-    mesh, normal = np.full(shape, -2), np.zeros((*shape, 3), np.float32)
+    shape, seen = (len(pixels), POSITIONS_A_PIXEL), layer.shown
+    row, is_direct = seen.ray, layer.chain is None
+    key, normal, is_hit = np.full(shape, -2), np.zeros((*shape, 3), np.float32), np.zeros(shape, np.bool_)
     distance, rays, through = np.ones(shape, np.float32), np.ones((*shape, 3), np.float32), np.ones((*shape, 3))
-    mesh.flat[row] = np.where(hits.face >= 0, geometry.face_mesh[np.maximum(hits.face, 0)], -1)
-    distance.flat[row] = hits.distance
+    key.flat[row], distance.flat[row], is_hit.flat[row] = seen.key, seen.hits.distance, seen.hits.face >= 0
     for out, values in (
-        (normal, surface_at(geometry, hits, directions).points.normal),
-        (rays, directions),
-        (through, layer.through[layer.is_shown]),
+        (normal, surface_at(geometry, seen.hits, seen.directions).points.normal),
+        (rays, seen.directions),
+        (through, seen.through),
     ):
         out.reshape(-1, 3)[row] = values
-    group = np.where(mesh == -2, -2, -1)
+    group = np.where(key == -2, -2, -1)
     for candidate in range(POSITIONS_A_PIXEL):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
         one = slice(candidate, candidate + 1)
-        cosine = np.einsum("pkc,pc->pk", normal, normal[:, candidate])
-        off = is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
-        same = (group == -1) & (mesh == mesh[:, one]) & (((cosine > COS_TURN) & ~off) | (mesh < 0))
+        if is_direct:
+            is_alike = ~is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
+        else:  # a mirror's rays have no eye in common; they may go apart, to other parts of the background too
+            is_alike = np.einsum("pkc,pc->pk", rays, rays[:, candidate]) > COS_TURN
+        is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_TURN
+        same = (group == -1) & (key == key[:, one]) & (is_alike | (is_direct & ~is_hit))
         same &= (group[:, candidate] == -1)[:, None]
         group[same] = candidate
     pixel, first = np.nonzero(group == np.arange(POSITIONS_A_PIXEL))
     is_in = group[pixel] == first[:, None]
     size = is_in.sum(axis=1)
     kept = pixel * POSITIONS_A_PIXEL + _most_central(is_in, size)
-    place = np.searchsorted(row, kept)
     mean = np.einsum("gk,gkc->gc", is_in, through[pixel]) / size[:, None]
-    weight = (size / POSITIONS_A_PIXEL).astype(np.float32)
-    return Chosen(pixels[pixel], weight, hits.rows(place), directions[place], mean.astype(np.float32))
+    of_group = seen.rows(np.searchsorted(row, kept))._replace(through=mean.astype(np.float32))
+    return Chosen(pixels[pixel], (size / POSITIONS_A_PIXEL).astype(np.float32), of_group)
 
 
 def alone(layer: Layer, is_edge: NDArray[np.bool_]) -> Chosen:
     """The rays of a layer through the middles of pixels that are no edges. is_edge: of all pixels. (pixels,)"""
     rows = np.flatnonzero(layer.is_shown & ~is_edge[layer.ray])
-    weight = np.ones(len(rows), np.float32)
-    return Chosen(layer.ray[rows], weight, layer.hits.rows(rows), layer.directions[rows], layer.through[rows])
+    return Chosen(layer.ray[rows], np.ones(len(rows), np.float32), layer.rows(rows))
 
 
-def joined(parts: Sequence[Chosen]) -> Chosen:
-    """All of several."""
-    pixel, weight, directions, through = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("pixel", "weight", "directions", "through")
+def joined(parts: Sequence[Chosen], most_mirrors: int) -> Chosen:
+    """All of several. most_mirrors: that any ray has met."""
+    seen = [part.seen for part in parts]
+    chains = [Chain.filled(one.chain, len(one.ray), most_mirrors) for one in seen]
+    arrays = ("ray", "directions", "through", "is_shown", "eyes", "is_mirrored", "key")
+    return Chosen(
+        np.concatenate([part.pixel for part in parts]),
+        np.concatenate([part.weight for part in parts]),
+        Layer(
+            hits=Hits.joined([one.hits for one in seen]),
+            chain=Chain(*map(np.concatenate, zip(*chains, strict=True))),
+            **{name: np.concatenate([getattr(one, name) for one in seen]) for name in arrays},
+        ),
     )
-    return Chosen(pixel, weight, Hits.joined([part.hits for part in parts]), directions, through)
 
 
 def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,11 +7,11 @@ import pytest
 from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
 
 from relume.environments.equirect import direction_to_uv
+from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.scene.model import Material, Texture
 from relume.trace.geometry import merge
 from relume.trace.primary import camera_directions
 from relume.trace.texture import MipMap
-from relume.trace.view_samples import BACKGROUND, sample_view
 
 SIZE = (64, 48)
 WHITE = ({"model": "lambert", "color": [1, 1, 1]},)

@@ -13,6 +13,9 @@ from twins import unit
 
 from relume.bake import Recipe
 from relume.brdf.fresnel import fresnel
+from relume.eye.glass import MAX_GLASS, dielectric
+from relume.eye.layers import layers_of
+from relume.eye.view_samples import sample_view
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.picture import MovingPicture
@@ -22,8 +25,6 @@ from relume.render.image import render_image
 from relume.scene.model import Glass, Material
 from relume.store import bake_here
 from relume.trace.geometry import merge
-from relume.trace.glass import MAX_LAYERS, dielectric, layers_of
-from relume.trace.view_samples import sample_view
 from relume.trace.visibility import trace_visibility
 
 SIZE = (64, 48)
@@ -120,7 +121,7 @@ def test_a_slab_shifts_what_is_behind_it_as_snell_says(ior):
 def test_rays_that_are_kept_inside_end_somewhere():
     scene = scene_with(sphere("ball", [0, 0, 0], 0.8, 1, rings=24), material=glass(thickness=1.6, ior=2.4))
     layers = followed(scene, slanted(2000))
-    assert 3 <= len(layers) <= MAX_LAYERS
+    assert 3 <= len(layers) <= MAX_GLASS
     for before, after in pairwise(layers):
         assert set(after.ray) <= set(before.ray)
         assert (after.through <= 1).all()

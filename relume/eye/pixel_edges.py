@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.eye.layers import Layer
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.geometry import Geometry
-from relume.trace.glass import Layer
 from relume.trace.primary import trace_from
 from relume.trace.surface import surface_at
 
@@ -76,8 +76,10 @@ def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray
     surface = surface_at(geometry, layer.hits, layer.directions)
     key, normal = np.full(width * height, -2), np.zeros((width * height, 3), np.float32)
     distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
-    key[layer.ray] = np.where(layer.hits.face >= 0, geometry.face_mesh[np.maximum(layer.hits.face, 0)], -1)
-    normal[layer.ray], distance[layer.ray] = surface.points.normal, layer.hits.distance
+    key[layer.ray] = layer.key
+    normal[layer.ray] = surface.points.normal
+    if layer.chain is None:  # a mirror's rays have no eye in common: no steps in depth are told in it
+        distance[layer.ray] = layer.hits.distance
     directions[layer.ray] = layer.directions
     shape = (height, width)
     seen = key.reshape(shape)

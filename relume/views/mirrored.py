@@ -1,0 +1,56 @@
+"""Samples of a view that are seen in mirrors: by which, and how they count for their pixels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.errors import ChunkDamagedError
+from relume.eye.ways import NO_MIRROR, Chain
+
+F32 = NDArray[np.float32]
+
+
+class Mirrored(NamedTuple):
+    """m samples that are seen in mirrors, of a view's n.
+
+    Attributes:
+        sample: their rows, ascending. (m,) int64
+        place: of each in the view's `order`. (m,) int64
+        gain: what its radiance is multiplied by for its pixel, mirrors apart. (m, 3) float32
+        chain: the mirrors that it is seen in.
+    """
+
+    sample: NDArray[np.int64]
+    place: NDArray[np.int64]
+    gain: F32
+    chain: Chain
+
+
+def read_mirrored(
+    store: StoreReader, k: int, order: NDArray[np.int32], gains: F32, num_materials: int
+) -> Mirrored | None:
+    """Read which samples of a view are seen in mirrors; None where none is.
+
+    Args:
+        store: an open store. k: number of the view. order: of its samples, by pixel. (n,)
+        gains: of each sample. (n, 3) num_materials: of the scene.
+    Raises:
+        ChunkDamagedError: a mirror is of a material that the scene has not.
+    """
+    if not store.attributes.get("has_layers"):
+        return None
+    prefix = f"views/{k}"
+    material = store.read(f"{prefix}/mirror")
+    sample = np.flatnonzero(material[:, 0] != NO_MIRROR)
+    if not len(sample):
+        return None
+    if int(np.where(material == NO_MIRROR, 0, material).max()) >= num_materials:
+        raise ChunkDamagedError(prefix, "a mirror has a material that the scene has not")
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    chain = Chain(material, store.read(f"{prefix}/mirror_cosine"), store.read(f"{prefix}/mirror_tint"))
+    return Mirrored(sample, place[sample], np.array(gains[sample], np.float32), chain.rows(sample))
