@@ -17,8 +17,9 @@ from relume.color import luminance, srgb_encode
 from relume.look import EnvironmentKey, Look
 from relume.look.model import BackgroundLook, Rgb
 from relume.picture.coverage import Coverage
-from relume.picture.light import Light
+from relume.picture.light import Light, Source
 from relume.picture.material_image import MaterialImage
+from relume.picture.mirrors import rectangles_of
 from relume.picture.unshadowed import Unshadowed
 from relume.picture.view_images import ViewImages
 
@@ -35,12 +36,14 @@ class _Shown(NamedTuple):
 
     Attributes:
         factor: multiplies the map, or the colour, for the gain of the finished picture is yet to.
+        lamps: that shine before it in mirrors.
     """
 
     background: BackgroundLook
     environment: EnvironmentKey
     factor: tuple[float, ...]
     is_direct: bool
+    lamps: tuple[Source, ...]
 
 
 class Backdrop:
@@ -70,7 +73,8 @@ class Backdrop:
         """
         background = look.background
         factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
-        shown = _Shown(background, light.environment, factor, light.paths.direct)
+        lamps = self._images.mirrors.lamps(light)
+        shown = _Shown(background, light.environment, factor, light.paths.direct, rectangles_of(light))
         for name, material in self._images.by_name.items():
             if material.num_samples and look.materials[name].catcher:
                 self._catch(material, shown, light)
@@ -85,6 +89,8 @@ class Backdrop:
             seen = self._view.mirrored.sample[self._view.mirrored.sample >= first]
             light_itself = shown._replace(background=_MAP, factor=light.environment_gain)
             radiance[:, seen] = self._behind(light_itself, None)[seen - first].T
+            if lamps is not None:
+                radiance[:, seen] += lamps[:, len(lamps.T) - len(seen) :]
         return True
 
     def alpha(self, *, for_display: bool) -> F32:

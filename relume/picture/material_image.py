@@ -40,6 +40,7 @@ class MaterialImage:
         self._factor: F32 | None = None
         self._most: F32 | None = None
         self._unlit: F32 | None = None
+        self._before: F32 | None = None
         self.factor_key: Hashable = None
         self._is_current = False
         self.num_composed = 0
@@ -84,6 +85,15 @@ class MaterialImage:
             self.factor_key, self._factor, self._most, self._unlit = key, factor, most, unlit
             self._is_current = False
 
+    def set_before(self, before: F32 | None) -> None:
+        """What shines between mirrors and samples that are seen in them, (3, n): the same array while it is the same.
+
+        Args:
+            before: of all of the view that are seen in mirrors. (3, m) float32, None for nothing
+        """
+        if before is not self._before:
+            self._before, self._is_current = before, False
+
     @property
     def is_caught(self) -> bool:
         """Whether only shadows on it are shown."""
@@ -107,6 +117,10 @@ class MaterialImage:
             own += self._unlit
         if self._shines is not None and any(self._emission):
             own += np.array(self._emission, np.float32)[:, None] * self._shines.T
+        seen = self._view.mirrored
+        if self._before is not None and seen is not None:
+            among = seen.within(self._view.rows(self.index))
+            own[:, seen.sample[among] - self._first] += self._before[:, among]
         self._is_current = True
         self.num_composed += 1
         return True

@@ -148,7 +148,9 @@ class Picture:
         tiles: set[Tile] = set()
         light, gain = transition.light, self._backdrop.gain_of(transition.gain, self._look.background)
         is_new_behind = self._backdrop.follow(self._look, light, gain, self._radiance)
+        lamps = images.mirrors.lamps(light)
         for index, material in enumerate(images.by_name.values()):
+            material.set_before(lamps)
             if material.num_samples and material.compose(self._radiance):
                 tiles.update(self._view.tiles_of_material[index])
         for index in images.follow_mirrors(self._look):

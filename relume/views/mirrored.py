@@ -22,22 +22,32 @@ class Mirrored(NamedTuple):
         place: of each in the view's `order`. (m,) int64
         gain: what its radiance is multiplied by for its pixel, mirrors apart. (m, 3) float32
         chain: the mirrors that it is seen in.
+        eye: where the last of them is. (m, 3) float32. direction: from there, unit. (m, 3) float32
+        distance: from there; infinite of the background. (m,) float32
     """
 
     sample: NDArray[np.int64]
     place: NDArray[np.int64]
     gain: F32
     chain: Chain
+    eye: F32
+    direction: F32
+    distance: F32
+
+    def within(self, rows: slice) -> slice:
+        """Which of them are among some rows of the view."""
+        first, stop = np.searchsorted(self.sample, (rows.start, rows.stop))
+        return slice(int(first), int(stop))
 
 
 def read_mirrored(
-    store: StoreReader, k: int, order: NDArray[np.int32], gains: F32, num_materials: int
+    store: StoreReader, k: int, order: NDArray[np.int32], gains: F32, num_surface: int
 ) -> Mirrored | None:
     """Read which samples of a view are seen in mirrors; None where none is.
 
     Args:
         store: an open store. k: number of the view. order: of its samples, by pixel. (n,)
-        gains: of each sample. (n, 3) num_materials: of the scene.
+        gains: of each sample. (n, 3) num_surface: of the samples, those that are on surfaces, which come first.
     Raises:
         ChunkDamagedError: a mirror is of a material that the scene has not.
     """
@@ -48,9 +58,15 @@ def read_mirrored(
     sample = np.flatnonzero(material[:, 0] != NO_MIRROR)
     if not len(sample):
         return None
-    if int(np.where(material == NO_MIRROR, 0, material).max()) >= num_materials:
+    if int(np.where(material == NO_MIRROR, 0, material).max()) >= len(store.attributes["materials"]):
         raise ChunkDamagedError(prefix, "a mirror has a material that the scene has not")
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     chain = Chain(material, store.read(f"{prefix}/mirror_cosine"), store.read(f"{prefix}/mirror_tint"))
-    return Mirrored(sample, place[sample], np.array(gains[sample], np.float32), chain.rows(sample))
+    eye, direction = (store.read(f"{prefix}/{name}")[sample] for name in ("eye", "position"))
+    distance, on_surface = np.full(len(sample), np.inf, np.float32), slice(0, int(np.searchsorted(sample, num_surface)))
+    away = direction[on_surface] - eye[on_surface]
+    distance[on_surface] = np.linalg.norm(away, axis=1)
+    direction[on_surface] = away / np.maximum(distance[on_surface], 1e-30)[:, None]
+    gain = np.array(gains[sample], np.float32)
+    return Mirrored(sample, place[sample], gain, chain.rows(sample), eye, direction, distance)

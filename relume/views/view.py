@@ -249,7 +249,7 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
     eye = read_eyes(store, index, 0, surface)
     wo = towards(eye, store.read(f"{prefix}/position", 0, surface))
     cosine = np.einsum("nc,nc->n", store.read(f"{prefix}/normal", 0, surface), wo.astype(np.float64))
-    mirrored = read_mirrored(store, index, order, gains, num_materials)
+    mirrored = read_mirrored(store, index, order, gains, surface)
     is_mirrored = store.read(f"{prefix}/is_mirrored", 0, surface) if has_layers else np.zeros(surface, np.bool_)
     if mirrored is not None:
         gains[mirrored.sample] = 0

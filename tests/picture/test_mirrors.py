@@ -211,3 +211,50 @@ def test_gather_pictures_have_mirrors_too(tmp_path):
     direct = baked(room(metal()), tmp_path, "direct", (32, 24))
     is_mirror = transfer.views["front"].material_ids() == 0
     assert shown(transfer)[is_mirror].mean() > shown(direct)[is_mirror].mean()
+
+
+def test_a_rectangle_that_shines_is_seen_in_a_mirror_where_it_hangs(hung):
+    centre, side = np.array([0.0, 1.6, 0.5]), 0.6
+
+    def lamp(towards):
+        def change(document):
+            document["environment"]["scale"] = 0
+            document["lights"] = {
+                "Panel": {"kind": "rectangle", "position": centre.tolist(), "direction": [0, 0, towards],
+                          "size": [side, side], "emission": [7, 7, 7]}
+            }  # fmt: skip
+
+        return change
+
+    scene = room(metal())
+    rays, cosine = angles(scene)
+    eye = scene.cameras[0].to_world[:3, 3] * [1, 1, -1] + [0, 0, -2]  # behind the mirror
+    way = rays * [1, 1, -1]
+    place = eye + way * ((centre[2] - eye[2]) / way[:, 2:]) - centre
+    is_in = (np.abs(place[:, :2]) < side / 2 - 0.05).all(axis=1).reshape(cosine.shape)
+    is_out = (np.abs(place[:, :2]) > side / 2 + 0.05).any(axis=1).reshape(cosine.shape)
+    is_mirror = hung.views["front"].material_ids() == 0
+    assert is_in.sum() > 20
+    picture = shown(hung, lamp(-1))
+    wanted = 7 * np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
+    np.testing.assert_allclose(picture[is_in & is_mirror], wanted[is_in & is_mirror], rtol=0.01)
+    assert np.median(picture[is_out & is_mirror]) < 0.1
+    assert np.abs(shown(hung, lamp(1))[is_in & is_mirror]).max() < 1  # it shines away from the mirror
+
+
+def test_a_rectangle_that_is_dimmed_in_a_session_is_dimmed_in_the_mirror(hung):
+    def lamp(emission, **fields):
+        def change(document):
+            document["lights"] = {
+                "Panel": {"kind": "rectangle", "position": [0, 1.6, 0.5], "direction": [0, 0, -1], "size": [0.6, 0.6],
+                          "emission": [emission] * 3, **fields}
+            }  # fmt: skip
+
+        return change
+
+    picture = Picture(hung, "front", Memory(1 << 30))
+    for change in (lamp(7), lamp(2), lamp(2, on=False), lamp(3), lambda document: None):
+        look = look_of(hung, change)
+        picture.set_look(look)
+        settle(picture)
+        np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-4)
