@@ -134,6 +134,7 @@ GROUPS = (
     ),
     Group("bench.glass", ("glass.rmse",)),
     Group("bench.rough", ("rough.rmse",)),
+    Group("bench.mirror", ("mirror.rmse", "mirror.sharp_rmse")),
     Group(
         "bench.estimators",
         (

@@ -1,0 +1,122 @@
+"""mirror.rmse, mirror.sharp_rmse: a room with mirrors against Mitsuba's whole path tracer with conductors of its own.
+
+A corner of two coloured walls with a ball of chrome, one of brass and a clay one on a polished table, under a hazy sun
+in a sky, all paths. `mirror.sharp_rmse` is of the pixels that the two metal balls fill.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.figure import Figure, skipped
+from bench.gather import bake
+from bench.indirect import PASSES
+from bench.mitsuba import missing, render
+from bench.standard_error import NoiseFree, over_passes
+from relume.bake import Recipe
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import open_transfer
+from relume.render.image import render_image
+from relume.scene.archive import make_scene
+from relume.scene.cornell import rectangle, sunny_sky
+from relume.scene.demo.still_life import look_at
+from relume.scene.demo.surfaces import sphere
+from relume.scene.model import Material, Scene
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NAMES, _UNIT = ("mirror.rmse", "mirror.sharp_rmse"), "relative RMSE"
+_SIZE, _FINER, _SPP, _LIGHTS = (400, 300), 2, 128, 2000
+_DEPTH = 24
+_DIFFUSE = {"Table": (0.3, 0.15, 0.08), "Left": (0.6, 0.2, 0.15), "Back": (0.5, 0.5, 0.45), "Clay": (0.2, 0.4, 0.6)}
+_MIRRORS = {"Chrome": (0.6, 0.6, 0.62), "Brass": (0.9, 0.65, 0.3), "Table": (0.1, 0.1, 0.1)}
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake and a render."""
+    if (why := missing()) is not None:
+        return skipped(_NAMES, _UNIT, why)
+    size, spp, lights = ((40, 30), 2, 60) if tiny else (_SIZE, _SPP, _LIGHTS)
+    scene = mirror_room()
+    with tempfile.TemporaryDirectory() as folder:
+        ours, is_ball = _ours(scene, size, lights, Path(folder))
+        theirs = _theirs(scene, size, spp, Path(folder))
+    whole, balls, others = (_over(ours, theirs, chosen) for chosen in (is_ball | True, is_ball, ~is_ball))
+    about = {"size": list(size), "spp": PASSES * spp, "lights": lights}
+    return [
+        Figure(name, found.error.value, _UNIT, {**found.context, **about, **more}, found.error.standard_error)
+        for name, found, more in zip(_NAMES, (whole, balls), ({"beside_the_balls": others.said}, {}), strict=True)
+    ]
+
+
+def _over(ours: F64, theirs: F32, chosen: NDArray[np.bool_]) -> NoiseFree:
+    """Of some pixels, as if they were a row."""
+    return over_passes(ours[chosen][None], theirs[:, chosen][:, None])
+
+
+def mirror_room() -> Scene:
+    """The scene of this benchmark."""
+    names = ("Table", "Left", "Back", "Clay", "Chrome", "Brass")
+    turn = np.eye(3)
+    meshes = [
+        rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("table", 0),
+        rectangle([-2, 0, 2], [0, 0, -4], [0, 2.5, 0]).mesh("left", 1),
+        rectangle([-2, 0, -2], [4, 0, 0], [0, 2.5, 0]).mesh("back", 2),
+        sphere(0.25, 64).moved(turn, [-0.1, 0.25, 0.8]).mesh("clay", 3),
+        sphere(0.6, 96).moved(turn, [-0.8, 0.6, 0.0]).mesh("chrome", 4),
+        sphere(0.45, 96).moved(turn, [0.7, 0.45, 0.2]).mesh("brass", 5),
+    ]
+    camera = look_at("front", (0.6, 1.3, 4.0), (-0.1, 0.5, 0.0), 0.7)
+    return make_scene("mirrors", meshes, [_material(name) for name in names], [camera], sunny_sky())
+
+
+def _material(name: str) -> Material:
+    diffuse = [{"model": "lambert", "color": list(_DIFFUSE[name])}] if name in _DIFFUSE else []
+    sharp = {"roughness": 0.03, "f0": 1.0}
+    mirror = [{"model": "ggx", "color": list(_MIRRORS[name]), "params": sharp}] if name in _MIRRORS else []
+    return Material(name, (*diffuse, *mirror))
+
+
+def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
+    """The picture, and which pixels the metal balls fill."""
+    width, height = size
+    recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), lights)
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+    fine = render_image(transfer, "front", validate({}, transfer.default_look)).astype(np.float64)
+    is_ball = transfer.views["front"].material_ids() >= len(_DIFFUSE)
+    is_ball &= transfer.views["front"].material_ids() < len(scene.materials)
+    return (
+        np.asarray(fine.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3))),
+        np.asarray(is_ball.reshape(height, _FINER, width, _FINER).all(axis=(1, 3)), np.bool_),
+    )
+
+
+def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+    bsdfs = [_bsdf(material.name) for material in scene.materials]
+    job = {"integrator": {"type": "path", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
+    render(scene, size, job, folder)
+    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+
+
+def _bsdf(name: str) -> dict[str, object]:
+    """A material as Mitsuba's own plugins have it: diffuse, a smooth conductor, or so much of each as ours adds up."""
+
+    def rgb(value: tuple[float, ...]) -> dict[str, object]:
+        return {"type": "rgb", "value": list(value)}
+
+    if name not in _MIRRORS:
+        return {"type": "diffuse", "reflectance": rgb(_DIFFUSE[name])}
+    if name not in _DIFFUSE:
+        return {"type": "conductor", "material": "none", "specular_reflectance": rgb(_MIRRORS[name])}
+    share = _MIRRORS[name][0]
+    below = tuple(value / (1 - share) for value in _DIFFUSE[name])
+    return {
+        "type": "blendbsdf", "weight": share, "below": {"type": "diffuse", "reflectance": rgb(below)},
+        "above": {"type": "conductor", "material": "none", "specular_reflectance": rgb((1.0, 1.0, 1.0))},
+    }  # fmt: skip
