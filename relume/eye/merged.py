@@ -60,8 +60,9 @@ def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chose
         one = slice(candidate, candidate + 1)
         if is_direct:
             is_alike = ~is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
-        else:  # a mirror's rays have no eye in common; they may go apart, to other parts of the background too
+        else:  # no eye in common; of the background each sees a part of its own, the rim of a sun perhaps
             is_alike = np.einsum("pkc,pc->pk", rays, rays[:, candidate]) > COS_TURN
+            is_alike &= is_hit | (np.arange(POSITIONS_A_PIXEL) == candidate)
         is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_TURN
         same = (group == -1) & (key == key[:, one]) & (is_alike | (is_direct & ~is_hit))
         same &= (group[:, candidate] == -1)[:, None]

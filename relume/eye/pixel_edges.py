@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.color import luminance
+from relume.environments.equirect import lookup
 from relume.eye.layers import Layer
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.geometry import Geometry
@@ -16,6 +18,7 @@ F32 = NDArray[np.float32]
 COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
 _COS_EDGE = np.cos(np.radians(20.0))  # a crease
 _DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
+_BRIGHT = 1.0  # of the mean radiance around; darker details of a map are left to its own filter
 _MOST_TURNING = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
 
 
@@ -85,6 +88,26 @@ def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray
     seen = key.reshape(shape)
     differs, cosine = _edges(seen, normal.reshape(*shape, 3), distance.reshape(shape), directions.reshape(*shape, 3))
     return np.asarray((differs | _turning(differs, cosine, seen)).ravel())
+
+
+def bright_edges_of(layer: Layer, environment: F32, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Find pixels where the background, seen in mirrors, has the rim of something bright, as a sun. (pixels,)
+
+    Args:
+        layer: of one ray through the middle of each pixel. environment: its radiance. (h, w, 3) float32
+        size: width and height of the picture in pixels.
+    """
+    width, height = size
+    value, rows = np.full(width * height, np.nan), np.flatnonzero(layer.hits.face < 0)
+    value[layer.ray[rows]] = luminance(lookup(environment, layer.directions[rows]))
+    bright = _BRIGHT * float(luminance(environment).mean())
+    edge = np.zeros((height, width), np.bool_)
+    seen = value.reshape(height, width)
+    for here, there in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+        differs = np.abs(seen[here] - seen[there]) > bright  # never where a neighbour sees something else
+        edge[here] |= differs
+        edge[there] |= differs
+    return edge.ravel()
 
 
 def is_partly_there(geometry: Geometry, origin: F32, directions: F32) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from relume.environments.equirect import lookup
 from relume.eye.layers import Layer, layers_of
 from relume.eye.merged import POSITIONS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
 from relume.eye.mirrors import MOST_MIRRORS
-from relume.eye.pixel_edges import edges_of, is_partly_there
+from relume.eye.pixel_edges import bright_edges_of, edges_of, is_partly_there
 from relume.eye.ways import Chain
 from relume.scene.model import Scene
 from relume.scene.roughness import level_of, levels_of
@@ -126,6 +126,9 @@ def sample_view(
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     coarse = layers(directions, EVERYWHERE)
     is_edge = np.any([edges_of(geometry, layer, size) for layer in coarse], axis=0)
+    for layer in coarse:
+        if layer.chain is not None:
+            is_edge |= bright_edges_of(layer, scene.environment.radiance, size)
     if geometry.embree.holes is not None and geometry.embree.holes.blends:
         is_edge |= is_partly_there(geometry, origin, directions)
 
