@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, render
+from bench.mitsuba import bsdf, missing, passes_of, render
 from bench.standard_error import over_passes
 from relume.bake import Recipe
 from relume.brdf.registry import TERMS
@@ -59,7 +59,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
         integrator = {"type": "path", "max_depth": 8, "rr_depth": 8}
         job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(tile.terms)], "integrator": integrator}
         render(real, size, job, to)
-        theirs = np.load(to / "passes.npy", allow_pickle=False)
+        theirs = passes_of(to)
         errors.append(over_passes(ours.astype(np.float64), theirs))
     worst = max(errors, key=lambda one: one.error.value)
     context: dict[str, Any] = {

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, render
+from bench.mitsuba import averaged, bsdf, missing, passes_of, render
 from bench.standard_error import NoiseFree, over_passes
 from relume.bake import Recipe
 from relume.look import validate
@@ -89,8 +89,7 @@ def _ours(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), 60 if tiny else 2000)
     transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
-    fine = render_image(transfer, "front", validate({}, transfer.default_look)).astype(np.float64)
-    return np.asarray(fine.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3)))
+    return averaged(render_image(transfer, "front", validate({}, transfer.default_look)), _FINER)
 
 
 def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
@@ -98,7 +97,7 @@ def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     bsdfs = [bsdf(m.terms) if m.glass is None else _dielectric(m.glass) for m in materials]
     job = {"integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
     render(scene, size, job, folder)
-    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+    return passes_of(folder)
 
 
 def _dielectric(glass: Glass) -> Mapping[str, Any]:

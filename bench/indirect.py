@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.mitsuba import render
+from bench.mitsuba import passes_of, render
 from relume.brdf.albedo import is_diffuse, reflectances_of
 from relume.look import validate
 from relume.look.document import MAX_BOUNCES
@@ -68,4 +68,4 @@ def reflected_by_mitsuba(
         folder: where files of the exchange are written.
     """
     render(scene, size, {"spp": [spp], "passes": PASSES, **mitsuba_job(seen, beyond)}, folder)
-    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+    return passes_of(folder)

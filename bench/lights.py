@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, render
+from bench.mitsuba import bsdf, missing, passes_of, render
 from bench.standard_error import over_passes
 from relume.bake import Recipe
 from relume.environments.model import Environment
@@ -75,7 +75,7 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
         ours = render_image(transfer, "front", _look(transfer, {"A": light})).astype(np.float64)
         job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
         render(scene, size, job, folder)
-        theirs = np.load(folder / "passes.npy", allow_pickle=False)
+        theirs = passes_of(folder)
         found = over_passes(_blocks(ours), np.array([_blocks(one) for one in theirs], np.float32))
         context = {**found.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
         figures.append(Figure(name, found.error.value, "relative RMSE", context, found.error.standard_error))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import missing, render
+from bench.mitsuba import averaged, missing, passes_of, render
 from bench.standard_error import NoiseFree, over_passes
 from relume.bake import Recipe
 from relume.look import validate
@@ -88,11 +88,10 @@ def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tup
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
-    fine = render_image(transfer, "front", validate({}, transfer.default_look)).astype(np.float64)
-    is_ball = transfer.views["front"].material_ids() >= len(_DIFFUSE)
-    is_ball &= transfer.views["front"].material_ids() < len(scene.materials)
+    fine = render_image(transfer, "front", validate({}, transfer.default_look))
+    is_ball = np.isin(transfer.views["front"].material_ids(), (4, 5))
     return (
-        np.asarray(fine.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3))),
+        averaged(fine, _FINER),
         np.asarray(is_ball.reshape(height, _FINER, width, _FINER).all(axis=(1, 3)), np.bool_),
     )
 
@@ -101,7 +100,7 @@ def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     bsdfs = [_bsdf(material.name) for material in scene.materials]
     job = {"integrator": {"type": "path", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
     render(scene, size, job, folder)
-    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+    return passes_of(folder)
 
 
 def _bsdf(name: str) -> dict[str, object]:

@@ -84,6 +84,18 @@ def map_for_mitsuba(radiance: F32) -> F32:
     return np.asarray(0.5 * (radiance[above] + radiance[below]), np.float32).repeat(finer, axis=1)
 
 
+def passes_of(folder: Path) -> F32:
+    """Read the independent pictures that `render` was asked for. (passes, height, width, 3)"""
+    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+
+
+def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
+    """Average a picture that has `finer` times as many pixels both ways as the peer's. (h, w, 3) float64"""
+    height, width, _ = fine.shape
+    blocks = fine.reshape(height // finer, finer, width // finer, finer, 3)
+    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
+
+
 def render(
     scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path, images: Mapping[str, F32] | None = None
 ) -> dict[str, Any]:

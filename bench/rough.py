@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import missing, render
+from bench.mitsuba import averaged, missing, passes_of, render
 from bench.standard_error import over_passes
 from relume.bake import Recipe
 from relume.look import validate
@@ -100,8 +100,7 @@ def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tup
     plain = {name: {"terms": [{**of["terms"][0], "roughness_map": False}]} for name, of in materials.items()}
 
     def picture(changes: dict[str, object]) -> F64:
-        fine = render_image(transfer, "front", validate(changes, transfer.default_look)).astype(np.float64)
-        return np.asarray(fine.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3)))
+        return averaged(render_image(transfer, "front", validate(changes, transfer.default_look)), _FINER)
 
     return picture({}), picture({"materials": plain})
 
@@ -114,4 +113,4 @@ def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
         for k, material in enumerate(scene.materials)
     ]  # fmt: skip
     render(scene, size, {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs}, folder, images)
-    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+    return passes_of(folder)

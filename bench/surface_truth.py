@@ -17,7 +17,7 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, render
+from bench.mitsuba import bsdf, missing, passes_of, render
 from bench.standard_error import over_passes
 from relume.bake import Recipe
 from relume.look import complete, validate
@@ -66,7 +66,7 @@ def _figure(kind: str, tiny: bool) -> Figure:
         integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
         job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(terms)] * len(scene.meshes), "integrator": integrator}
         render(scene, size, job, Path(folder))
-        theirs = np.load(Path(folder) / "passes.npy", allow_pickle=False)
+        theirs = passes_of(Path(folder))
     found = over_passes(ours.astype(np.float64), theirs)
     context = {**found.context, "scene": scene.name, "size": list(size), "spp": PASSES * spp, "points": num_points}
     return Figure(f"surface.rmse_{kind}", 100 * found.error.value, _UNIT, context, 100 * found.error.standard_error)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
-from bench.mitsuba import bsdf, missing, render
+from bench.mitsuba import averaged, bsdf, missing, passes_of, render
 from bench.scenes import cook_torrance, sky, teapot_on_table
 from bench.standard_error import Estimated, over_passes
 from relume.brdf.document import complete_term
@@ -80,7 +80,7 @@ def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) ->
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     with tempfile.TemporaryDirectory() as folder:
         render(scene, size, {"spp": [spp], "bsdfs": bsdfs, "passes": passes}, Path(folder))
-        theirs = np.load(Path(folder) / "passes.npy", allow_pickle=False)
+        theirs = passes_of(Path(folder))
     ours = np.array([_our_pass(scene, size, spp, k) for k in range(passes)])
     mean = ours.mean(axis=0)
     estimate = Estimate.nothing(size[1], size[0])
@@ -98,5 +98,4 @@ def _our_pass(scene: Scene, size: tuple[int, int], spp: int, index: int) -> F32:
     finer = (_FINER * width, _FINER * height)
     look = validate({}, default_look(scene.materials))
     image = reference_image(scene, scene.cameras[0].name, look, finer, spp, pass_index=index)
-    blocks = image.reshape(height, _FINER, width, _FINER, 3).mean(axis=(1, 3), dtype=np.float64)
-    return np.asarray(blocks, np.float32)
+    return averaged(image, _FINER).astype(np.float32)

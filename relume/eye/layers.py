@@ -25,6 +25,9 @@ from relume.trace.primary import Hits, trace_from
 F32 = NDArray[np.float32]
 
 
+_ARRAYS = ("ray", "directions", "through", "is_shown", "eyes", "is_mirrored", "key")  # of a `Layer`, a row for each ray
+
+
 class Layer(NamedTuple):
     """What some of an eye's rays meet after as many surfaces.
 
@@ -55,8 +58,17 @@ class Layer(NamedTuple):
         """Those of some rays."""
         chain = None if self.chain is None else self.chain.rows(chosen)
         kept = self._replace(hits=self.hits.rows(chosen), chain=chain)
-        arrays = ("ray", "directions", "through", "is_shown", "eyes", "is_mirrored", "key")
-        return kept._replace(**{name: getattr(self, name)[chosen] for name in arrays})
+        return kept._replace(**{name: getattr(self, name)[chosen] for name in _ARRAYS})
+
+    @staticmethod
+    def joined(parts: Sequence[Layer], most_mirrors: int) -> Layer:
+        """Those of several, one after another. most_mirrors: that any ray has met."""
+        chains = [Chain.filled(part.chain, len(part.ray), most_mirrors) for part in parts]
+        return Layer(
+            hits=Hits.joined([part.hits for part in parts]),
+            chain=Chain(*map(np.concatenate, zip(*chains, strict=True))),
+            **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS},
+        )
 
     @property
     def shown(self) -> Layer:
@@ -105,7 +117,10 @@ def layers_of(
     num_keys, most = int(geometry.face_mesh.max(initial=0)) + 2, most_layers(materials)
     chances, layers = np.broadcast_to(chance, num), list[Layer]()
     ways = deque([Ways.begun(eye, directions)])
-    num_begun = 1
+
+    def has_room() -> bool:
+        return len(layers) + 1 + len(ways) < most  # the one that is being followed is in neither
+
     while ways:
         way = ways.popleft()
         hits = trace_from(geometry.embree, way.origins, way.directions, chances[way.ray])
@@ -117,14 +132,12 @@ def layers_of(
         if len(glass):
             is_outer, behind = through_glass(geometry, panes, way, hits, glass)
             is_shown[glass] = is_outer & (way.num_passed < MOST_SHOWN)
-            if way.num_passed + 1 < MAX_GLASS and num_begun < most:
+            if way.num_passed + 1 < MAX_GLASS and has_room():
                 ways.append(behind)
-                num_begun += 1
         facing = np.flatnonzero(is_hit & mirrors[material] & is_shown)
-        if len(facing) and not way.num_passed and way.num_mirrors < MOST_MIRRORS and num_begun < most:
+        if len(facing) and not way.num_passed and way.num_mirrors < MOST_MIRRORS and has_room():
             ways.append(sent_back(geometry, materials, way, hits, facing, pixel_angle, num_keys))
             is_mirrored[facing] = True
-            num_begun += 1
         whole = replace(hits, distance=hits.distance + way.length)
         key = np.where(is_hit, geometry.face_mesh[face], -1) + way.via * num_keys
         eyes = np.broadcast_to(way.origins, (len(way.ray), 3))

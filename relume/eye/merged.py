@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from relume.eye.layers import Layer
 from relume.eye.pixel_edges import COS_TURN, is_off_plane
-from relume.eye.ways import Chain
 from relume.trace.geometry import Geometry
-from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
@@ -84,18 +82,8 @@ def alone(layer: Layer, is_edge: NDArray[np.bool_]) -> Chosen:
 
 def joined(parts: Sequence[Chosen], most_mirrors: int) -> Chosen:
     """All of several. most_mirrors: that any ray has met."""
-    seen = [part.seen for part in parts]
-    chains = [Chain.filled(one.chain, len(one.ray), most_mirrors) for one in seen]
-    arrays = ("ray", "directions", "through", "is_shown", "eyes", "is_mirrored", "key")
-    return Chosen(
-        np.concatenate([part.pixel for part in parts]),
-        np.concatenate([part.weight for part in parts]),
-        Layer(
-            hits=Hits.joined([one.hits for one in seen]),
-            chain=Chain(*map(np.concatenate, zip(*chains, strict=True))),
-            **{name: np.concatenate([getattr(one, name) for one in seen]) for name in arrays},
-        ),
-    )
+    pixel, weight, seen = zip(*parts, strict=True)
+    return Chosen(np.concatenate(pixel), np.concatenate(weight), Layer.joined(seen, most_mirrors))
 
 
 def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:

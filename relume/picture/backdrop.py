@@ -83,14 +83,14 @@ class Backdrop:
         if shown == self._shown:
             return False
         self._shown, self.is_transparent = shown, background.kind == "transparent"
-        first = self._view.num_surface_samples
+        first, mirrored = self._view.num_surface_samples, self._view.mirrored
         radiance[:, first:] = self._behind(shown, None).T if shown.is_direct else 0
-        if self._view.mirrored is not None and shown.is_direct:  # mirrors show the light, whatever is put behind
-            seen = self._view.mirrored.sample[self._view.mirrored.sample >= first]
-            light_itself = shown._replace(background=_MAP, factor=light.environment_gain)
+        if mirrored is not None and shown.is_direct:  # mirrors show the light, whatever is put behind
+            among = mirrored.within(slice(first, self._view.num_view_samples))
+            seen, light_itself = mirrored.sample[among], shown._replace(background=_MAP, factor=light.environment_gain)
             radiance[:, seen] = self._behind(light_itself, None)[seen - first].T
             if lamps is not None:
-                radiance[:, seen] += lamps[:, len(lamps.T) - len(seen) :]
+                radiance[:, seen] += lamps[:, among]
         return True
 
     def alpha(self, *, for_display: bool) -> F32:

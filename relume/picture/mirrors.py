@@ -31,6 +31,7 @@ class Mirrors:
 
     Attributes:
         gains: what the radiance of each sample is multiplied by for its pixel, in the view's order; see `View.gains`.
+        materials: those that anything is seen in.
     """
 
     def __init__(self, view: View) -> None:
@@ -39,11 +40,7 @@ class Mirrors:
         chain = None if view.mirrored is None else view.mirrored.chain
         self._lamps: tuple[tuple[Source, ...], F32 | None] = (), None
         self._sends = None if chain is None else np.ones((*chain.material.shape, 3), np.float32)
-
-    @property
-    def materials(self) -> list[int]:
-        """Those that anything is seen in."""
-        return [] if self._seen is None else np.setdiff1d(self._seen.chain.material, [NO_MIRROR]).tolist()
+        self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
 
     def lamps(self, light: Light) -> F32 | None:
         """Radiance of the rectangles between mirrors and what is seen in them; the same array while they stay as they
