@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.levels import Levels
+from relume.brdf.mirror import mirrored_share
 from relume.operators.edit_basis import EditBasis
 from relume.operators.frozen import tiles_of
 from relume.picture.fidelity import Fidelity, Word, word_of
@@ -37,6 +38,7 @@ class LiveTerm:
         ready: the newest image of it.
         displayed: the image in the picture; another one than `ready` until all terms can be shown in one light.
         is_composed: the picture's radiance has `displayed` in it as it is now.
+        mirror: the document whose mirror the picture shows, see `follow_mirror`.
     """
 
     def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, levels: Levels, light: Light) -> None:
@@ -47,7 +49,7 @@ class LiveTerm:
         self.is_composed = False
         self.model: Hashable = None
         self.set_document(document)
-        self.displayed = self.ready
+        self.displayed, self.mirror = self.ready, self.document
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
@@ -61,6 +63,15 @@ class LiveTerm:
         self.target, self.outgoing = wanted.bands, wanted.outgoing
         self.target_rows = _rows(self.target, ())
         self.is_composed = False
+
+    def follow_mirror(self) -> None:
+        """Its mirror follows the look; one that fades stays as it was until its lobe can be shown in its place."""
+        if self.mirror is self.document:
+            return
+        fades = bool(np.any(mirrored_share(self.document) < mirrored_share(self.mirror)))
+        steps = () if self.displayed.basis is None else self.displayed.basis.moves
+        if not fades or set(self.displayed.differing(self.target)) <= set(steps):
+            self.mirror, self.is_composed = self.document, False
 
     def set_light(self, light: Light) -> None:
         """It is wanted in another light; the picture goes on showing what it shows (`show_ready`)."""

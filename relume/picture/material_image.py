@@ -95,12 +95,19 @@ class MaterialImage:
             self._before, self._is_current = before, False
 
     @property
+    def mirrors(self) -> Sequence[Mapping[str, Any]]:
+        """Its terms, as their mirrors are shown; those of a material of which nothing else is seen follow at once."""
+        return [term.mirror for term in self.terms] if self.num_samples else self.documents
+
+    @property
     def is_caught(self) -> bool:
         """Whether only shadows on it are shown."""
         return self._factor is not None
 
     def compose(self, radiance: F32) -> bool:
         """Write the material's samples into the view's radiance; False where nothing has changed since."""
+        for term in self.terms:
+            term.follow_mirror()
         if self._is_current and all(term.is_composed for term in self.terms):
             return False
         for k, term in enumerate(self.terms):
@@ -146,7 +153,7 @@ class MaterialImage:
     def _outgoing(self, term: LiveTerm) -> F32 | None:
         """What multiplies a term's finished samples, None for one: its outgoing curves; of mirrors, whose picture other
         samples have, the share that is none. (3, n)"""
-        if self._is_mirrored is None or not (share := mirrored_share(term.document)).any():
+        if self._is_mirrored is None or not (share := mirrored_share(term.mirror)).any():
             return term.outgoing
         lobe = np.where(self._is_mirrored, (1 - share)[:, None], 1).astype(np.float32)
         return lobe if term.outgoing is None else lobe * term.outgoing

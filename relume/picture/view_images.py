@@ -89,10 +89,11 @@ class ViewImages:
             material.set_emission(emission_of(light, name), self._shines)
 
     def follow_mirrors(self, look: Look) -> list[int]:
-        """Bring mirrors to a look; returns the materials that send on something else than before."""
-        names = self.transfer.material_names
-        looks = {index: look.materials[names[index]] for index in self.mirrors.materials}
-        return self.mirrors.follow({k: None if one.catcher else one.terms for k, one in looks.items()})
+        """Bring mirrors to a look, as far as their materials are shown in it; returns the materials that send on
+        something else than before."""
+        names = {index: self.transfer.material_names[index] for index in self.mirrors.materials}
+        shown = {k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()}
+        return self.mirrors.follow(shown)
 
     def arriving(self, material: MaterialImage, light: Light) -> tuple[TriangleLights, Receivers]:
         """What arrives at the samples of a material in a light; shadows that the memory lacks are traced."""

@@ -141,6 +141,25 @@ def test_roughened_it_is_a_lobe_again(hung, tmp_path):
     assert np.quantile(away, 0.9) < 1e-5  # but for pixels that have more samples for what is seen in them
 
 
+def test_a_mirror_stays_until_its_lobe_can_be_shown(hung):
+    picture = Picture(hung, "front", Memory(1 << 30))
+    sharp, wanted = settle(picture).image(), shown(hung, set_roughness(0.3))
+    is_mirror = hung.views["front"].material_ids() == 0
+    for time in ("first", "second"):
+        picture.set_look(look_of(hung, set_roughness(0.3)))
+        step, at_once = picture.advance(None), picture.image()
+        if time == "first":
+            assert not step.exact
+            np.testing.assert_array_equal(at_once, sharp)
+        lobe = settle(picture).image()
+        np.testing.assert_allclose(lobe, wanted, atol=1e-4)
+        assert min(np.abs(at_once - other)[is_mirror].max() for other in (sharp, lobe)) < 1e-4
+        picture.set_look(look_of(hung))
+        picture.advance(None)
+        np.testing.assert_allclose(picture.image()[is_mirror], sharp[is_mirror], atol=1e-4)
+        settle(picture)
+
+
 def test_between_mirror_and_lobe_is_a_mixture(hung):
     sharp, soft = shown(hung, set_roughness(0.03)), shown(hung, set_roughness(0.06))
     half = shown(hung, set_roughness(0.05))
