@@ -12,7 +12,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
-TOGETHER = ("gestures", "journeys")  # folders whose tests share what is dear to start: a server, its bake, a browser
+TOGETHER = ("gestures", "journeys", "btf")  # folders whose tests share what is dear: a server and a browser, a BTF
 
 
 class _Sharing(LoadScopeScheduling):

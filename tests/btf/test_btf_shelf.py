@@ -68,25 +68,26 @@ def test_a_damaged_one_hides_no_others_from_lists(small_btf, tmp_path, caplog):
     assert "0123456789abcdef is damaged" in caplog.text
 
 
-def test_making_goes_on_where_it_was_and_gives_the_same(small_btf, tmp_path):
+def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
     asked = []
 
     def after_some():
         asked.append(0)
         return len(asked) > 20
 
-    wanted = Made("corduroy", 16, 2, 0.02)
+    wanted, (at_once, resumed) = Made("corduroy", 8, 1, 0.02), (tmp_path / "at once", tmp_path / "resumed")
+    whole = make_btf(at_once, wanted, "Corduroy", lambda share: None, lambda: False)
     with pytest.raises(CancelledError):
-        make_btf(tmp_path, wanted, "Corduroy", lambda share: None, after_some)
-    (begun,) = (tmp_path / "making").iterdir()
+        make_btf(resumed, wanted, "Corduroy", lambda share: None, after_some)
+    (begun,) = (resumed / "making").iterdir()
     done = int((begun / "done").read_text())
     assert 5 < done < 81
     shares = []
-    record = make_btf(tmp_path, wanted, "Corduroy", shares.append, lambda: False)
+    record = make_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
     assert shares[0] == pytest.approx(0.8 * done / 81)
-    assert record.id == small_btf.record.id
+    assert record.id == whole.id
     for array in shelf._ARRAYS:
-        one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (tmp_path, small_btf.folder))
+        one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
         np.testing.assert_array_equal(one, other)
 
 
