@@ -428,7 +428,7 @@ export interface MeasuredBody {
   homomorphic_error: [number, number, number];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, and `data_prefix` how the names of such data begin (see `data`). */
+/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
@@ -437,6 +437,7 @@ export interface ModelBody {
   texture: string;
   needs_data: boolean;
   width: string | null;
+  mirrors_below: number | null;
   data_prefix: string | null;
   parameters: ParameterBody[];
   curves: CurveBody[];

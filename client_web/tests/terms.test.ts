@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
-import { texturesOf } from "../src/inspector/terms";
-import type { SceneBody } from "../src/protocol";
-import { scene } from "../src/state/scene";
+import { mirrorsSoftly, texturesOf } from "../src/inspector/terms";
+import type { ModelBody, Rgb, SceneBody, Term } from "../src/protocol";
+import { models, scene } from "../src/state/scene";
 
 test("a material offers the images that its own terms take, in their order", () => {
   const materials = [
@@ -12,4 +12,28 @@ test("a material offers the images that its own terms take, in their order", () 
   expect(texturesOf("Tray")).toEqual(["diffuse", "specular"]);
   expect(texturesOf("Wall")).toEqual([]);
   expect(texturesOf("Nothing")).toEqual([]);
+});
+
+test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
+  const curves = [{ name: "theta_h", parameters: ["roughness"] }, { name: "theta_d", parameters: ["f0"] }];
+  models.value = [{ model: "ggx", width: "roughness", mirrors_below: 0.06, curves }] as unknown as ModelBody[];
+  const ggx = (roughness: number | Rgb, others: Partial<Term> = {}): Term => ({
+    model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...others,
+  });
+  const materials = [
+    { name: "Chrome", terms: [ggx(0.03)] },
+    { name: "Paint", terms: [ggx(0.4)] },
+  ];
+  scene.value = { materials } as unknown as SceneBody;
+  const drawn = [{ knots: [] }] as unknown as NonNullable<Term["curves"]>[string];
+  expect(mirrorsSoftly("Paint", ggx(0.05))).toBe(true);
+  expect(mirrorsSoftly("Paint", ggx([0.3, 0.3, 0.05]))).toBe(true);
+  expect(mirrorsSoftly("Paint", ggx(0.06))).toBe(false);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { texture: "diffuse" }))).toBe(false);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { roughness_map: true }))).toBe(false);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
+  expect(mirrorsSoftly("Chrome", ggx(0.02))).toBe(false);
+  expect(mirrorsSoftly("Nothing", ggx(0.02))).toBe(false);
 });

@@ -98,6 +98,7 @@ describe("terms", () => {
     texture: "specular",
     needs_data: false,
     width: name === "flat" ? null : "roughness",
+    mirrors_below: null,
     data_prefix: null,
     parameters: parameters.map((p) => ({
       name: p,

@@ -26,6 +26,11 @@ MODEL, TEXTURE = "ggx", "specular"  # its facets are normalised; terms of other 
 SHARP, SOFT = 0.04, 0.06  # roughness up to which all is mirrored, and from which nothing is
 
 
+def mirrors_below(model: str) -> float | None:
+    """The roughness below which terms of a model are mirrors, in part at least; None where none is."""
+    return SOFT if model == MODEL else None
+
+
 def mirrored_share(document: Mapping[str, Any]) -> F64:
     """How much of a term is a mirror: the rest is its lobe. (3,) within [0, 1]
 

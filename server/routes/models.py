@@ -7,6 +7,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.brdf import registry
 from relume.brdf.document import complete_term
+from relume.brdf.mirror import mirrors_below
 from server.wire.bodies import InOutBody, InOutRequest, ModelBody
 
 router = APIRouter(prefix="/api/models", tags=["models"])
@@ -15,7 +16,7 @@ router = APIRouter(prefix="/api/models", tags=["models"])
 @router.get("")
 def list_models() -> list[ModelBody]:
     """Every BRDF term."""
-    return [ModelBody(**term) for term in registry.describe()]
+    return [ModelBody(**term, mirrors_below=mirrors_below(term["model"])) for term in registry.describe()]
 
 
 @router.post("/in-out")

@@ -150,7 +150,8 @@ class MaterialMapBody(Body):
 
 class ModelBody(Body):
     """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the
-    parameter that maps of roughness scale, and `data_prefix` how the names of such data begin (see `data`)."""
+    parameter that maps of roughness scale, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of
+    such data begin (see `data`)."""
 
     model: str
     label: str
@@ -159,6 +160,7 @@ class ModelBody(Body):
     texture: str
     needs_data: bool
     width: str | None
+    mirrors_below: float | None
     data_prefix: str | None
     parameters: list[ParameterBody]
     curves: list[CurveBody]

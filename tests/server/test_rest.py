@@ -162,6 +162,7 @@ def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
 def test_models_are_listed(client: TestClient) -> None:
     models = {model["model"]: model for model in client.get("/api/models").json()}
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]
+    assert (models["ggx"]["mirrors_below"], models["lambert"]["mirrors_below"]) == (0.06, None)
 
 
 def test_library_materials_are_listed_and_can_be_put_into_a_look(client: TestClient, baked: Baked) -> None:

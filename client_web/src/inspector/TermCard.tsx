@@ -14,7 +14,7 @@ import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
 import { InMotion } from "./InMotion";
 import { ParamRow } from "./ParamRow";
-import { hasRoughnessMap, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
+import { hasRoughnessMap, isWidthDrawn, mirrorsSoftly, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 
 interface Props {
   material: string;
@@ -167,7 +167,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
           {model?.width != null && hasRoughnessMap(material) && (
             <RoughnessMap
               label={model.parameters.find((info) => info.name === model.width)?.label ?? model.width}
-              isDrawn={model.curves.some((curve) => curve.parameters.includes(model.width as string) && term.curves?.[curve.name] !== undefined)}
+              isDrawn={isWidthDrawn(term)}
               value={term.roughness_map === true}
               onChange={(value) => edit("Roughness map", `${path}/roughness_map`, value)}
             />
@@ -182,6 +182,9 @@ export function TermCard({ material, term, index, onRemove }: Props) {
               onHold={() => hold(`${path}/params/${info.name}`)}
             />
           ))}
+          {mirrorsSoftly(material, term) && (
+            <p class="aside">Reflections stay soft here: this material was no mirror when the scene was baked.</p>
+          )}
           {model !== undefined && <Curves model={model} term={term} index={index} />}
           <InMotion term={term} material={material} />
         </>

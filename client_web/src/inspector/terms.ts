@@ -1,6 +1,6 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
 import type { ModelBody, Term } from "../protocol";
-import { materialOf } from "../state/scene";
+import { materialOf, modelOf } from "../state/scene";
 
 /** The images that a material may have, in words. */
 export const TEXTURES: Record<string, string> = { diffuse: "Base colour", specular: "Highlight" };
@@ -14,6 +14,24 @@ export function texturesOf(material: string): string[] {
 /** Whether a material of the scene has a map that its terms' widths may follow. */
 export function hasRoughnessMap(material: string): boolean {
   return materialOf(material)?.terms.some((term) => term.roughness_map !== undefined) ?? false;
+}
+
+/** Whether a curve is drawn by hand that the term's width would give. */
+export function isWidthDrawn(term: Term): boolean {
+  const model = modelOf(term);
+  return model?.curves.some(({ name, parameters }) => parameters.includes(model.width ?? "") && term.curves?.[name] !== undefined) ?? false;
+}
+
+/** Whether a term is so smooth that it is a mirror rather than a highlight. */
+function isMirror(term: Term): boolean {
+  const { mirrors_below: below, width } = modelOf(term) ?? {};
+  if (below == null || width == null || term.roughness_map === true || term.texture === "diffuse") return false;
+  return [term.params?.[width] ?? below].flat().some((value) => value < below) && !isWidthDrawn(term);
+}
+
+/** Whether what a term mirrors is shown blurred, since its material mirrored nothing when the scene was baked. */
+export function mirrorsSoftly(material: string, term: Term): boolean {
+  return isMirror(term) && materialOf(material)?.terms.some(isMirror) === false;
 }
 
 export function defaultTerm(model: ModelBody): Term {
