@@ -69,7 +69,8 @@ class LiveTerm:
         if self.mirror is self.document:
             return
         fades = bool(np.any(mirrored_share(self.document) < mirrored_share(self.mirror)))
-        steps = () if self.displayed.basis is None else self.displayed.basis.moves
+        basis = self.displayed.basis if self.displayed is self.ready else None
+        steps = () if basis is None else basis.moves  # curves on their way
         if not fades or set(self.displayed.differing(self.target)) <= set(steps):
             self.mirror, self.is_composed = self.document, False
 
