@@ -160,6 +160,21 @@ def test_a_mirror_stays_until_its_lobe_can_be_shown(hung):
         settle(picture)
 
 
+def test_it_stays_as_well_while_another_light_is_awaited(hung):
+    def rough_and_turned(document):
+        set_roughness(0.3)(document)
+        document["environment"]["rotation"] = 90.0
+
+    picture = Picture(hung, "front", Memory(1 << 30))
+    settle(picture)
+    picture.touch("/materials/Mirror/terms/0/params/roughness")  # the operator that a hand would follow
+    sharp = settle(picture).image()
+    picture.set_look(look_of(hung, rough_and_turned))
+    assert not picture.advance(None).exact
+    np.testing.assert_array_equal(picture.image(), sharp)
+    np.testing.assert_allclose(settle(picture).image(), shown(hung, rough_and_turned), atol=1e-4)
+
+
 def test_between_mirror_and_lobe_is_a_mixture(hung):
     sharp, soft = shown(hung, set_roughness(0.03)), shown(hung, set_roughness(0.06))
     half = shown(hung, set_roughness(0.05))
