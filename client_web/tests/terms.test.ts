@@ -15,7 +15,7 @@ test("a material offers the images that its own terms take, in their order", () 
 });
 
 test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
-  const curves = [{ name: "theta_h", parameters: ["roughness"] }, { name: "theta_d", parameters: ["f0"] }];
+  const curves = ["theta_h", "theta_d", "theta_i"].map((name) => ({ name, angle: name }));
   models.value = [{ model: "ggx", width: "roughness", mirrors_below: 0.06, curves }] as unknown as ModelBody[];
   const ggx = (roughness: number | Rgb, others: Partial<Term> = {}): Term => ({
     model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...others,
@@ -33,6 +33,7 @@ test("a material that was no mirror when it was baked reflects softly once it is
   expect(mirrorsSoftly("Paint", ggx(0.05, { roughness_map: true }))).toBe(false);
   expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
   expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
+  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
   expect(mirrorsSoftly("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
   expect(mirrorsSoftly("Chrome", ggx(0.02))).toBe(false);
   expect(mirrorsSoftly("Nothing", ggx(0.02))).toBe(false);

@@ -14,7 +14,7 @@ import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
 import { InMotion } from "./InMotion";
 import { ParamRow } from "./ParamRow";
-import { hasRoughnessMap, isWidthDrawn, mirrorsSoftly, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
+import { hasRoughnessMap, mirrorsSoftly, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 
 interface Props {
   material: string;
@@ -167,7 +167,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
           {model?.width != null && hasRoughnessMap(material) && (
             <RoughnessMap
               label={model.parameters.find((info) => info.name === model.width)?.label ?? model.width}
-              isDrawn={isWidthDrawn(term)}
+              isDrawn={model.curves.some((curve) => curve.parameters.includes(model.width as string) && term.curves?.[curve.name] !== undefined)}
               value={term.roughness_map === true}
               onChange={(value) => edit("Roughness map", `${path}/roughness_map`, value)}
             />

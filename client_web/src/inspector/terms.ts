@@ -16,17 +16,13 @@ export function hasRoughnessMap(material: string): boolean {
   return materialOf(material)?.terms.some((term) => term.roughness_map !== undefined) ?? false;
 }
 
-/** Whether a curve is drawn by hand that the term's width would give. */
-export function isWidthDrawn(term: Term): boolean {
-  const model = modelOf(term);
-  return model?.curves.some(({ name, parameters }) => parameters.includes(model.width ?? "") && term.curves?.[name] !== undefined) ?? false;
-}
-
-/** Whether a term is so smooth that it is a mirror rather than a highlight. */
+/** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/mirror.py`. */
 function isMirror(term: Term): boolean {
-  const { mirrors_below: below, width } = modelOf(term) ?? {};
+  const { mirrors_below: below, width, curves } = modelOf(term) ?? {};
   if (below == null || width == null || term.roughness_map === true || term.texture === "diffuse") return false;
-  return [term.params?.[width] ?? below].flat().some((value) => value < below) && !isWidthDrawn(term);
+  const facets = curves?.find(({ angle }) => angle === "theta_h");
+  if (facets !== undefined && term.curves?.[facets.name] !== undefined) return false;
+  return [term.params?.[width] ?? below].flat().some((value) => value < below);
 }
 
 /** Whether what a term mirrors is shown blurred, since its material mirrored nothing when the scene was baked. */
