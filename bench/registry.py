@@ -49,6 +49,7 @@ GROUPS = (
     Group("bench.incremental", ("frame.incremental_rmse",)),
     Group("bench.curve_switch", ("freeze.curve_switch_s",)),
     Group("bench.curve_switch_terms", ("freeze.terms_s",)),
+    Group("bench.shade", ("shade.pairs_per_s_vs_limit", "shade.vs_leaves")),
     Group("bench.glimpse", ("glimpse.speedup", "glimpse.error")),
     Group("bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
     Group("bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),

@@ -50,6 +50,11 @@ class TriangleLights:
         return TriangleLights(self.nodes[:, :, :0], self.direction[:0], self.irradiance[:0])
 
     @cached_property
+    def by_light(self) -> F32:
+        """The nodes, those of one light together. (M, 6, 3)"""
+        return np.ascontiguousarray(self.nodes.transpose(2, 1, 0))
+
+    @cached_property
     def radius(self) -> F32:
         """The angle from each light's direction to its farthest corner, within which all of it lies; radians. (M,)"""
         chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,21 @@ F32 = NDArray[np.float32]
 
 _NOTHING = 1e-9
 _FLAT = 1e-12  # band averages of a constant differ by rounding
+
+
+class WholeCurves(NamedTuple):
+    """The curves of a term with none free, as `relume.project.shade_kernel` integrates them.
+
+    Attributes:
+        kinds, num_rows, num_bands: as in `Contraction`.
+        steps: each band's value; the sum of the values from it on; how much they vary from it on. (C, 3, J or more, 3)
+            float32. Summed from the end, where curves mostly are small, for what is small is their difference there.
+    """
+
+    kinds: NDArray[np.int64]
+    steps: F32
+    num_rows: NDArray[np.int64]
+    num_bands: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -52,6 +69,16 @@ class Contraction:
     def num_columns(self) -> int:
         """Columns of what is projected: J of the free curve, or N."""
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
+
+    @cached_property
+    def whole(self) -> WholeCurves:
+        """Its curves where none is free and each has one setting."""
+        steps = np.zeros((*self.bands.shape, 3), np.float32)
+        for of_curve, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
+            values = bands[:, :num][:, ::-1]
+            varies = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
+            of_curve[:, :num] = np.stack([values, values.cumsum(axis=1), varies.cumsum(axis=1)], axis=2)[:, ::-1]
+        return WholeCurves(self.kinds, steps, self.num_rows, self.num_bands)
 
 
 def _support(rows: NDArray[np.float64]) -> float:

@@ -13,6 +13,7 @@ from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction, contract
 from relume.project.projector import Projector
 from relume.project.receivers import Receivers
+from relume.project.shader import Shader
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -74,15 +75,16 @@ def project_levels(
     receivers: Receivers,
     start: int,
     stop: int,
+    projector: type[Projector | Shader] = Projector,
 ) -> F32:
-    """`Projector.project` with the curves of each point's level.
+    """`Projector.project`, or that of another projector, with the curves of each point's level.
 
     Args:
         term, lights, receivers: as `Projector` takes them. contractions: from `contract_levels`.
-        start, stop: of the points.
+        start, stop: of the points. projector: which one.
     """
     parts = [
-        Projector(term, contractions[level], lights, receivers).project(first, last)
+        projector(term, contractions[level], lights, receivers).project(first, last)
         for level, first, last in runs(receivers.level, len(contractions), start, stop)
     ]
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -21,7 +21,7 @@ FIXED_NAMES = {
 IN_PROCESS = [
     "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
     "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
-    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms",
+    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.shade",
     "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting",
     "bench.in_out",
 ]  # fmt: skip

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from furnace_method import FurnaceMethod
+from leaves import by_leaves
 
 from relume.bake import Recipe
 from relume.memory import Memory
@@ -16,6 +17,8 @@ from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
 from relume.store import bake_here
 from worker.status import MOVING
+
+__all__ = ["by_leaves"]  # a fixture
 
 SIZE, NUM_LIGHTS, NUM_POINTS = (48, 36), 100, 6000
 

@@ -1,11 +1,14 @@
 """One measured material for all tests here; making it takes a second."""
 
 import pytest
+from leaves import by_leaves
 from merl_files import planes_of
 
 from relume.measured.asset_store import STORE, keep, records
 from relume.measured.lookup import table_of
 from relume.measured.merl import write_merl
+
+__all__ = ["by_leaves"]  # a fixture
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,52 @@
+"""The projector of pictures: no curve is free, so that what arrives is summed without sharing it out to bands.
+
+    R(x) = Σ_m V(x, m) L_m Ω_m cos θi · q(x, ω_m) · Π_f mean_m(f)
+
+The sums of `relume.project.projector`, by a quadrature that need not be right for whatever a curve may become: the
+pictures are the same to a thousandth or two (docs/adr/0055-boxes-for-pictures.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.light.triangles import TriangleLights
+from relume.project.contraction import Contraction
+from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
+from relume.project.ray_projector import RayProjector
+from relume.project.receivers import Receivers
+from relume.project.shade_kernel import shade_points
+
+F32 = NDArray[np.float32]
+
+
+class Shader:
+    """Shades ranges of receivers; holds the scratch memory of one thread.
+
+    Args:
+        term: the BRDF term. contraction: its curves, none of them free and each of one setting, from `contract`.
+        lights: triangles of the environment; `receivers` tell which of them each point sees.
+        receivers: all points, and what arrives at them.
+    """
+
+    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
+        self._contraction, self._lights, self._receivers = contraction, lights, receivers
+        self._listed = ListedLights(term, contraction, lights, receivers)
+        self._brings = np.concatenate([self._listed.irradiance, lights.radius[:, None]], axis=1)
+        self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
+
+    def project(self, start: int, stop: int) -> F32:
+        """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
+        r, c, listed = self._receivers, self._contraction, self._listed
+        out = np.zeros((stop - start, 3, 1), np.float32)
+        for block in range(start, stop, POINTS_A_BLOCK):
+            end = min(block + POINTS_A_BLOCK, stop)
+            shading, wo = listed.list(block, end)
+            shade_points(
+                r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.by_light, self._brings,
+                c.axes, c.whole, block, end, out[block - start : end - start],
+            )  # fmt: skip
+        self._rays.add(start, stop, out)
+        return out.transpose(0, 2, 1)

@@ -1,0 +1,21 @@
+"""Pictures summed from the leaves of operators: for tests that follow a picture through its routes to the last digits.
+
+The product shades by boxes (`relume.project.shader`), which agree with operators to a thousandth: `tests/project` holds
+them to that, and so does the contract. That would hide a coefficient forgotten on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import relume.operators.shade
+from relume.project.projector import Projector
+
+
+@pytest.fixture(scope="module", autouse=True)
+def by_leaves() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(relume.operators.shade, "Shader", Projector)
+        yield
