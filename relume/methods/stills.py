@@ -22,16 +22,16 @@ from relume.errors import CancelledError
 from relume.methods.gather import GatherMethod
 from relume.methods.local_lights import LocalLights
 from relume.methods.reflected import Reflected
-from relume.methods.transfer import BouncedViews
+from relume.methods.transfer import BakedViews, BouncedViews, FewSamples
 from relume.operators.image_files import ImageFiles
 from relume.picture.jobs import Cancelled, Progress
 from relume.scene.model import Camera, Scene
 from relume.scene.placed_camera import with_cameras
-from relume.views.view import open_view
+from relume.views.view import View, open_view
 
 _RAYS, _GLOSSY_RAYS = 203, 78  # a third of a bake's: reflected light is there three times as soon
 _ROWS_A_TASK = 4096  # half a second's work at most: so soon is a still given up
-_SAMPLES, _TRACED = 0, (1, 3)  # stages of `gather`; the one between them is the bake's
+_SAMPLES, _SHADOWS, _LINKS = 0, 1, 3  # stages of `gather`; the one between them is the bake's
 
 
 class StoreWithView:
@@ -61,17 +61,22 @@ class Still(BouncedViews):
     """One view of a moving bake, opened as if it had been baked; what is no view's is the bake's.
 
     Attributes:
-        lit: the light of the bake.
+        lit: the light of the bake. reflects: whether gather rays were traced; else light comes straight alone.
     """
 
     lit: BouncedViews
+    reflects: bool
 
     @classmethod
-    def of(cls, lit: BouncedViews, store: StoreWithView) -> Still:
-        """Open the view that a store has more than the bake."""
+    def of(cls, lit: BouncedViews, store: StoreWithView, reflects: bool) -> Still:
+        """Open the view that a store has more than the bake.
+
+        Args:
+            lit: the light of the bake. store: over the bake's. reflects: whether its gather rays are there.
+        """
         view = open_view(store, 0, lit.memory, lit.key)
         of_bake = {one.name: getattr(lit, one.name) for one in fields(BouncedViews)}
-        return cls(**{**of_bake, "store": store, "views": {view.name: view}}, lit=lit)
+        return cls(**{**of_bake, "store": store, "views": {view.name: view}}, lit=lit, reflects=reflects)
 
     @property
     def derived(self) -> ImageFiles:
@@ -88,6 +93,10 @@ class Still(BouncedViews):
         """Light that gather cells send out."""
         return self.lit.reflected
 
+    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+        """Some of a material's samples, with what gather rays they have. See `Transfer`."""
+        return super().some(view, material, chosen) if self.reflects else BakedViews.some(self, view, material, chosen)
+
 
 class Tracing:
     """A still that is being traced; given up, it goes on from there when it is wanted again.
@@ -101,10 +110,14 @@ class Tracing:
         self._method, self._scene, self._recipe, self.store = method, scene, recipe, store
         sampling = Task(_SAMPLES, 1, recipe.views[0], 0, 0)
         store.arrays.update(method.compute(scene, recipe, sampling, store).arrays)
-        for stage in _TRACED:
+        for stage in (_SHADOWS, _LINKS):
             of_view = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
             store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in of_view})
-        self._tasks = [task for stage in _TRACED for task in _shortened(method.tasks(stage, scene, recipe, store))]
+        # seeds of local lights' shadows, too, which need no gather rays
+        seeds = store.arrays["views/0/number"]
+        seeds[:] = np.arange(len(seeds))
+        shadows, links = (list(_shortened(method.tasks(k, scene, recipe, store))) for k in (_SHADOWS, _LINKS))
+        self._tasks, self._num_straight = shadows + links, len(shadows)
         self._done, self._lock = 0, threading.Lock()
 
     @property
@@ -112,20 +125,22 @@ class Tracing:
         """Memory that the view's arrays hold."""
         return sum(array.nbytes for array in self.store.arrays.values())
 
-    def finish(self, progress: Progress, cancelled: Cancelled) -> None:
+    def finish(self, reflects: bool, progress: Progress, cancelled: Cancelled) -> None:
         """Trace what is left.
 
         Args:
+            reflects: gather rays, too, by far the most of it.
             progress: called with the share done. cancelled: asked now and then.
         Raises:
             CancelledError: `cancelled` said so.
         """
+        num_tasks = len(self._tasks) if reflects else self._num_straight
         while True:
             if cancelled():
                 raise CancelledError("the still was cancelled")
-            progress(self._done / len(self._tasks) if self._tasks else 1.0)
+            progress(min(self._done / num_tasks, 1.0) if num_tasks else 1.0)
             with self._lock:  # for one task, so that others who want it go on with it as well
-                if self._done == len(self._tasks):
+                if self._done >= num_tasks:
                     return
                 self._trace(self._tasks[self._done])
                 self._done += 1
@@ -147,11 +162,13 @@ class Stills:
     def __init__(self, lit: BouncedViews, scene: Scene) -> None:
         self._lit, self._scene, self._method = lit, scene, GatherMethod(_RAYS, _GLOSSY_RAYS)
 
-    def make(self, camera: Camera, size: tuple[int, int], progress: Progress, cancelled: Cancelled) -> Still:
+    def make(
+        self, camera: Camera, size: tuple[int, int], reflects: bool, progress: Progress, cancelled: Cancelled
+    ) -> Still:
         """Trace what an eye sees, as far as it is not remembered.
 
         Args:
-            camera: the eye. size: width and height, pixels.
+            camera: the eye. size: width and height, pixels. reflects: with light from other surfaces.
             progress: called with the share done. cancelled: asked now and then.
         Raises:
             CancelledError: `cancelled` said so.
@@ -163,8 +180,8 @@ class Stills:
         if tracing is None:
             begun = self._begin(replace(camera, name=name), size)
             tracing = memory.get(key, Tracing, begun.num_bytes, lambda: begun)
-        tracing.finish(progress, cancelled)
-        return Still.of(self._lit, tracing.store)
+        tracing.finish(reflects, progress, cancelled)
+        return Still.of(self._lit, tracing.store, reflects)
 
     def _begin(self, camera: Camera, size: tuple[int, int]) -> Tracing:
         recipe = Recipe(self._method.name, (camera.name,), size, self._lit.num_lights)

@@ -26,8 +26,9 @@ from relume.scene.model import Camera
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
 Eye = tuple[Camera, tuple[int, int]]
-MakeStill = Callable[[Camera, tuple[int, int], Progress, Cancelled], Transfer]
-"""Finds what an eye sees, in a picture of this size: an opened bake of this one fixed view."""
+MakeStill = Callable[[Camera, tuple[int, int], bool, Progress, Cancelled], Transfer]
+"""Finds what an eye sees, in a picture of this size: an opened bake of this one fixed view, with light between surfaces
+where that is wanted."""
 
 TRACING = 0.5  # of what a still tells to be done; the rest is shading
 
@@ -44,7 +45,7 @@ def exact_picture(
     Raises:
         CancelledError: `cancelled` said so.
     """
-    transfer = make_still(*eye, lambda share: progress(TRACING * share), cancelled)
+    transfer = make_still(*eye, _reflects(look), lambda share: progress(TRACING * share), cancelled)
     picture = Picture(transfer, next(iter(transfer.views)), memory)
     picture.set_look(look, solo=solo)
     finish(picture, look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
@@ -58,7 +59,8 @@ class StillJob:
     Attributes:
         number: of the eye, among those that the picture was given. num_looks: that it was given, too.
         look, solo: that the picture is made in; others that came meanwhile are followed from there.
-        take: gets it when it is there; None where it cannot be had.
+        take: gets the number of the eye, whether light between surfaces can be shown, and the picture when it is there;
+            None where it cannot be had.
     """
 
     make_still: MakeStill
@@ -68,7 +70,7 @@ class StillJob:
     num_looks: int
     look: Look
     solo: Solo
-    take: Callable[[int, Picture | None], None]
+    take: Callable[[int, bool, Picture | None], None]
 
     what = "the exact picture from here"
     state: ClassVar[Literal["shading"]] = "shading"
@@ -90,7 +92,7 @@ class StillJob:
 
     def install(self, made: Picture | None) -> None:
         """Hand it over."""
-        self.take(self.number, made)
+        self.take(self.number, _reflects(self.look), made)
 
 
 class RestingPicture:
@@ -105,6 +107,7 @@ class RestingPicture:
         self._moving, self._make_still, self._memory = moving, make_still, memory
         self._number, self._num_looks, self._rests = 0, 0, True
         self._still: Picture | None = None
+        self._has_reflections = False  # the still, if a look wants them
         self._is_still = False  # the still is what is shown
         self._is_asked_again = False  # for a picture from the eye that it has
         self._look: Look | None = None
@@ -129,9 +132,12 @@ class RestingPicture:
         Raises:
             ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
         """
-        if self._still is not None:  # first, for it refuses whatever the other does
-            self._still.set_look(look, hand=hand, solo=solo)
+        still = self._still if self._has_reflections or not _reflects(look) else None
+        if still is not None:  # first, for it refuses whatever the other does
+            still.set_look(look, hand=hand, solo=solo)
         self._moving.set_look(look, hand=hand, solo=solo)
+        if still is None:
+            self._still, self._is_still = None, False
         self._look, self._hand, self._solo = look, hand, solo
         self._num_looks += 1
 
@@ -178,17 +184,19 @@ class RestingPicture:
         wanted = self._number, self._num_looks, self._look, self._solo
         return StillJob(self._make_still, self._memory, self._moving.eye, *wanted, self._take)
 
-    def _take(self, number: int, still: Picture | None) -> None:
-        if number != self._number:
+    def _take(self, number: int, has_reflections: bool, still: Picture | None) -> None:
+        if number != self._number or self._look is None:
             return
-        if still is None or self._look is None:
+        if still is None:
             self._rests = False
+            return
+        if _reflects(self._look) and not has_reflections:  # asked for meanwhile: it goes on from what was traced
             return
         still.set_look(self._look, hand=self._hand, solo=self._solo)
         if self._touched is not None:
             with suppress(ParameterError):  # an edit may have removed it
                 still.touch(self._touched)
-        self._still = still
+        self._still, self._has_reflections = still, has_reflections
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
@@ -255,6 +263,11 @@ class RestingPicture:
             EditNotSupportedError: no still is shown.
         """
         return self._shown.brush(pointer, from_deg, to_deg)
+
+
+def _reflects(look: Look) -> bool:
+    """Whether a look shows light between surfaces."""
+    return look.transport.paths.reflect
 
 
 def _is_same(one: Eye, other: Eye) -> bool:

@@ -10,7 +10,7 @@ from relume.bake import Recipe
 from relume.errors import CancelledError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.stills import Stills
+from relume.methods.stills import Stills, Tracing
 from relume.moving.picture import MovingPicture
 from relume.moving.resting import RestingPicture, StillJob
 from relume.render.image import render_image
@@ -159,3 +159,45 @@ def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
     make_next(picture)
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
+
+
+@pytest.fixture
+def traced(monkeypatch):
+    """Stages of what is traced: shadows, and gather rays."""
+    stages, trace = [], Tracing._trace
+
+    def noted(tracing, task):
+        stages.append(task.stage)
+        trace(tracing, task)
+
+    monkeypatch.setattr(Tracing, "_trace", noted)
+    return stages
+
+
+def test_gather_rays_are_traced_when_a_look_shows_their_light_and_then_no_more(moving, picture, traced):
+    straight, whole = look_of(moving, lit(transport(show="direct"))), look_of(moving, lit())
+    picture.set_look(straight)
+    assert rested(picture).exact
+    assert set(traced) == {1}
+    picture.set_look(whole)
+    assert picture.advance(None).fidelity == "approximate"
+    assert rested(picture).exact
+    first, num_traced = picture.image().copy(), len(traced)
+    assert set(traced) == {1, 3}
+    for look in (straight, whole):
+        picture.set_look(look)
+        assert rested(picture).exact
+    assert len(traced) == num_traced
+    assert relative_rmse(picture.image(), first) < 1e-5
+
+
+def test_reflected_light_asked_for_while_a_still_without_it_is_made(moving, picture, traced):
+    whole = look_of(moving, lit())
+    picture.set_look(look_of(moving, lit(transport(show="direct"))))
+    job = picture.next_job()
+    made = job.make(lambda share: None, lambda: False)
+    picture.set_look(whole)
+    picture.install(job, made)
+    assert picture.advance(None).fidelity == "approximate"
+    assert rested(picture).exact
+    assert traced == sorted(traced)

@@ -1,7 +1,8 @@
 """The product's own shading, by boxes: what a picture shows before a curve is touched, and after."""
 
 import pytest
-from looks_of_pictures import EDITS, LOBE, lit
+from looks_of_pictures import EDITS, lit
+from oracle import copied, rendered_afresh
 from sessions import BUDGET, look_of, relative_rmse, settle
 
 import relume.operators.shade
@@ -19,6 +20,7 @@ def by_boxes(by_leaves, monkeypatch):
 
 
 def shown(transfer, *changes, touched=None):
+    """A picture at rest, what a hand touches made ready."""
     picture = Picture(transfer, "front", Memory(BUDGET))
     picture.set_look(look_of(transfer, lit(*changes)))
     settle(picture)
@@ -31,18 +33,20 @@ def shown(transfer, *changes, touched=None):
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edited_picture_is_the_shaded_one_to_a_thousandth(by_boxes, transfer, edit):
     pointer, change = EDITS[edit]
-    picture = shown(transfer, touched=pointer)
-    picture.set_look(look_of(transfer, lit(change)))
-    picture.advance(8)
-    assert relative_rmse(settle(picture).image(), shown(transfer, change).image()) < A_THOUSANDTH
+    with copied(transfer) as fresh:
+        picture = shown(fresh, touched=pointer)
+        picture.set_look(look_of(fresh, lit(change)))
+        picture.advance(8)
+        found = settle(picture).image()
+    expected = rendered_afresh(transfer, look_of(transfer, lit(change)))
+    assert relative_rmse(found, expected) < A_THOUSANDTH
 
 
-def test_touching_a_curve_moves_the_picture_by_less_than_a_thousandth(by_boxes, transfer):
-    assert relative_rmse(shown(transfer, touched=LOBE).image(), shown(transfer).image()) < A_THOUSANDTH
-
-
-def test_operators_and_boxes_are_two_quadratures(by_boxes, transfer, monkeypatch):
-    """Were they the same, the two above would hold whatever boxes give."""
-    picture = shown(transfer)
+def test_boxes_are_not_leaves(by_boxes, transfer, monkeypatch):
+    """Were they the same, the above would hold whatever boxes give."""
+    if transfer.method == "furnace":
+        pytest.skip("it has no light triangles to take boxes of")
+    look = look_of(transfer, lit())
+    by_boxes = rendered_afresh(transfer, look)
     monkeypatch.setattr(relume.operators.shade, "Shader", Projector)
-    assert relative_rmse(picture.image(), shown(transfer).image()) > 0
+    assert 0 < relative_rmse(by_boxes, rendered_afresh(transfer, look)) < A_THOUSANDTH
