@@ -59,8 +59,9 @@ def seen_behind(
         return np.tile(np.array(background.color, np.float32), (num, 1))
     behind = np.zeros((num, 3), np.float32)
     if background.kind != "transparent":
-        face, of_face = seen.hits.face, transfer.surface.face_material
-        past = np.where((face >= 0) & is_catcher[of_face[np.maximum(face, 0)]], -1, face).astype(np.int32)
+        past, of_face = seen.hits.face, transfer.surface.face_material
+        if is_catcher.any():
+            past = np.where((past >= 0) & is_catcher[of_face[np.maximum(past, 0)]], -1, past).astype(np.int32)
         radiance = transfer.map_of(light.environment.map, background.blur if background.kind == "blurred" else 0.0)
         shown = np.array(light.environment_gain, np.float32) * gain
         fill_sky(radiance, light.environment.rotation, shown, past, seen.directions, behind)

@@ -90,7 +90,8 @@ def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camer
     """
     (width, height), surface, light = size, transfer.surface, wanted.light
     out = _radiance(transfer, wanted, seen, camera, height)
-    out *= wanted.gain
+    if (wanted.gain != 1).any():
+        out *= wanted.gain
     caught = _caught(transfer, wanted, seen)
     behind = seen_behind(transfer, wanted.look.background, light, wanted.gain, seen, caught.is_catcher)
     hides = lay_over(surface, seen, behind, caught, wanted.gain, is_direct=light.paths.direct, out=out)

@@ -22,6 +22,7 @@ from relume.parallel import for_shares
 F32 = NDArray[np.float32]
 
 _LEAST_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
+_ALL_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
 
 
 class Mirrored(NamedTuple):
@@ -40,10 +41,12 @@ class Mirrored(NamedTuple):
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _share_above(x):  # type: ignore[no-untyped-def]
     """Approximate the share of a normal distribution above −x."""
+    if x > _ALL_ABOVE:
+        return np.float32(1)
     return np.float32(1) / (np.float32(1) + math.exp(np.float32(-1.702) * max(x, np.float32(-20))))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
     """Find what the lobe of a pixel sees.
 
@@ -72,7 +75,7 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     return row, share
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors between the three vertices about a pixel.
 
@@ -86,7 +89,7 @@ def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Find the place in textures of a place in a triangle.
 
@@ -139,7 +142,7 @@ def _combine(  # type: ignore[no-untyped-def]
         if f < 0:
             continue
         material = face_material[f]
-        # tuples: rows of arrays would be counted as references, several times a ray
+        # tuples, and helpers that are inlined: arrays handed over would be counted as references, several times a ray
         outward = face_normal[f, 0], face_normal[f, 1], face_normal[f, 2]
         corners = faces[f, 0], faces[f, 1], faces[f, 2]
         about, shares = (vertex[p, 0], vertex[p, 1], vertex[p, 2]), (weight[p, 0], weight[p, 1], weight[p, 2])

@@ -10,6 +10,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.angles import acos_clamped
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -39,23 +40,43 @@ def sky_of(map_of: Callable[[float], F32]) -> Sky:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _turn_of(x, z):  # type: ignore[no-untyped-def]
+    """Approximate atan2(z, x) / 2π within 3e-7, by a minimax polynomial: libm's is a call for every pixel."""
+    across, along = abs(x), abs(z)
+    t = min(across, along) / max(max(across, along), np.float32(1e-30))
+    t2 = t * t
+    p = np.float32(-0.01172120)
+    p = p * t2 + np.float32(0.05265332)
+    p = p * t2 - np.float32(0.11643287)
+    p = p * t2 + np.float32(0.19354346)
+    p = p * t2 - np.float32(0.33262347)
+    angle = np.float32(0.5 / math.pi) * t * (p * t2 + np.float32(0.99997726))
+    angle = np.float32(0.25) - angle if along > across else angle
+    angle = np.float32(0.5) - angle if x < 0 else angle
+    return -angle if z < 0 else angle
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Find u and v of a direction, u perhaps a turn or two outside."""
-    u = np.float32(math.atan2(dz, dx)) * np.float32(0.5 / math.pi) + turn
-    v = np.float32(0.5) - np.float32(math.asin(min(max(dy, np.float32(-1)), np.float32(1)))) * np.float32(1 / math.pi)
-    return u, v
+    """Find u and v of a direction, both in [0, 1]."""
+    u = _turn_of(dx, dz) + turn
+    whole = np.int64(u)
+    from_pole = np.float32(1 / math.pi) * acos_clamped(abs(dy))
+    v = from_pole if dy > 0 else np.float32(1) - from_pole
+    return u - np.float32(whole - 1 if u < whole else whole), v
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
     """Add a share of one level in a place; bilinear, round about in u. out: (3,)"""
-    first, height, width = sky.levels[level]
-    x = u * width - np.float32(0.5)
-    y: Any = min(max(v * height - np.float32(0.5), np.float32(0)), np.float32(height - 1))
-    left, upper = math.floor(x), math.floor(y)
-    fx, fy = np.float32(x - left), np.float32(y - upper)
-    column, row = np.int64(left) % width, np.int64(upper)
-    beside, below = (column + 1) % width, min(row + 1, height - 1)
+    first, height, width = sky.levels[level, 0], sky.levels[level, 1], sky.levels[level, 2]
+    x = u * np.float32(width) - np.float32(0.5)
+    y: Any = min(max(v * np.float32(height) - np.float32(0.5), np.float32(0)), np.float32(height - 1))
+    # rounded down without a call: x is −½ at least
+    column, row = np.int64(x + np.float32(1)) - 1, np.int64(y)
+    fx, fy = x - np.float32(column), y - np.float32(row)
+    beside, below = (column + 1 if column + 1 < width else column + 1 - width), min(row + 1, height - 1)
+    column = column + width if column < 0 else column
     for channel in range(3):
         top = sky.texels[first + row * width + column, channel] * (1 - fx)
         top += sky.texels[first + row * width + beside, channel] * fx
@@ -64,7 +85,8 @@ def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
         out[channel] += share * (top * (1 - fy) + bottom * fy)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+# Inlined, as what it calls: calls would count the references of arrays, for which threads wait for each other.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def sky_about(sky, turn, dx, dy, dz, sigma, out):  # type: ignore[no-untyped-def]
     """Find the light about a direction.
 
@@ -79,8 +101,7 @@ def sky_about(sky, turn, dx, dy, dz, sigma, out):  # type: ignore[no-untyped-def
     out[:] = 0
     u, v = _place(turn, dx, dy, dz)
     _add_level(sky, lower, u, v, np.float32(1 - share), out)
-    if share > 0:
-        _add_level(sky, lower + 1, u, v, np.float32(share), out)
+    _add_level(sky, min(lower + 1, sky.levels.shape[0] - 1), u, v, np.float32(share), out)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
