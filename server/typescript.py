@@ -52,7 +52,8 @@ INPUTS: tuple[type[BaseModel], ...] = (
     bodies.BakeRequest,
     renders.Keyframes,
     renders.RenderRequest,
-    bodies.InOutRequest,
+    bodies.TermsRequest,
+    bodies.AlbedoBody,
     bodies.TruthRequest,
     bodies.ShareRequest,
 )

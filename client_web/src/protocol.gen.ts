@@ -17,6 +17,13 @@ export interface AckMessage {
   frame: number;
 }
 
+/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `most` in any channel, which is sent `at_deg` from the normal. */
+export interface AlbedoBody {
+  mean: number[];
+  most: number;
+  at_deg: number;
+}
+
 /** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none. `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
@@ -89,11 +96,6 @@ export interface FocusMessage {
   view: string;
 }
 
-/** Terms as they stand in a look. */
-export interface InOutRequest {
-  terms: Record<string, unknown>[];
-}
-
 /** Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is between goes from one to the next. `between`: from parameter to parameter, or across the material map (GET /api/materials/map) where both are of its kind. */
 export interface Keyframes {
   bake: string;
@@ -156,6 +158,11 @@ export interface StreamMessage {
   type: "stream";
   format: "hdr" | "jpeg" | "auto";
   quality?: number;
+}
+
+/** Terms as they stand in a look. */
+export interface TermsRequest {
+  terms: Record<string, unknown>[];
 }
 
 /** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */

@@ -17,6 +17,7 @@ export type {
   FinderBody,
   FrameHeader,
   HelloMessage,
+  AlbedoBody,
   InOutBody,
   Keyframes,
   LookEntry,

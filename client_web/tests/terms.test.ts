@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import { energyWords } from "../src/inspector/energy";
 import { mirrorsSoftly, texturesOf } from "../src/inspector/terms";
 import type { ModelBody, Rgb, SceneBody, Term } from "../src/protocol";
 import { models, scene } from "../src/state/scene";
@@ -37,4 +38,11 @@ test("a material that was no mirror when it was baked reflects softly once it is
   expect(mirrorsSoftly("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
   expect(mirrorsSoftly("Chrome", ggx(0.02))).toBe(false);
   expect(mirrorsSoftly("Nothing", ggx(0.02))).toBe(false);
+});
+
+test("that more light is sent back than arrives is said, and nothing else", () => {
+  expect(energyWords({ mean: [0.5, 0.5, 0.5], most: 1.01, at_deg: 89 })).toBeNull();
+  expect(energyWords({ mean: [0.7, 0.2, 0.4], most: 1.234, at_deg: 80.6 })).toBe(
+    "Sends back more light than meets it: 123 % of it 81° from the normal, 70 % on average. No real surface does.",
+  );
 });

@@ -92,11 +92,36 @@ def shares(term_document: Mapping[str, Any]) -> F64:
 @lru_cache(maxsize=1024)
 def _of_lobe(term_text: str) -> F64:
     """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi do. (3, pairs)"""
+    places, arriving = _about_mirrors(), _arriving(term_text)
+    return np.stack([places.h_o[:, j] @ arriving[..., k] for j, k in PAIRS], axis=-1)
+
+
+@lru_cache(maxsize=256)
+def _arriving(term_text: str) -> F64:
+    """What each function of ωi sends towards each ωo, weighed as `_Places`. (o, 3, rungs)"""
     document, places = json.loads(term_text), _about_mirrors()
     turns = _TURNS[:1] if is_isotropic(document) else _TURNS
     value = np.mean([eval_brdf(document, places.wi @ turn.T, places.wo @ turn.T) for turn in turns], axis=0)
-    arriving = np.einsum("onc,onk->ock", value, places.h_i, optimize=True)
-    return np.stack([places.h_o[:, j] @ arriving[..., k] for j, k in PAIRS], axis=-1)
+    return np.asarray(np.einsum("onc,onk->ock", value, places.h_i, optimize=True), np.float64)
+
+
+def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[F64, F64]:
+    """What share of even light a material sends towards each θo, its textures white, the mean over turns:
+
+        a(θo) = ∫ f(ωi, ωo) cos θi dωi
+
+    Args:
+        terms: of a complete look.
+    Returns:
+        θo in radians, rising, (o,), and a there, (o, 3).
+    """
+    places, total = _about_mirrors(), np.zeros((_NUM_OUT, 3))
+    for term in terms:
+        white = {**term, "color": [1.0, 1.0, 1.0]}
+        # the first function is the constant 1 / √π
+        even = np.sqrt(np.pi) * _arriving(json.dumps(white, sort_keys=True))[..., 0]
+        total += even / places.weight_o[:, None] * np.asarray(term["color"], np.float64)
+    return np.arccos(places.wo[::-1, 0, 2]), total[::-1]
 
 
 class _Places(NamedTuple):
@@ -105,12 +130,14 @@ class _Places(NamedTuple):
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
         h_i: functions of ωi, weighed. (o, n, rungs). h_o: of ωo, times ∫ cos² mφ dφ. (o, rungs)
+        weight_o: of each ωo, its cosine included, which is in h_i. (o,)
     """
 
     wi: F64
     wo: F64
     h_i: F64
     h_o: F64
+    weight_o: F64
 
 
 @lru_cache(maxsize=1)
@@ -133,7 +160,7 @@ def _about_mirrors() -> _Places:
     rungs = ladder(SENT_DEGREE)
     around = np.where(rungs.order > 0, np.pi, 2 * np.pi)
     h_i, h_o = weight[..., None] * in_basis(wi)[..., rungs.cosine], around * in_basis(wo[:, 0])[:, rungs.cosine]
-    return _Places(wi, wo, h_i, h_o)
+    return _Places(wi, wo, h_i, h_o, weight_o * cos_o)
 
 
 def _gauss(num: int) -> tuple[F64, F64]:

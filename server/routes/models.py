@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import numpy as np
 from fastapi import APIRouter
 from fastapi.concurrency import run_in_threadpool
 
 from relume.brdf import registry
+from relume.brdf.albedo import directional_albedo, reflectance
 from relume.brdf.document import complete_term
 from relume.brdf.mirror import mirrors_below
-from server.wire.bodies import InOutBody, InOutRequest, ModelBody
+from server.wire.bodies import AlbedoBody, InOutBody, ModelBody, TermsRequest
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
@@ -20,13 +25,29 @@ def list_models() -> list[ModelBody]:
 
 
 @router.post("/in-out")
-async def show_in_out(request: InOutRequest) -> list[InOutBody]:
+async def show_in_out(request: TermsRequest) -> list[InOutBody]:
     """How terms are sent in views whose eye moves: the in-out factorisation of each (Mahajan 2008)."""
-    terms = [complete_term(("terms", index), term, None) for index, term in enumerate(request.terms)]
-    return await run_in_threadpool(_in_out, terms)
+    return await run_in_threadpool(_in_out, _complete(request))
 
 
-def _in_out(terms: list[dict[str, object]]) -> list[InOutBody]:
+@router.post("/albedo")
+async def show_albedo(request: TermsRequest) -> AlbedoBody:
+    """What share of the light that meets a material of these terms it sends back: no more than all, in the world."""
+    return await run_in_threadpool(_albedo, _complete(request))
+
+
+def _complete(request: TermsRequest) -> list[dict[str, Any]]:
+    return [complete_term(("terms", index), term, None) for index, term in enumerate(request.terms)]
+
+
+def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
+    theta, albedo = directional_albedo(terms)
+    mean = np.sum([reflectance(term) for term in terms], axis=0)
+    row = int(albedo.max(axis=1).argmax())
+    return AlbedoBody(mean=mean.tolist(), most=float(albedo[row].max()), at_deg=math.degrees(theta[row]))
+
+
+def _in_out(terms: list[dict[str, Any]]) -> list[InOutBody]:
     from relume.moving.basis.in_out import in_out  # loads compiled kernels
 
     return [InOutBody(**in_out(term)._asdict()) for term in terms]

@@ -166,7 +166,7 @@ class ModelBody(Body):
     curves: list[CurveBody]
 
 
-class InOutRequest(Body):
+class TermsRequest(Body):
     """Terms as they stand in a look."""
 
     terms: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_TERMS)]
@@ -181,6 +181,15 @@ class InOutBody(Body):
     missed: float
     needed: int | None
     is_mirror: bool
+
+
+class AlbedoBody(Body):
+    """What share of even light a material sends back, its textures white: the `mean` over all directions, and the
+    `most` in any channel, which is sent `at_deg` from the normal."""
+
+    mean: list[float]
+    most: float
+    at_deg: float
 
 
 class MeasuredBody(Body):

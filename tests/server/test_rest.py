@@ -159,6 +159,19 @@ def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
         assert len(answer.json()["detail"]) > 10
 
 
+def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
+    grey = {"model": "lambert", "color": [0.2, 0.5, 0.3]}
+    told = client.post("/api/models/albedo", json={"terms": [grey]}).json()
+    assert told["mean"] == pytest.approx(grey["color"], rel=1e-3)
+    assert told["most"] == pytest.approx(0.5, rel=0.01)
+    bright = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "params": {"exponent": 20.0}}
+    told = client.post("/api/models/albedo", json={"terms": [grey, bright]}).json()
+    assert told["most"] > 1
+    assert 0 <= told["at_deg"] < 90
+    for bad in ([], [{"model": "nothing"}], [grey] * 99):
+        assert client.post("/api/models/albedo", json={"terms": bad}).status_code == 422
+
+
 def test_models_are_listed(client: TestClient) -> None:
     models = {model["model"]: model for model in client.get("/api/models").json()}
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]

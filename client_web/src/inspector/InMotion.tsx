@@ -1,13 +1,11 @@
 /** What a view whose eye moves makes of a term: how many functions of the incoming light it takes, and what they miss. */
-import { useEffect, useState } from "preact/hooks";
 import { getInOut } from "../net/api";
 import type { InOutBody, Term } from "../protocol";
 import { materialOf } from "../state/scene";
 import { moves } from "../state/views";
 import { isTexels } from "../state/look";
 import { drawsHere } from "../live/drawing";
-
-const AFTER_MS = 250; // a slider that moves asks once, when it rests
+import { useTold } from "./useTold";
 
 function words({ functions, missed, needed, is_mirror }: InOutBody): string {
   const percent = missed < 0.01 ? "less than 1 %" : `${Math.round(100 * missed)} %`;
@@ -30,25 +28,11 @@ function Cover({ material }: { material: string }) {
 }
 
 export function InMotion({ term, material }: { term: Term; material: string }) {
-  const [told, setTold] = useState<InOutBody | null>(null);
   const isCover = isTexels(term);
   const asked = moves.value && !isCover ? JSON.stringify(term) : null;
-  useEffect(() => {
-    if (asked === null) return undefined;
-    let isOld = false;
-    const timer = setTimeout(() => {
-      getInOut([JSON.parse(asked) as Term]).then(
-        ([found]) => !isOld && setTold(found ?? null),
-        () => !isOld && setTold(null), // a term that is refused is said where it is edited
-      );
-    }, AFTER_MS);
-    return () => {
-      isOld = true;
-      clearTimeout(timer);
-    };
-  }, [asked]);
+  const told = useTold(asked, async (text) => (await getInOut([JSON.parse(text) as Term]))[0] ?? null);
   if (isCover) return <Cover material={material} />;
-  if (asked === null || told === null) return null;
+  if (told === null) return null;
   return (
     <p class="in-motion" title="In-out factorisation of this term, cosine-weighted RMS. Where the eye rests it is exact.">
       {words(told)}

@@ -11,6 +11,7 @@ import { shownPanels } from "../state/room";
 import { materialOf, models } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "../state/selection";
 import { IconButton } from "../ui/Button";
+import { Energy } from "./Energy";
 import { TermCard } from "./TermCard";
 import { defaultTerm, modelsFor } from "./terms";
 
@@ -137,6 +138,7 @@ function MaterialInspector() {
           }
         />
       ))}
+      {!isCaught && <Energy key={material} terms={terms.value} />}
       {!isCaught && <AddTerm material={material} />}
     </div>
   );

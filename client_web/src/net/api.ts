@@ -1,5 +1,6 @@
 /** REST calls; failures become ApiError with the server's own words (RFC 9457). */
 import type {
+  AlbedoBody,
   BakeBody,
   BakeRequest,
   BuiltInBody,
@@ -122,6 +123,11 @@ export async function startBake(body: BakeRequest): Promise<BakeBody> {
 
 export async function cancelBake(id: string): Promise<void> {
   await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+
+/** What share of light a material of these terms sends back. */
+export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
+  return (await (await request("/api/models/albedo", json("POST", { terms }))).json()) as AlbedoBody;
 }
 
 /** How terms are sent in views whose eye moves. */

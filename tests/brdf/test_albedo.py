@@ -1,0 +1,55 @@
+"""What share of even light materials send back, against sums over even directions."""
+
+import numpy as np
+import pytest
+from analytic_terms import ANALYTIC
+
+from relume.brdf.albedo import directional_albedo, reflectance
+from relume.brdf.document import complete_term
+from relume.brdf.evaluate import eval_brdf
+
+NUM, ERRORS = 100_000, 5  # directions, and standard errors of their sums that are allowed; quadrature's own beside
+
+
+def term_of(model, color=(1.0, 1.0, 1.0), **params):
+    return complete_term(("test",), {"model": model, "color": list(color), "params": params}, None)
+
+
+def sent_towards(term, theta_o):
+    """A sum over directions, and turns about the normal, spread evenly by chance; its standard error. (3,) each"""
+    rng = np.random.default_rng(7)
+    z, phi = rng.random(NUM), 2 * np.pi * rng.random(NUM)
+    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1)
+    turn = 2 * np.pi * rng.random(NUM)
+    wo = np.stack([np.sin(theta_o) * np.cos(turn), np.sin(theta_o) * np.sin(turn), 0 * turn + np.cos(theta_o)], axis=-1)
+    value = 2 * np.pi * eval_brdf(term, wi, wo) * z[:, None]
+    return value.mean(axis=0), value.std(axis=0) / np.sqrt(NUM)
+
+
+@pytest.mark.parametrize("model", ANALYTIC)
+def test_it_is_the_integral_over_all_directions(model):
+    term = term_of(model, color=(0.8, 0.3, 0.1))
+    theta, albedo = directional_albedo([term])
+    for k in (0, 4, 7):
+        expected, error = sent_towards(term, theta[k])
+        np.testing.assert_array_less(np.abs(albedo[k] - expected), ERRORS * error + 0.01 * expected)
+
+
+def test_terms_add_up_and_its_mean_is_the_reflectance():
+    terms = [term_of("oren_nayar", (0.5, 0.4, 0.2)), term_of("ggx", roughness=0.3)]
+    theta, albedo = directional_albedo(terms)
+    alone = [directional_albedo([term])[1] for term in terms]
+    np.testing.assert_allclose(albedo, alone[0] + alone[1], rtol=1e-6)
+    assert np.all(np.diff(theta) > 0)
+    cosine = np.cos(theta)
+    mean = 2 * np.trapezoid(
+        np.vstack([albedo[:1], albedo, albedo[-1:]]) * np.array([1, *cosine, 0])[:, None],
+        -np.array([1, *cosine, 0]),
+        axis=0,
+    )
+    np.testing.assert_allclose(mean, sum(reflectance(term) for term in terms), rtol=0.02)
+
+
+def test_a_white_furnace_takes_light_and_a_bright_lobe_makes_some():
+    assert directional_albedo([term_of("ggx", roughness=0.5, f0=1.0)])[1].max() <= 1.001
+    assert directional_albedo([term_of("blinn_phong", exponent=50.0)])[1].max() > 2
