@@ -3,12 +3,13 @@
 import pytest
 from leaves import by_leaves
 from merl_files import planes_of
+from shared_bakes import baked, corner, gathered, transfer
 
 from relume.measured.asset_store import STORE, keep, records
 from relume.measured.lookup import table_of
 from relume.measured.merl import write_merl
 
-__all__ = ["by_leaves"]  # a fixture
+__all__ = ["baked", "by_leaves", "corner", "gathered", "transfer"]  # fixtures
 
 
 @pytest.fixture(scope="session")

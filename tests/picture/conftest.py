@@ -1,5 +1,6 @@
-"""Pictures are followed to the last digits."""
+"""Pictures are followed to the last digits, in bakes of their own: images kept beside others' are shaded otherwise."""
 
 from leaves import by_leaves
+from shared_bakes import baked, corner, gathered, transfer
 
-__all__ = ["by_leaves"]  # a fixture
+__all__ = ["baked", "by_leaves", "corner", "gathered", "transfer"]  # fixtures
