@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, cameras, protocol, renders, surface
+from server.wire import bodies, cameras, models, protocol, renders, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -52,8 +52,8 @@ INPUTS: tuple[type[BaseModel], ...] = (
     bodies.BakeRequest,
     renders.Keyframes,
     renders.RenderRequest,
-    bodies.TermsRequest,
-    bodies.AlbedoBody,
+    models.TermsRequest,
+    models.AlbedoBody,
     bodies.TruthRequest,
     bodies.ShareRequest,
 )
@@ -67,8 +67,8 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     cameras.FinderBody,
     cameras.PlaceBody,
     bodies.BuiltInBody,
-    bodies.ModelBody,
-    bodies.InOutBody,
+    models.ModelBody,
+    models.InOutBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,
@@ -93,8 +93,8 @@ def generate_protocol() -> str:
     for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"):
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
-    for mode, models in (("validation", INPUTS), ("serialization", OUTPUTS)):
-        _, schema = models_json_schema([(m, mode) for m in models], by_alias=True)  # type: ignore[misc]
+    for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):
+        _, schema = models_json_schema([(m, mode) for m in of_mode], by_alias=True)  # type: ignore[misc]
         parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
     parts = list(dict.fromkeys(parts))  # a part of inputs and outputs alike is written once
     parts.append(union("ClientMessage", CLIENT_MESSAGES))

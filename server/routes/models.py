@@ -13,7 +13,7 @@ from relume.brdf import registry
 from relume.brdf.albedo import directional_albedo, reflectance
 from relume.brdf.document import complete_term
 from relume.brdf.mirror import mirrors_below
-from server.wire.bodies import AlbedoBody, InOutBody, ModelBody, TermsRequest
+from server.wire.models import AlbedoBody, InOutBody, ModelBody, TermsRequest
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
