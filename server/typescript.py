@@ -53,7 +53,6 @@ INPUTS: tuple[type[BaseModel], ...] = (
     renders.Keyframes,
     renders.RenderRequest,
     models.TermsRequest,
-    models.AlbedoBody,
     bodies.TruthRequest,
     bodies.ShareRequest,
 )
@@ -69,6 +68,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.BuiltInBody,
     models.ModelBody,
     models.InOutBody,
+    models.AlbedoBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,

@@ -17,13 +17,6 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `most` in any channel, which is sent `at_deg` from the normal. */
-export interface AlbedoBody {
-  mean: number[];
-  most: number;
-  at_deg: number;
-}
-
 /** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none. `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
@@ -198,6 +191,13 @@ export interface ViewMessage {
 export interface ViewsMessage {
   type: "views";
   names: string[];
+}
+
+/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `most` in any channel, which is sent `at_deg` from the normal. */
+export interface AlbedoBody {
+  mean: number[];
+  most: number;
+  at_deg: number;
 }
 
 /** An array of a payload or of GET /api/bakes/{id}/surface: so many texels of 1, 2 or 4 numbers. */

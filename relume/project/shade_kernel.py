@@ -375,11 +375,11 @@ def shade_points(  # type: ignore[no-untyped-def]
             _sum_up(value[chunk], weight[chunk], num, total)
             if divided == 0:
                 continue
-            for n in range(divided):
-                chosen[n] = light[at + which[chunk, n]]
-                of_parts[1][0, n] = reach[chunk, which[chunk, n]]
-                for channel in range(3):
-                    of_parts[0][0, channel, n] = weight[chunk, channel, which[chunk, n]]
+            listed = which[chunk, :divided]
+            _copy(light[at : at + num], listed, chosen)
+            _copy(reach[chunk], listed, of_parts[1][0])
+            for channel in range(3):
+                _copy(weight[chunk, channel], listed, of_parts[0][0, channel])
             for node in range(6):
                 _look_up(nodes, node, chosen, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node])
             _turn(normal[p], tangent[p], 0, divided, local[0])
