@@ -18,7 +18,7 @@ from relume.look import Look, complete, validate
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.moving.arriving import arriving
+from relume.moving.arriving import wholly
 from relume.moving.look_up import look as look_around
 from relume.moving.picture import MovingPicture
 from relume.picture.light import light_of
@@ -133,9 +133,7 @@ class MovingScene:
             document["transport"]["show"] = "direct"
 
         shown = light_of(self.look(direct), self.moving.material_names, has_bounces=True)
-        found = np.sqrt(np.pi) * arriving(self.moving, shown, self.moving.vectors).total[chosen, :, 0].astype(
-            np.float64
-        )
+        found = np.sqrt(np.pi) * wholly(self.moving, shown).total[chosen, :, 0].astype(np.float64)
         return float(np.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)))
 
     def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:

@@ -111,20 +111,10 @@ def add_light(rungs, num, wi, light, scratch, out):  # type: ignore[no-untyped-d
         scratch: (6, ≥ num) float32, written. out: added to. (3, K) float32
     """
     x, re, im, before, last, value = scratch
-    for n in range(num):
-        x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)
+    _begin(num, wi, x)
     for rung in range(rungs.order.shape[0]):
-        m, a, b, c = rungs.order[rung], rungs.a[rung], rungs.b[rung], rungs.c[rung]
-        if a == 0:
-            _next_power(m, num, wi, re, im)
-            for n in range(num):
-                before[n], last[n] = np.float32(0), np.float32(1)
-        else:
-            for n in range(num):
-                old = last[n]
-                last[n] = (a * x[n] + b) * old - c * before[n]
-                before[n] = old
-        norm, cosine, sine = rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
+        _climb(rungs, rung, num, wi, x, re, im, before, last)
+        m, norm, cosine, sine = rungs.order[rung], rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
         for n in range(num):
             value[n] = norm * last[n] * re[n]
         _add(num, value, light, cosine, out)
@@ -132,6 +122,46 @@ def add_light(rungs, num, wi, light, scratch, out):  # type: ignore[no-untyped-d
             for n in range(num):
                 value[n] = norm * last[n] * im[n]
             _add(num, value, light, sine, out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def functions_of(rungs, num, wi, scratch, out):  # type: ignore[no-untyped-def]
+    """Evaluate all functions for some rays.
+
+    Args:
+        rungs: the `ladder`. num: how many rays there are. wi: their local directions. (≥ 2, ≥ num) float32
+        scratch: (≥ 5, ≥ num) float32, written. out: written. (K, ≥ num) float32
+    """
+    x, re, im, before, last = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    _begin(num, wi, x)
+    for rung in range(rungs.order.shape[0]):
+        _climb(rungs, rung, num, wi, x, re, im, before, last)
+        norm, cosine, sine = rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
+        for n in range(num):
+            out[sine, n] = norm * last[n] * im[n]
+        for n in range(num):
+            out[cosine, n] = norm * last[n] * re[n]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _begin(num, wi, x):  # type: ignore[no-untyped-def]
+    for n in range(num):
+        x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _climb(rungs, rung, num, wi, x, re, im, before, last):  # type: ignore[no-untyped-def]
+    """Go from the rung before to this one."""
+    a, b, c = rungs.a[rung], rungs.b[rung], rungs.c[rung]
+    if a == 0:
+        _next_power(rungs.order[rung], num, wi, re, im)
+        for n in range(num):
+            before[n], last[n] = np.float32(0), np.float32(1)
+    else:
+        for n in range(num):
+            old = last[n]
+            last[n] = (a * x[n] + b) * old - c * before[n]
+            before[n] = old
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.local_pca import Clusters, cluster, distances, missed, strongest
 from relume.btf.begun import Arrays, Begun
-from relume.btf.clusters import Clusters, cluster, distances, missed, strongest
 from relume.btf.eigen import LARGEST, EigenBtf
 from relume.btf.rings import Rings
 from relume.errors import CancelledError, MaterialError

@@ -47,7 +47,11 @@ class TriangleLights:
 
     def none(self) -> TriangleLights:
         """Keep none of them, as where no light comes from the environment itself."""
-        return TriangleLights(self.nodes[:, :, :0], self.direction[:0], self.irradiance[:0])
+        return self.some(np.empty(0, np.intp), self.irradiance[:0])
+
+    def some(self, chosen: NDArray[np.intp], irradiance: F32) -> TriangleLights:
+        """Choose some of them, with other light. chosen: (N,). irradiance: (N, 3) float32"""
+        return TriangleLights(self.nodes[:, :, chosen], self.direction[chosen], irradiance)
 
     @cached_property
     def by_light(self) -> F32:

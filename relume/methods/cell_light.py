@@ -20,6 +20,7 @@ from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays
 from relume.project.sent import NUM_SENT, Sent
 from relume.trace.surface import any_tangent
+from relume.trace.visibility import visible_of
 
 F32 = NDArray[np.float32]
 
@@ -76,22 +77,33 @@ class CellLight:
         """What the cells make of light in a look."""
         return Reflecting.of(reflectances, self.material, self.textures)
 
-    def irradiance(self, lights: TriangleLights) -> F32:
-        """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32"""
-        of_points = self.visible.reshape(-1, self.visible.shape[2])
+    def irradiance(self, lights: TriangleLights, among: NDArray[np.intp] | None = None) -> F32:
+        """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32
+
+        Args:
+            lights: triangles of the environment. among: which of the bake's they are, (M,); None: all.
+        """
+        of_points = self._seen(self.visible.reshape(-1, self.visible.shape[2]), among)
         arriving = irradiance(self.points.normal, of_points, lights).reshape(*self.visible.shape[:2], 3)
         return np.asarray(arriving.mean(axis=1, dtype=np.float64), np.float32)
 
-    def vectors(self, rows: NDArray[np.intp], lights: TriangleLights, degree: int) -> F32:
+    @staticmethod
+    def _seen(visible: NDArray[np.uint8], among: NDArray[np.intp] | None) -> NDArray[np.uint8]:
+        return visible if among is None else visible_of(visible, np.arange(len(visible)), among)
+
+    def vectors(
+        self, rows: NDArray[np.intp], lights: TriangleLights, degree: int, among: NDArray[np.intp] | None = None
+    ) -> F32:
         """The same as light vectors, of cells that ask where light comes from; at the first of their points.
 
         Args:
             rows: the cells. (G,). lights: triangles of the environment.
             degree: at most `SENT_DEGREE`; the numbers of higher functions are left at nothing.
+            among: which of the bake's lights they are, (M,); None: all.
         Returns:
             t. (G, 3, J) float32
         """
-        points, visible = self.first_points(rows), np.ascontiguousarray(self.visible[rows, 0])
+        points, visible = self.first_points(rows), self._seen(np.ascontiguousarray(self.visible[rows, 0]), among)
         return self.vectors_of(rows, points, light_vectors(points, visible, lights, (), degree))
 
     def first_points(self, rows: NDArray[np.intp]) -> Points:
@@ -107,7 +119,7 @@ class CellLight:
 
         Args:
             rows: the cells. (G,). points: equally many of each, those of a cell one after another. (n,)
-            arriving: at the points, in their own frames. (n, 3, ≥ J) float32
+            arriving: at the points, in their own frames, of any number of functions. (n, 3, …) float32
         Returns:
             The mean over a cell's points, in its own frame. (G, 3, J) float32
         """
@@ -116,9 +128,11 @@ class CellLight:
         along = np.repeat(self.frames[rows, 0], points.num_points // len(rows), axis=0)
         bitangent = np.cross(points.normal, points.tangent)
         angle = np.arctan2(np.einsum("nc,nc->n", along, bitangent), np.einsum("nc,nc->n", along, points.tangent))
-        turned, rungs = np.array(arriving[..., :NUM_SENT]), ladder(SENT_DEGREE)
+        turned, rungs = np.zeros((*arriving.shape[:2], NUM_SENT), np.float32), ladder(SENT_DEGREE)
+        width = min(NUM_SENT, arriving.shape[2])
+        turned[..., :width] = arriving[..., :width]
         for m, cosine, sine in zip(rungs.order, rungs.cosine, rungs.sine, strict=True):
-            if m:
+            if m and sine < width:
                 c, s = np.cos(m * angle)[:, None].astype(np.float32), np.sin(m * angle)[:, None].astype(np.float32)
                 turned[..., cosine] = c * arriving[..., cosine] + s * arriving[..., sine]
                 turned[..., sine] = c * arriving[..., sine] - s * arriving[..., cosine]

@@ -1,4 +1,4 @@
-"""What was read of a store stays while tasks of that store follow each other."""
+"""What was found of a store, or of anything large, stays while questions about the same follow each other."""
 
 from __future__ import annotations
 
@@ -6,28 +6,27 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from relume.bake import StoreReader
-
+Source = TypeVar("Source")
 Value = TypeVar("Value")
 
 
-class LastRead(Generic[Value]):
-    """A function of stores that remembers its last answer; for several threads, and travelling without what it keeps.
+class LastRead(Generic[Source, Value]):
+    """A function that remembers its last answer; for several threads, and travelling without what it keeps.
 
     Args:
-        read: finds it, of a store whose arrays for it are complete.
+        read: finds it; of a store, whose arrays for it are complete.
     """
 
-    def __init__(self, read: Callable[[StoreReader], Value]) -> None:
+    def __init__(self, read: Callable[[Source], Value]) -> None:
         self._read, self._lock = read, threading.Lock()
-        self._last: tuple[StoreReader, Value] | None = None
+        self._last: tuple[Source, Value] | None = None
 
-    def __reduce__(self) -> tuple[type[LastRead[Value]], tuple[Callable[[StoreReader], Value]]]:
+    def __reduce__(self) -> tuple[type[LastRead[Source, Value]], tuple[Callable[[Source], Value]]]:
         return type(self), (self._read,)
 
-    def __call__(self, store: StoreReader) -> Value:
-        """Of this store."""
+    def __call__(self, source: Source) -> Value:
+        """Of this very object."""
         with self._lock:
-            if self._last is None or self._last[0] is not store:
-                self._last = store, self._read(store)
+            if self._last is None or self._last[0] is not source:
+                self._last = source, self._read(source)
             return self._last[1]

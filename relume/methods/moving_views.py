@@ -16,6 +16,7 @@ from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
 from relume.memory import Memory
+from relume.methods.harmonic_light import POINT_DEGREE
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
@@ -24,15 +25,14 @@ from relume.moving.view import FreeView
 from relume.picture.light import Light
 from relume.picture.transfer import Axis, Eyes
 from relume.points import Points
-from relume.project.light_vectors import light_vectors
+from relume.project.alike_rays import alike_ray_vectors, weighed_functions
+from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays, Rays
-from relume.project.sent import evenly
 from relume.trace.embree import EmbreeScene
+from relume.trace.visibility import visible_of
 from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
-
-_PREVIEW_DEGREE = 3  # ten numbers of each point are enough while a hand moves a light
 
 
 @dataclass(frozen=True)
@@ -146,19 +146,34 @@ class MovingViews:
         return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
-        """The same of some points, of a low degree, found quickly. (points, 3, K) float32, nothing elsewhere"""
+        """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32"""
         points, rays = self.surface.points.rows(chosen), list[Rays]()
         if element.paths.direct:
             for source in element.local:
                 seen = self.lit.local.preview(source.geometry, points).visible
                 rays.append(self.lit.local.preview_rays(source, seen))
-        if element.paths.reflect:
-            sent = evenly(self.lit.reflected.preview_under(element))
-            rays.append(GatherRays(self._links[chosen], self._pattern, sent))
+        found = ray_vectors(points, rays, POINT_DEGREE)
         lights = self.lit.preview_lights_of(element)
-        out = np.zeros(self.vectors_shape, np.float32)
-        out[chosen] = light_vectors(points, self._visible[chosen], lights, rays, _PREVIEW_DEGREE)
-        return out
+        if lights.num_lights:
+            found += self._quick_sky(lights, points, chosen)
+        if element.paths.reflect:
+            even = self.lit.reflected.preview_under(element)
+            found += alike_ray_vectors(self._links, chosen, self._functions_of_rays, even)
+        return found
+
+    def _quick_sky(self, lights: TriangleLights, points: Points, chosen: NDArray[np.intp]) -> F32:
+        """Light vectors of an environment at some points, by harmonics where the bake has them."""
+        harmonic = self.lit.harmonic
+        if harmonic is None:
+            return light_vectors(points, self._visible[chosen], lights, (), POINT_DEGREE)
+        divided = harmonic.divided(lights)
+        seen = visible_of(self._visible, chosen, divided.chosen)
+        beyond = light_vectors(points, seen, divided.beyond, (), POINT_DEGREE)
+        return beyond + harmonic.of_points.vectors(divided.smooth, chosen)
+
+    @cached_property
+    def _functions_of_rays(self) -> F32:
+        return weighed_functions(self._pattern, 0, POINT_DEGREE)  # all points have one seed
 
     def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
         """What white points of a material would send if nothing were in the light's way; of others nothing.

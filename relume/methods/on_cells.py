@@ -12,6 +12,7 @@ from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
 from relume.memory import Memory
 from relume.methods.cell_light import CellLight
+from relume.methods.harmonic_light import CELL_DEGREE, HarmonicLight
 from relume.methods.local_lights import LocalLights
 from relume.methods.reflecting import Arrived, Reflecting
 from relume.picture.light import Light
@@ -19,8 +20,6 @@ from relume.project.light_vectors import ray_vectors
 from relume.project.sent import NUM_SENT
 
 F32 = NDArray[np.float32]
-
-_PREVIEW_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
 
 
 class LightOnCells:
@@ -30,6 +29,7 @@ class LightOnCells:
         cells: that it comes to. local: local lights. lights_in: finds the triangles of an environment.
         preview_lights_in: finds them quickly.
         memory: of all that is made from the bake. key: of the bake in it.
+        harmonic: transfer of smooth light, for previews; None where a bake has none.
     """
 
     def __init__(
@@ -40,10 +40,11 @@ class LightOnCells:
         preview_lights_in: Callable[[EnvironmentKey], TriangleLights],
         memory: Memory,
         key: str,
+        harmonic: HarmonicLight | None,
     ) -> None:
         self._cells, self._local = cells, local
         self._lights_in, self._preview_lights_in = lights_in, preview_lights_in
-        self._memory, self._key = memory, key
+        self._memory, self._key, self._harmonic = memory, key, harmonic
 
     def arrived(self, light: Light, reflecting: Reflecting, *, is_preview: bool) -> Arrived:
         """Sum what all sources bring.
@@ -72,15 +73,32 @@ class LightOnCells:
         if not is_preview or self._memory.holds(key):
             return self._memory.keep(key, lambda: self._cells.irradiance(self._lights_in(environment)))
         quick = *key, "for a preview"
-        return self._memory.passing.keep(quick, lambda: self._cells.irradiance(self._preview_lights_in(environment)))
+        return self._memory.passing.keep(quick, lambda: self._quick_irradiance(environment))
+
+    def _quick_irradiance(self, environment: EnvironmentKey) -> F32:
+        lights, harmonic = self._preview_lights_in(environment), self._harmonic
+        if harmonic is None:
+            return self._cells.irradiance(lights)
+        divided = harmonic.divided(lights)
+        beyond = self._cells.irradiance(divided.beyond, divided.chosen)
+        return beyond + harmonic.irradiance @ divided.smooth
 
     def _vectors(self, environment: EnvironmentKey, reflecting: Reflecting, is_preview: bool) -> F32:
+        cells, rows = self._cells, reflecting.rows
+        key = self._key, "environment on cells, by direction", environment, reflecting.has_lobe
         if is_preview:
-            degree, lights_in, kept = _PREVIEW_DEGREE, self._preview_lights_in, self._memory.passing
-        else:
-            degree, lights_in, kept = SENT_DEGREE, self._lights_in, self._memory
-        key = self._key, "environment on cells, by direction", environment, reflecting.has_lobe, degree
-        return kept.keep(key, lambda: self._cells.vectors(reflecting.rows, lights_in(environment), degree))
+            quick = *key, "for a preview"
+            return self._memory.passing.keep(quick, lambda: self._quick_vectors(environment, rows))
+        return self._memory.keep(key, lambda: cells.vectors(rows, self._lights_in(environment), SENT_DEGREE))
+
+    def _quick_vectors(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> F32:
+        lights, harmonic, cells = self._preview_lights_in(environment), self._harmonic, self._cells
+        if harmonic is None:
+            return cells.vectors(rows, lights, CELL_DEGREE)
+        divided = harmonic.divided(lights)
+        beyond = cells.vectors(rows, divided.beyond, CELL_DEGREE, divided.chosen)
+        smooth = np.einsum("gkl,lc->gck", harmonic.vectors[rows], divided.smooth)
+        return beyond + cells.vectors_of(rows, cells.first_points(rows), smooth)
 
     def _local_vectors(self, geometry: LightGeometry, reflecting: Reflecting, is_preview: bool) -> F32:
         """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""

@@ -2,7 +2,7 @@
 
 What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
 and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
-points, the cells), then "visibility and gather rays" (rows of cells and of points).
+points, the cells), then "visibility and gather rays" (rows of cells and of points), then "harmonics of light".
 
     scene/positions, faces, face_material, uvs, textures, …  what the eye sees: relume.moving.points.surface
     lights/…                                                 as in relume.methods.sampled_views
@@ -11,6 +11,7 @@ points, the cells), then "visibility and gather rays" (rows of cells and of poin
     vertices/normal, point, weight                           relume.moving.points.vertices.Vertices
     points/position, normal, tangent, material               relume.moving.points.lattice.Placed
     points/visibility, points/links                          lights that a point sees, cells that its rays hit
+    harmonics/…                                              relume.methods.harmonic_light
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
+from relume.methods.harmonic_light import harmonic_bytes, make_harmonic_light
 from relume.methods.last_read import LastRead
 from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
@@ -57,7 +59,7 @@ class SurfaceMethod:
     """Implements `relume.methods.base.TransferMethod`."""
 
     name = "surface"
-    stages = ("points", "visibility and gather rays")
+    stages = ("points", "visibility and gather rays", "harmonics of light")
 
     def __init__(self) -> None:
         self._views = SampledViews()
@@ -90,6 +92,7 @@ class SurfaceMethod:
             + of_cells * bits
             + num_cells * _CELL_BYTES
             + (4 + _VERTEX_BYTES) * nodes
+            + harmonic_bytes(points, num_cells)
             + triangles * 10
             + bounds.triangles_bytes(scene)
             + bounds.corner_bytes(scene)
@@ -104,6 +107,7 @@ class SurfaceMethod:
         return {
             **self._views.attributes(scene, recipe),
             "gather_seed": int(scene.id[:7], 16),
+            "has_harmonics": True,
             **textures_of(scene).described,
         }
 
@@ -111,6 +115,8 @@ class SurfaceMethod:
         """The lights, the points, the cells; then whole shards of cells and of points. See `BakeMethod`."""
         if stage == 0:
             return [Task(0, index, part, 0, 0) for index, part in enumerate(("lights", "points", "cells"))]
+        if stage == 2:
+            return [Task(2, 0, "harmonics", 0, 0)]
         rows = {part: store.shape(f"{part}/material")[0] for part in ("cells", "points")}
         ranges = [
             (part, start, min(start + ROWS_A_SHARD, num))
@@ -121,7 +127,7 @@ class SurfaceMethod:
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
         """What cells and points see, and their links; the first stage makes its own. See `BakeMethod`."""
-        if stage == 0:
+        if stage != 1:
             return []
         bits = (store.shape("lights/power")[0] + 7) // 8
         widths = {
@@ -145,6 +151,8 @@ class SurfaceMethod:
         if task.stage == 0:
             make = {"lights": self._lights, "points": self._points, "cells": self._cells}
             return Written(make[task.view](scene, recipe), 0, 0.0)
+        if task.view == "harmonics":
+            return Written(make_harmonic_light(store, int(scene.id[:7], 16)), 0, 0.0)
         if task.view not in ("cells", "points"):
             raise ValueError(f"{task.view!r} is not in the stage")
         return self._rows(scene, task, store)

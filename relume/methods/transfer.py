@@ -23,6 +23,7 @@ from relume.light.triangles import TriangleLights, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.memory import Memory
 from relume.methods.cell_light import CellLight
+from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.methods.local_lights import SAMPLES, LocalLights, Shadows
 from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
@@ -37,7 +38,7 @@ from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
 from relume.views.view import View, open_view
 
-_PREVIEW_WIDTH = 512
+_PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
@@ -123,7 +124,7 @@ class BakedViews:
         return self.memory.keep((self.key, "lights", environment), weighed)
 
     def preview_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
-        """The triangles of an environment from a map of at most 512 texels' width: a large one takes seconds."""
+        """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
 
         def weighed() -> TriangleLights:
             radiance = self.radiance_of(environment.map)
@@ -262,8 +263,15 @@ class BouncedViews(BakedViews):
     @cached_property
     def reflected(self) -> Reflected:
         """Light that gather cells send out."""
-        on_cells = LightOnCells(self.cells, self.local, self.lights_in, self.preview_lights_in, self.memory, self.key)
+        on_cells = LightOnCells(
+            self.cells, self.local, self.lights_in, self.preview_lights_in, self.memory, self.key, self.harmonic
+        )
         return Reflected(self.cells, on_cells, self.memory, self.key)
+
+    @cached_property
+    def harmonic(self) -> HarmonicLight | None:
+        """How smooth light comes to points and cells, where that was baked."""
+        return read_harmonic_light(self.store, self.cells)
 
     def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
         """The rays among what arrives: those of gather cells, and of local lights."""

@@ -25,20 +25,36 @@ class Arriving(NamedTuple):
     others: F32
 
 
-def arriving(transfer: MovingTransfer, light: Light, vectors_of: Callable[[Light], F32]) -> Arriving:
+class Found(NamedTuple):
+    """Light vectors of some points.
+
+    Attributes:
+        vectors: of fewer functions, maybe. (m, 3, ≤ K) float32. rows: the points. (m,); None: all.
+    """
+
+    vectors: F32
+    rows: NDArray[np.intp] | None = None
+
+
+def arriving(transfer: MovingTransfer, light: Light, vectors_of: Callable[[Light], Found]) -> Arriving:
     """Sum over sources: transport is linear in them.
 
     Args:
         transfer: of the points. light: that arrives.
-        vectors_of: finds those of one source and one kind of way. (points, 3, K) float32
+        vectors_of: finds those of one source and one kind of way.
     """
     total, others = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
     for element, gain in vector_of(light).items():
-        part, factor = vectors_of(element), np.array(gain, np.float32)
-        add_scaled(total, part, factor)
+        (part, rows), factor = vectors_of(element), np.array(gain, np.float32)
+        add_scaled(total, part, factor, rows)
         if not (element.paths.direct and element.is_environment_lit):
-            add_scaled(others, part, factor)
+            add_scaled(others, part, factor, rows)
     return Arriving(total, others)
+
+
+def wholly(transfer: MovingTransfer, light: Light) -> Arriving:
+    """Find what arrives at all points, where it is not known too."""
+    return arriving(transfer, light, lambda element: Found(transfer.vectors(element)))
 
 
 def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp]) -> Arriving:
@@ -48,9 +64,10 @@ def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp]) ->
         transfer: of the points. light: that arrives. chosen: points that are asked about. (n,)
     """
 
-    def found(element: Light) -> F32:
-        is_known = transfer.knows(element)
-        return transfer.vectors(element) if is_known else transfer.preview_vectors(element, chosen)
+    def found(element: Light) -> Found:
+        if transfer.knows(element):
+            return Found(transfer.vectors(element))
+        return Found(transfer.preview_vectors(element, chosen), chosen)
 
     return arriving(transfer, light, found)
 
@@ -80,13 +97,13 @@ class LightJob:
         """Find it, source by source. Raises CancelledError where `cancelled`, asked before each, said so."""
         num, done = len(vector_of(self.light)), 0
 
-        def found(element: Light) -> F32:
+        def found(element: Light) -> Found:
             nonlocal done
             if cancelled():
                 raise CancelledError("light on the points was cancelled")
             vectors, done = self.transfer.vectors(element), done + 1
             progress(done / num)
-            return vectors
+            return Found(vectors)
 
         return arriving(self.transfer, self.light, found)
 

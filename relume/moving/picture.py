@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
-from relume.moving.arriving import Arriving, LightJob, arriving, roughly
+from relume.moving.arriving import Arriving, LightJob, roughly, wholly
 from relume.moving.behind import alpha_of
 from relume.moving.frame import Frame, Materials, Wanted, frame_of
 from relume.moving.look_up import Seen, look
@@ -197,7 +197,7 @@ class MovingPicture:
                 return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
             return roughly(transfer, light, np.flatnonzero(is_needed))
         if self._vectors is None or self._vectors[0] != light:
-            self._vectors = light, arriving(transfer, light, transfer.vectors)
+            self._vectors = light, wholly(transfer, light)
         return self._vectors[1]
 
     def all_tiles(self) -> list[Tile]:

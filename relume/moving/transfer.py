@@ -51,7 +51,7 @@ class MovingTransfer(Opened, Protocol):
         ...
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
-        """The same of some points alone, found quickly. (points, 3, K) float32"""
+        """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32"""
         ...
 
     def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:

@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, add_light, in_basis, ladder, num_functions
+from relume.basis.zernike import DEGREE, add_light, in_basis, ladder, num_functions
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
@@ -73,12 +73,12 @@ def light_vectors(
     Args:
         points: n of them. visible: which of the lights each sees, as in `Receivers`. (n, bytes) uint8
         lights: triangles of the environment. rays: what brings light besides.
-        degree: of the functions; the numbers of higher ones are left at nothing.
+        degree: of the functions.
     Returns:
-        t, radiance times solid angle. (n, 3, K) float32
+        t, radiance times solid angle, of the functions up to the degree alone. (n, 3, functions) float32
     Cost: O(n · (lights + rays) · K) time.
     """
-    out = np.zeros((points.num_points, 3, NUM_FUNCTIONS), np.float32)
+    out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     if lights.num_lights:
         args = (ladder(degree), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
         for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
@@ -92,7 +92,7 @@ def ray_vectors(points: Points, rays: Sequence[Rays], degree: int = DEGREE) -> F
     Args:
         points, rays, degree: as there.
     Returns:
-        t, of the functions up to the degree alone. (n, 3, functions) float32
+        As there.
     """
     out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     _add_rays(points, rays, degree, out)
@@ -135,19 +135,22 @@ def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: Tria
     return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), in_basis(wi)))
 
 
-def add_scaled(total: F32, part: F32, gain: F32) -> None:
+def add_scaled(total: F32, part: F32, gain: F32, rows: NDArray[np.intp] | None = None) -> None:
     """Add light vectors times a gain of each channel to others.
 
     Args:
         total: what they are added to. (n, 3, K) float32
-        part: that is added. (n, 3, K) float32. gain: (3,) float32
+        part: that is added, of as many functions or fewer. (m, 3, ≤ K) float32. gain: (3,) float32
+        rows: which of the n they are. (m,); None: all.
     """
-    for_shares(lambda start, stop: _add_scaled(part, gain, start, stop, total), len(part))
+    chosen = np.arange(len(total)) if rows is None else rows
+    for_shares(lambda start, stop: _add_scaled(part, gain, chosen, start, stop, total), len(part))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_scaled(part, gain, start, stop, out):  # type: ignore[no-untyped-def]
-    for p in range(start, stop):
+def _add_scaled(part, gain, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    for i in range(start, stop):
+        p = rows[i]
         for channel in range(3):
             for k in range(part.shape[2]):
-                out[p, channel, k] += gain[channel] * part[p, channel, k]
+                out[p, channel, k] += gain[channel] * part[i, channel, k]

@@ -9,7 +9,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges
+from relume.parallel import for_ranges, for_shares
 from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
 from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
 
@@ -88,3 +88,26 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
     began = time.perf_counter()
     for_ranges(kernel, len(origins), _POINTS_A_RANGE)
     return Traced(bits, sum(counts), time.perf_counter() - began)
+
+
+@nb.njit(nogil=True, cache=True)
+def _pick(visible, rows, lights, start, stop, out):  # type: ignore[no-untyped-def]
+    for i in range(start, stop):
+        for k in range(len(lights)):
+            light = lights[k]
+            bit = (visible[rows[i], light >> 3] >> (light & 7)) & 1
+            out[i, k >> 3] |= np.uint8(bit << (k & 7))
+
+
+def visible_of(visible: NDArray[np.uint8], rows: NDArray[np.intp], lights: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """What some points see of some lights.
+
+    Args:
+        visible: what all points see of all lights, as in `Traced`. (n, bytes) uint8
+        rows: the points. (m,). lights: (N,)
+    Returns:
+        The same of them alone. (m, ceil(N / 8)) uint8
+    """
+    out = np.zeros((len(rows), -(-len(lights) // 8)), np.uint8)
+    for_shares(lambda start, stop: _pick(visible, rows, lights, start, stop, out), len(rows))
+    return out

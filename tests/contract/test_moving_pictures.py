@@ -5,10 +5,15 @@ import pytest
 from looks_of_pictures import EDITS, LOBE, environment, exponent, light, lit, painted, transport
 from sessions import look_of, relative_rmse
 
-from relume.errors import CancelledError, NotFoundError, ParameterError
+from relume.errors import CancelledError, ChunkDamagedError, NotFoundError, ParameterError
+from relume.memory import Memory
+from relume.methods.harmonic_light import read_harmonic_light
+from relume.methods.registry import open_bake
+from relume.methods.store_io import read_cells
 from relume.moving.picture import MovingPicture
 from relume.reference import reference_image
 from relume.scene.model import Camera
+from relume.store import open_store
 
 ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
 
@@ -87,6 +92,35 @@ def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched
     exact = seen(moving, change, other).image()
     np.testing.assert_array_equal(picture.image(), exact)
     assert relative_rmse(rough, exact) < 0.3
+
+
+def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatch):
+    turned = environment(rotation=203.0)
+
+    def rough(of):
+        picture = MovingPicture(of, "front", is_watched=True)
+        picture.set_look(look_of(of, lit(turned)))
+        assert picture.advance(None).fidelity == "preview"
+        return picture.image()
+
+    harmonic = rough(moving)
+    monkeypatch.setattr("relume.methods.transfer.read_harmonic_light", lambda store, cells: None)
+    plain = rough(open_bake(baked, Memory(1 << 30)))
+    assert 0 < relative_rmse(harmonic, plain) < 0.04
+
+
+def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
+    store = open_store(baked)
+
+    class Damaged:
+        attributes, shape = store.attributes, store.shape
+
+        def read(self, path, start=0, stop=None):
+            found = store.read(path, start, stop)
+            return found[:-1] if path == "harmonics/weight" else found
+
+    with pytest.raises(ChunkDamagedError, match="harmonics"):
+        read_harmonic_light(Damaged(), read_cells(store))
 
 
 def test_a_hand_on_a_highlight_waits_for_no_light_between_surfaces(moving, monkeypatch):

@@ -79,8 +79,12 @@ def _components(rows: F32, of: NDArray[np.intp], num_clusters: int, num: int) ->
 
 def strongest(rows: F32, num: int) -> F32:
     """Find where rows (n, R) reach farthest, orthonormal. (≤ num, R)"""
-    values, vectors = np.linalg.eigh((rows.T @ rows).astype(np.float64))
+    is_wide = len(rows) < rows.shape[1]  # then the vectors on their other side are fewer
+    values, vectors = np.linalg.eigh((rows @ rows.T if is_wide else rows.T @ rows).astype(np.float64))
     kept = vectors[:, ::-1][:, :num].T[values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)]
+    if is_wide:
+        kept = kept @ rows.astype(np.float64)
+        kept /= np.linalg.norm(kept, axis=1, keepdims=True)
     return np.ascontiguousarray(kept, np.float32)
 
 
@@ -91,11 +95,10 @@ def _apart(rows: F32, centres: F32) -> F32:
 
 def distances(rows: F32, found: Clusters) -> F32:
     """What means and components of each cluster miss of rows, squared. (n, K)"""
-    out = np.empty((len(rows), len(found.mean)), np.float32)
+    out = (rows**2).sum(axis=1)[:, None] + _apart(rows, found.mean)
     for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
-        away = rows - mean
-        out[:, k] = (away**2).sum(axis=1) - ((away @ components.T) ** 2).sum(axis=1)
-    return out
+        out[:, k] -= ((rows @ components.T - components @ mean) ** 2).sum(axis=1)
+    return np.asarray(out, np.float32)
 
 
 def missed(rows: F32, found: Clusters) -> F64:
