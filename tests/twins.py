@@ -10,7 +10,7 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.methods.between import sent_between
+from relume.methods.cells.between import sent_between
 from relume.methods.on_cells import LightOnCells
 from relume.picture.light import light_of
 from relume.picture.transfer import Axis

@@ -21,7 +21,7 @@ from relume.basis.zernike import num_functions
 from relume.errors import ChunkDamagedError
 from relume.light.smooth import Divided, divide
 from relume.light.triangles import TriangleLights
-from relume.methods.cell_light import CellLight
+from relume.methods.cells.cell_light import CellLight
 from relume.methods.last_read import LastRead
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.moving.points.surface import read_surface_points

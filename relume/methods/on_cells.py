@@ -11,10 +11,10 @@ from relume.basis.zernike import SENT_DEGREE
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
 from relume.memory import Memory
-from relume.methods.cell_light import CellLight
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.methods.harmonic_light import CELL_DEGREE, HarmonicLight
 from relume.methods.local_lights import LocalLights
-from relume.methods.reflecting import Arrived, Reflecting
 from relume.picture.light import Light
 from relume.project.light_vectors import ray_vectors
 from relume.project.sent import NUM_SENT

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.memory import Memory
-from relume.methods.between import preview_between, sent_between
-from relume.methods.cell_light import CellLight
+from relume.methods.cells.between import preview_between, sent_between
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
-from relume.methods.reflecting import Reflecting
 from relume.picture.light import Light
 from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL

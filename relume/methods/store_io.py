@@ -11,7 +11,7 @@ from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
-from relume.methods.cell_light import CellLight
+from relume.methods.cells.cell_light import CellLight
 from relume.points import Points
 from relume.trace.cell_tree import CellTree
 from relume.trace.cells import gather_samples_of

@@ -22,7 +22,7 @@ from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.memory import Memory
-from relume.methods.cell_light import CellLight
+from relume.methods.cells.cell_light import CellLight
 from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.methods.local_lights import SAMPLES, LocalLights, Shadows
 from relume.methods.on_cells import LightOnCells

@@ -7,7 +7,7 @@ import pytest
 from tiny_scenes import studio
 
 from relume.light.triangles import subdivide
-from relume.methods.bounces import bounce, bounced, irradiance, preview_bounced
+from relume.methods.cells.bounces import bounce, bounced, irradiance, preview_bounced
 from relume.trace.cell_tree import NO_CELL
 
 

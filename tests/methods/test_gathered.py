@@ -24,9 +24,9 @@ from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, w
 from relume.light.triangles import subdivide
 from relume.look import validate
 from relume.memory import Memory
-from relume.methods.between import sent_between
-from relume.methods.cell_light import CellLight
-from relume.methods.reflecting import Arrived
+from relume.methods.cells.between import sent_between
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.reflecting import Arrived
 from relume.methods.registry import open_transfer
 from relume.picture.light import light_of
 from relume.picture.picture import Picture

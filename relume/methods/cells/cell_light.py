@@ -12,9 +12,9 @@ from relume.basis.zernike import SENT_DEGREE, ladder
 from relume.brdf.albedo import Reflectances
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
-from relume.methods.bounces import irradiance
-from relume.methods.reflecting import Arrived, Reflecting
-from relume.methods.seen_from import seen_from
+from relume.methods.cells.bounces import irradiance
+from relume.methods.cells.reflecting import Arrived, Reflecting
+from relume.methods.cells.seen_from import seen_from
 from relume.points import Points
 from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays

@@ -4,7 +4,7 @@
 
 The first reflections keep the directions that highlights give light. What is reflected once more has come from
 everywhere: from then on a cell sends the same to all others, the mean of what they see of it
-(`relume.methods.bounces`).
+(`relume.methods.cells.bounces`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.methods.bounces import bounce, bounced, preview_bounced
-from relume.methods.cell_light import CellLight
-from relume.methods.reflecting import Arrived, Reflecting
+from relume.methods.cells.bounces import bounce, bounced, preview_bounced
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.project.sent import Sent, sent_by
 from relume.trace.cell_tree import NO_CELL
 

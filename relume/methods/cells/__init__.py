@@ -1,0 +1,1 @@
+"""Gather cells: what arrives at them, what they make of it, and what they send to each other."""
