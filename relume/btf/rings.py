@@ -74,7 +74,7 @@ def directions(rings: Rings) -> F64:
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four directions about one, and their weights.
 

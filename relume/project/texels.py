@@ -75,7 +75,7 @@ def _folded(i, count):  # type: ignore[no-untyped-def]
     return rest + count if rest < 0 else rest
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-untyped-def]
     """Find the texels about a place, of the two levels about a footprint.
 
@@ -113,7 +113,7 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
     return num
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type: ignore[no-untyped-def]
     """Sum the weights of texels, seen from one side, by their clusters.
 

@@ -39,7 +39,7 @@ class VertexLight(NamedTuple):
     vectors: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def add_turned(rungs, vectors, which, x, y, sign, weight, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 

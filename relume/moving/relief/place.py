@@ -27,7 +27,7 @@ def row(array, k):  # type: ignore[no-untyped-def]
     return array[k, 0], array[k, 1], array[k, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _frame(p0, p1, p2, uv0, uv1, uv2, n):  # type: ignore[no-untyped-def]
     """Find the texture's axes across a normal, and whether it has a place in textures; see `relume.trace.surface`."""
     e1 = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
@@ -52,7 +52,7 @@ def _frame(p0, p1, p2, uv0, uv1, uv2, n):  # type: ignore[no-untyped-def]
     return x, y, side, area != 0
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _projected(face_normal):  # type: ignore[no-untyped-def]
     """Find the axes of a texture that is projected along the axis of the world that a face looks along most."""
     a, b, c = abs(face_normal[0]), abs(face_normal[1]), abs(face_normal[2])
@@ -69,7 +69,7 @@ def _projected(face_normal):  # type: ignore[no-untyped-def]
     return across, cross(axis, across)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def place_of(surface, face, uv, distance, d, eye, n, pixel_angle, turn):  # type: ignore[no-untyped-def]
     """Find where in its texture a ray meets a surface.
 

@@ -49,7 +49,8 @@ class Sight(NamedTuple):
     seen: Seen
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+# Helpers are inlined: a call would count references to arrays, which threads share; that was half of the kernel.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _light_in(rungs, light, about, shares, x, y, side, blended, out):  # type: ignore[no-untyped-def]
     """Interpolate the light vectors of three vertices, in the frame of a texture. blended: (1, 3, F). out: (3, F)"""
     out[:] = 0
@@ -70,7 +71,7 @@ def _light_in(rungs, light, about, shares, x, y, side, blended, out):  # type: i
         add_turned(rungs, light.vectors, about[q], dot(t, x), dot(t, y), side, shares[q], out)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add_factors(factors, view, cluster, share, sums, slot, out):  # type: ignore[no-untyped-def]
     """Add the out-factors of a cluster from one side, all its components at once. out: (3 F,)"""
     s0, s1, s2 = share * sums[slot, 0], share * sums[slot, 1], share * sums[slot, 2]
@@ -86,7 +87,7 @@ def _add_factors(factors, view, cluster, share, sums, slot, out):  # type: ignor
         )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _mean_factors(mean, view, of_view, out):  # type: ignore[no-untyped-def]
     """Sum the out-factors of the mean of all texels between four sides. out: (3 F,)"""
     v0, v1, v2, v3 = view[0], view[1], view[2], view[3]
