@@ -26,11 +26,13 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
     from cli.data_folder import open_settings
     from server.app import serve as run_server
+    from worker.database import open_database
 
     is_url = data is not None and "://" in data
     folder = None if data is None or is_url else Path(data)
     settings = open_settings(folder, database=data if is_url else None, host=host, port=port, scheduler=scheduler)
     check_port(settings.host, settings.port)
+    open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
     typer.echo(f"relume listens on {address(settings.host, settings.port)}", err=True)
     run_server(settings)
 

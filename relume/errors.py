@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+
 
 class RelumeError(Exception):
     """The root of all of them; anything else that escapes is a defect."""
@@ -88,6 +90,29 @@ class ChunkDamagedError(StoreError):
     def __init__(self, path: str, detail: str) -> None:
         super().__init__(f"{path} is damaged ({detail}); delete the bake and bake again")
         self.path = path
+
+
+class DiskFullError(RelumeError):
+    """Something cannot be written for want of room."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"{what} cannot be written, the disk is full; free some space, then try again")
+
+
+def is_no_room(error: OSError) -> bool:
+    """Whether a disk or a quota of it is full."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+class DatabaseDamagedError(RelumeError):
+    """The file of the database is none."""
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(
+            f"the database is damaged ({detail}); stop relume and put a backup of relume.db in its place, or move"
+            " relume.db, relume.db-wal and relume.db-shm away: lists of scenes, bakes and looks then begin empty, their"
+            " files stay"
+        )
 
 
 class EditError(RelumeError):

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from relume.errors import RelumeError
+from relume.errors import DiskFullError, RelumeError, is_no_room
 
 UNFINISHED = ".unfinished-*"
 """Names of files that a killed process left."""
@@ -24,7 +24,7 @@ def replacing(path: Path) -> Iterator[Path]:
         The path to write to: hidden, in the same folder, with the same suffix in lower case, by which libraries choose
         a format.
     Raises:
-        RelumeError: the file cannot be written. Other errors than OSError pass as they are.
+        DiskFullError: there is no room for it. RelumeError: it cannot be written. Other errors than OSError pass.
     """
     unfinished = path.with_name(UNFINISHED.replace("*", uuid.uuid4().hex + path.suffix.lower()))
     try:
@@ -33,6 +33,8 @@ def replacing(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         os.replace(unfinished, path)
     except OSError as error:
+        if is_no_room(error):
+            raise DiskFullError(path.name) from error
         reason = error.strerror or str(error)
         raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
     finally:

@@ -18,6 +18,7 @@ from starlette.exceptions import HTTPException
 from relume import errors as relume_errors
 from relume.errors import ProtocolError, RelumeError
 from server.wire.protocol import Problem
+from worker.faults import told
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -94,6 +95,8 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.EditError, Row(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
     (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
+    (relume_errors.DiskFullError, Row(507, "disk", "Disk is full", CLOSE_INTERNAL)),
+    (relume_errors.DatabaseDamagedError, Row(503, "database", "Database damaged", CLOSE_BUSY)),
     (RelumeError, Row(500, "failure", "Failure", CLOSE_INTERNAL)),
     (OperationalError, Row(503, "database", "Database not reachable", CLOSE_BUSY)),
     (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
@@ -119,6 +122,8 @@ def problem_of(error: Exception) -> Problem:
         extra = {"parameter": error.name, "allowed": error.allowed}
     if isinstance(error, RelumeError):
         detail = str(error)
+    elif isinstance(error, OperationalError):
+        detail = "try again in a while; if it stays so, the server's log says why"
     elif isinstance(error, OSError):
         detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
     else:
@@ -159,7 +164,7 @@ def install(app: FastAPI) -> None:
 
     async def on_known(_: Request, error: Exception) -> JSONResponse:
         if row_of(error).status >= 500:
-            log.error("%s: %s", type(error).__name__, error)
+            log.error("%s: %s", type(error).__name__, told(error))
         return problem_response(problem_of(error))
 
     async def on_defect(_: Request, error: Exception) -> JSONResponse:

@@ -41,6 +41,7 @@ class Settings(BaseSettings):
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
+    least_free_bytes: int = Field(default=256 * 1024**2, ge=0, description="room on the disk for /readyz")
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
     import_bytes: int = Field(default=8 * GIB, gt=0, description="address space a scene import may use")

@@ -6,7 +6,6 @@ a task is pure, its shards appear by rename, and only a recorded task counts as 
 
 from __future__ import annotations
 
-import errno
 import logging
 import shutil
 import time
@@ -20,7 +19,7 @@ from pathlib import Path
 from sqlalchemy.exc import IntegrityError
 
 from relume.bake import Task
-from relume.errors import CancelledError, ChunkDamagedError, RelumeError
+from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, is_no_room
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
 from worker.lease import HEARTBEAT_S, LeaseKeeper
@@ -197,7 +196,7 @@ class BakeRunner:
 
     def _sentence(self, error: Exception) -> str:
         """What went wrong and what to do, in one line."""
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
             needed = self.ledger.bake(self.job.bake_id).plan.store_bytes
             missing = max(1, needed - _size(self._staging)) / 1e6
             return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"

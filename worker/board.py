@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Iterator
 
 from relume.errors import NotFoundError
+from worker.faults import AWAY, Complaint
 from worker.ledger import Ledger
 from worker.status import BakeStatus
 
 POLL_S = 0.5
+log = logging.getLogger(__name__)
 
 
 class Subscription:
@@ -65,6 +68,7 @@ class StatusBoard:
         self._wake = threading.Event()
         self._closed = False
         self._thread: threading.Thread | None = None
+        self._complaint = Complaint(log, "changes of bakes cannot be told")
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake. Raises NotFoundError."""
@@ -110,6 +114,10 @@ class StatusBoard:
                     for subscription in [s for s in subscriptions if s.bake_id == bake_id]:
                         subscription.close()
                     continue
+                except AWAY as error:
+                    self._complaint.meet(error)
+                    continue
+                self._complaint.well()
                 for subscription in subscriptions:
                     if subscription.bake_id == bake_id:
                         subscription.put(status)

@@ -10,6 +10,7 @@ from sqlalchemy import Column, Connection, Engine, MetaData, Table, create_engin
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import DBAPIError
 
+from worker.faults import name_fault
 from worker.models import Base
 
 BUSY_TIMEOUT_MS = 30_000
@@ -17,12 +18,13 @@ CREATE_ATTEMPTS = 5
 
 
 def open_database(url: str) -> Engine:
-    """An engine on `url`, its tables made where they are missing."""
+    """An engine on `url`, its tables made where they are missing. Raises DatabaseDamagedError, DiskFullError."""
     parsed = make_url(url)
     sqlite = parsed.get_backend_name() == "sqlite"
     if sqlite and parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(parsed, pool_pre_ping=not sqlite)
+    event.listen(engine, "handle_error", name_fault)
     if sqlite:
         event.listen(engine, "connect", _set_up_sqlite)
     create_tables(engine, Base.metadata)

@@ -14,7 +14,7 @@ import threading
 import uuid
 from collections.abc import Callable
 
-from sqlalchemy.exc import SQLAlchemyError
+from worker.faults import AWAY, Complaint
 
 log = logging.getLogger(__name__)
 
@@ -72,8 +72,10 @@ class LeaseKeeper:
         self._thread.join()
 
     def _run(self) -> None:
+        complaint = Complaint(log, f"the lease of bake {self._bake_id} cannot be renewed")
         while not self._done.wait(HEARTBEAT_S):
             try:
                 self._renew(self._bake_id, self._owner)
-            except SQLAlchemyError as error:  # a database that is away for some seconds costs no lease
-                log.warning("the lease of bake %s was not renewed: %s", self._bake_id, error)
+                complaint.well()
+            except AWAY as error:  # a database that is away for some seconds costs no lease
+                complaint.meet(error)

@@ -20,6 +20,7 @@ from worker.budget import check_budget
 from worker.database import open_database
 from worker.estimate import crowding, load_of_machine, seconds_for
 from worker.executor import Executors, is_tiny
+from worker.faults import Complaint
 from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger
@@ -62,6 +63,7 @@ class BakeService:
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)
         self._board = StatusBoard(self.ledger)
+        self._complaint = Complaint(log, "the queue of bakes cannot be read")
         self._owner = new_owner()
         self._closing = threading.Event()
         self._is_crowding = threading.Event()
@@ -203,14 +205,16 @@ class BakeService:
         while not self._closing.is_set():
             try:
                 self._wakes[tiny].clear()
-                if self._run_next(tiny):
+                has_run = self._run_next(tiny)
+                self._complaint.well()
+                if has_run:
                     at_work_s = time.monotonic()
                     continue
                 if not tiny and time.monotonic() - at_work_s > idle_seconds():
                     self._executors.stop_cluster()
                 self._wakes[tiny].wait(POLL_S)
-            except Exception:  # the database may be away for a while; the lane must outlive that
-                log.exception("the bake queue cannot be read; trying again")
+            except Exception as error:  # the database may be away for a while; the lane must outlive that
+                self._complaint.meet(error)
                 self._closing.wait(POLL_S)
 
     def _run_next(self, tiny: bool) -> bool:

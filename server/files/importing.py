@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from relume.errors import RelumeError, SceneError
+from relume.errors import DiskFullError, RelumeError, SceneError, is_no_room
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
     from relume.scene.model import Scene
@@ -89,7 +89,7 @@ def import_in_process(request: ImportRequest) -> str:
     """Import and register; returns the id. Blocks.
 
     Raises:
-        SceneError: the file cannot be used, or reading it took too much.
+        SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
     """
     command = [sys.executable, "-m", "server.files.importing"]
     # No thread pools in a short-lived process: each thread would reserve address space that counts against the limit.
@@ -105,6 +105,8 @@ def import_in_process(request: ImportRequest) -> str:
         answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
     except (subprocess.TimeoutExpired, ValueError, IndexError):
         raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file") from None
+    if "full" in answer:
+        raise DiskFullError("what was imported")
     if "problem" in answer:
         raise SceneError(answer["problem"])
     return str(answer["id"])
@@ -124,14 +126,24 @@ def main() -> int:
     resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    try:
-        answer = {"id": _import(request)}
-    except RelumeError as error:
-        answer = {"problem": str(error)}
-    except MemoryError:
-        answer = {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
-    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+    sys.stdout.write("\n" + json.dumps(answer_of(request)) + "\n")
     return 0
+
+
+def answer_of(request: ImportRequest) -> dict[str, str]:
+    """What the process says: the id of what it imported, a problem with the file, or that the disk is full."""
+    try:
+        return {"id": _import(request)}
+    except DiskFullError as error:
+        return {"full": str(error)}
+    except RelumeError as error:
+        return {"problem": str(error)}
+    except OSError as error:
+        if not is_no_room(error):
+            raise
+        return {"full": str(error)}
+    except MemoryError:
+        return {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
 
 
 def _import(request: ImportRequest) -> str:

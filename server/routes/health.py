@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
-from sqlalchemy import text
+from sqlalchemy import select
 
+from server.errors import BusyError
 from server.services import Shared
+from worker.models import BakeRow
 
 router = APIRouter(tags=["health"])
 
@@ -19,10 +23,12 @@ async def livez() -> dict[str, str]:
 
 @router.get("/readyz")
 def readyz(services: Shared) -> dict[str, str]:
-    """The database answers and the data directory is there."""
+    """The database can be read, and the data directory has room."""
     with services.bakes.ledger.sessions() as session:
-        session.execute(text("SELECT 1"))
-    services.settings.data.stat()
+        session.execute(select(BakeRow.id).limit(1))
+    free = shutil.disk_usage(services.settings.data).free
+    if free < services.settings.least_free_bytes:
+        raise BusyError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
     return {"status": "ready"}
 
 

@@ -220,6 +220,15 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert main(["render", "quad", "--turntable", "0", "--output", str(tmp_path / "none")]) == 1
 
 
+def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (data / "relume.db").write_bytes(bytes(range(256)) * 64)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = str(probe.getsockname()[1])
+    assert main(["serve", "--data", str(data), "--port", port]) == 1
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "listens" not in line]
+    assert line.startswith("relume: the database is damaged")
+
+
 def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from relume.errors import RelumeError
+from relume.errors import DiskFullError, RelumeError
 from relume.replacing import UNFINISHED, replacing
 
 
@@ -52,7 +52,7 @@ def test_a_full_disk_is_said_in_a_sentence(tmp_path: Path, monkeypatch: pytest.M
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, call, no_space)
-    with pytest.raises(RelumeError, match=r"a\.bin cannot be written \(No space left.*free space"):
+    with pytest.raises(DiskFullError, match=r"a\.bin cannot be written.*free some space"):
         write(tmp_path / "a.bin")
     assert not list(tmp_path.iterdir())
 

@@ -6,10 +6,9 @@ import asyncio
 import logging
 from collections.abc import Callable, Sequence
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from server.live.state.client_socket import ClientSocket
 from server.wire.protocol import BakeMessage
+from worker.faults import AWAY, Complaint
 from worker.status import BakeStatus
 
 log = logging.getLogger(__name__)
@@ -21,6 +20,7 @@ class BakeNews:
 
     def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]]) -> None:
         self._list_bakes = list_bakes
+        self._complaint = Complaint(log, "sessions are not told of finer bakes")
 
     async def tell(self, socket: ClientSocket, bake: str, scene: str) -> None:
         """Run for as long as the session does; says each change once."""
@@ -34,10 +34,12 @@ class BakeNews:
 
     async def _look_up(self, scene: str) -> Sequence[BakeStatus]:
         try:
-            return await asyncio.to_thread(self._list_bakes, scene)
-        except SQLAlchemyError as error:  # the database may be away for a while; the picture needs it not
-            log.warning("bakes cannot be listed: %s", type(error).__name__)
+            found = await asyncio.to_thread(self._list_bakes, scene)
+        except AWAY as error:  # for a while; the picture needs it not
+            self._complaint.meet(error)
             return ()
+        self._complaint.well()
+        return found
 
     @staticmethod
     def _news(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:

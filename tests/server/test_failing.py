@@ -1,0 +1,72 @@
+"""What a server answers, and logs, while its disk or its database fails."""
+
+import errno
+import logging
+import os
+from typing import Any, NamedTuple
+
+import pytest
+from fastapi.testclient import TestClient
+
+from relume.errors import DiskFullError
+from server.files import importing
+from server.files.importing import ImportRequest, answer_of, import_in_process
+from server.settings import Settings
+
+
+class Usage(NamedTuple):
+    """As `shutil.disk_usage` tells it."""
+
+    total: int
+    used: int
+    free: int
+
+
+def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
+    client: TestClient, settings: Settings, caplog: pytest.LogCaptureFixture
+) -> None:
+    for file in (settings.data / "relume.db", settings.data / "relume.db-wal"):
+        with file.open("r+b") as opened:  # as long as it was: it is mapped into memory
+            opened.write(bytes(range(256)) * (file.stat().st_size // 256))
+    caplog.clear()
+    with caplog.at_level(logging.ERROR):
+        for path in ("/api/bakes", "/readyz"):
+            answer = client.get(path)
+            assert answer.status_code == 503
+            assert answer.json()["type"] == "urn:relume:problem:database"
+            assert "put a backup of relume.db in its place" in answer.json()["detail"]
+    said = [record for record in caplog.records if record.name == "server.errors"]
+    assert len(said) == 2
+    assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
+
+
+def test_a_disk_that_is_nearly_full_is_not_ready(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
+    answer = client.get("/readyz")
+    assert answer.status_code == 503
+    assert "12 MB left" in answer.json()["detail"]
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
+    assert client.get("/readyz").status_code == 200
+
+
+def test_an_import_without_room_is_no_fault_of_the_file(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    def ended(*_: Any, **__: Any) -> Any:
+        class Done:
+            returncode, stdout = 0, b'\n{"full": "relume.db cannot be written"}\n'
+
+        return Done()
+
+    monkeypatch.setattr("subprocess.run", ended)
+    with pytest.raises(DiskFullError, match="free some space"):
+        import_in_process(ImportRequest.of(settings, "built_in", None, "cornell_box"))
+
+
+def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: object) -> str:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    request = ImportRequest.of(settings, "built_in", None, "cornell_box")
+    monkeypatch.setattr(importing, "_import", full)
+    assert answer_of(request).keys() == {"full"}
