@@ -37,7 +37,7 @@ from server.routes import (
     shares,
     surface,
 )
-from server.services import OpenBakes, OpenLibrary, open_bakes, open_services
+from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
 from worker.paths import btfs_path, environments_path, materials_path
@@ -68,13 +68,14 @@ def create_app(
     *,
     open_library: OpenLibrary = open_library,
     open_bakes: OpenBakes = open_bakes,
+    open_batches: OpenBatches = open_batches,
     clock: Callable[[], float] = time.monotonic,
 ) -> FastAPI:
     """The ASGI app; opens its data at startup and closes it at shutdown.
 
     Args:
         settings: None: from the environment.
-        open_library, open_bakes: what sessions and bakes stand on; tests put stand-ins here.
+        open_library, open_bakes, open_batches: what sessions, bakes and renders stand on; tests put stand-ins here.
         clock: seconds, by which things that nobody uses grow old.
     """
     settings = settings or Settings()
@@ -87,7 +88,7 @@ def create_app(
             BTFS.at(btfs_path(settings.data)),
             ENVIRONMENTS.at(environments_path(settings.data)),
         ):
-            async with open_services(settings, metrics, open_library, open_bakes, clock) as services:
+            async with open_services(settings, metrics, open_library, open_bakes, open_batches, clock) as services:
                 app.state.services = services
                 yield
                 del app.state.services

@@ -14,6 +14,8 @@ from starlette.requests import HTTPConnection
 
 from relume.environments.built_in import built_in
 from relume.resident import held_bytes
+from server.apart.pool import Pool
+from server.apart.step import Batches
 from server.files.importing import remove_stray_uploads
 from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
@@ -26,10 +28,12 @@ from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
 from server.queues.comparisons import ComparisonQueue
 from server.queues.renders import RenderQueue
+from server.queues.work_queue import Quota
 from server.records import tables  # noqa: F401  its tables must be known before the database is opened
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
 from server.settings import Settings
+from worker.executor import num_cores
 from worker.scenes import get_scene
 from worker.service import BakeService
 from worker.tasks import kept_bytes
@@ -63,6 +67,7 @@ MAX_IMPORTS = 2
 
 OpenLibrary = Callable[[int, int], Library]
 OpenBakes = Callable[[Settings], BakeService]
+OpenBatches = Callable[[Settings, Library], Batches]
 
 
 def open_bakes(settings: Settings) -> BakeService:
@@ -70,9 +75,20 @@ def open_bakes(settings: Settings) -> BakeService:
     return BakeService(settings.data, settings.database_url, settings.scheduler)
 
 
+def open_batches(settings: Settings, library: Library) -> Batches:
+    """Processes of their own, which have a library of their own."""
+    num_threads = max(1, num_cores() // settings.batch_processes)
+    return Pool(settings.data, settings.batch_processes, settings.batch_bytes, num_threads, settings.idle_seconds)
+
+
 @asynccontextmanager
 async def open_services(
-    settings: Settings, metrics: Metrics, open_library: OpenLibrary, bakes: OpenBakes, clock: Callable[[], float]
+    settings: Settings,
+    metrics: Metrics,
+    open_library: OpenLibrary,
+    bakes: OpenBakes,
+    batches: OpenBatches,
+    clock: Callable[[], float],
 ) -> AsyncIterator[Services]:
     """Open everything; close it in the reverse order."""
     settings.data.mkdir(parents=True, exist_ok=True)
@@ -80,10 +96,14 @@ async def open_services(
     library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
-    renders = RenderQueue(
-        service.ledger.sessions, settings.data, library, lambda scene: get_scene(service.ledger, scene).name
-    )
-    comparisons = ComparisonQueue(service.ledger.sessions, settings.data, library)
+    batch, quota = batches(settings, library), Quota(settings.max_queued, settings.max_queued_each)
+    sessions = service.ledger.sessions
+
+    def scene_name(bake: str) -> str:
+        return get_scene(service.ledger, service.ledger.bake(bake).scene).name
+
+    renders = RenderQueue(sessions, settings.data, batch.run, quota, scene_name)
+    comparisons = ComparisonQueue(sessions, settings.data, batch.run, quota)
     live = SessionServices(
         library=library,
         threads=threads,
@@ -93,7 +113,7 @@ async def open_services(
         ack_seconds=settings.ack_seconds,
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
-    caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes)
+    caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
     metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
     metrics.watch_holders(
         {
@@ -103,7 +123,7 @@ async def open_services(
             "environments": lambda: held_bytes(built_in),
         }
     )
-    metrics.watch_workers(service.workers_resident_bytes)
+    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     renders.start()
@@ -130,6 +150,7 @@ async def open_services(
         rounds.cancel()
         await asyncio.to_thread(comparisons.close)
         await asyncio.to_thread(renders.close)
+        await asyncio.to_thread(batch.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)
 

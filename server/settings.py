@@ -38,6 +38,12 @@ class Settings(BaseSettings):
     )
     cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of what is made from bakes")
     cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
+    batch_processes: int = Field(default=1, ge=1, le=64, description="processes for renders and comparisons")
+    batch_bytes: int = Field(
+        default_factory=lambda: _quarter_of_memory() // 2, gt=0, description="that each keeps of what it makes"
+    )
+    max_queued: int = Field(default=100, ge=1, description="renders, and comparisons, that wait or run")
+    max_queued_each: int = Field(default=100, ge=1, description="of them, of one client")
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")

@@ -21,7 +21,7 @@ class Caretaker:
 
     Args:
         shrink: drops what the caches hold of all but these stores, down to their floor.
-        used_bytes: what the caches hold.
+        used_bytes: what the caches hold. let_go: ends processes that have nothing to do.
     """
 
     def __init__(
@@ -30,7 +30,9 @@ class Caretaker:
         threads: Threads,
         shrink: Callable[[Collection[Path]], None],
         used_bytes: Callable[[], int],
+        let_go: Callable[[], None],
     ) -> None:
+        self._let_go = let_go
         self._transfers, self._threads, self._shrink = transfers, threads, shrink
         self._used_bytes = used_bytes
 
@@ -48,5 +50,6 @@ class Caretaker:
         before = self._used_bytes()
         num_closed, used = self._transfers.let_go()
         self._shrink(used)
+        await asyncio.to_thread(self._let_go)
         if num_closed or self._used_bytes() < before:
             await asyncio.get_running_loop().run_in_executor(self._threads.long, give_back)

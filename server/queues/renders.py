@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.exr.attributes import Origin, attributes_of
-from relume.exr.layers import layers_of
-from relume.exr.picture import Progress, export_exr
-from relume.imageio.files import write_image
-from relume.imageio.shrink import shrink
-from relume.picture.transfer import Axis, Opened
-from relume.replacing import replacing
+from server.apart.step import RunStep
+from server.apart.step_timer import StepTimer
 from server.files.downloads import safe_stem
-from server.files.video import write_video
-from server.library.ports import F32, Library
-from server.queues.animation import eyes_of, look_of
-from server.queues.step_timer import StepTimer
-from server.queues.work_queue import Work, WorkQueue
+from server.queues.work_queue import Quota, Work, WorkQueue
 from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
-
-if TYPE_CHECKING:
-    from relume.scene.model import Camera
 
 Render = Work[RenderRequest]
 
@@ -38,15 +23,15 @@ class RenderQueue(WorkQueue[RenderRequest]):
     row, noun, request_type = RenderRow, "render", RenderRequest
 
     def __init__(
-        self, sessions: sessionmaker[Session], data: Path, library: Library, scene_name: Callable[[str], str]
+        self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota, scene_name: Callable[[str], str]
     ) -> None:
         """
         Args:
             sessions: of the database. data: directory of bakes and pictures.
-            library: paints. scene_name: of a scene's id.
+            run: does the steps. quota: how much may wait. scene_name: of a bake's id.
         """
-        super().__init__(sessions, data / "renders")
-        self._data, self._library, self._scene_name = data, library, scene_name
+        super().__init__(sessions, data / "renders", run, quota)
+        self._scene_name = scene_name
 
     def steps(self, request: RenderRequest) -> int:
         """One for each frame."""
@@ -81,61 +66,30 @@ class RenderQueue(WorkQueue[RenderRequest]):
         """The finished batch in one file."""
         return self.folder / render.id / "archive.zip"
 
-    def work(self, work: Render, timer: StepTimer) -> None:
-        """Paint all pictures of one batch, and pack them."""
-        for stray in (self.folder / work.id).glob(".layers-*"):  # a killed server left them
-            shutil.rmtree(stray, ignore_errors=True)
-        transfer = self._library.open_in_passing(self._data / "bakes" / f"{work.request.bake}.zarr")
-        for index, camera in enumerate(eyes_of(work.request, transfer)):
-            self.note(work.id, index)
-            self._paint_frame(transfer, work, index, camera, timer.tell)
+    def is_first(self, request: RenderRequest) -> bool:
+        """A single picture does not wait behind animations."""
+        return request.num_frames == 1
+
+    def step(self, work: Render, timer: StepTimer) -> int:
+        """Paint the next picture that is missing, or pack them."""
+        request, done = work.request.model_dump(mode="json"), work.done
+        while done < work.total and self.frame_path(work, done).exists():
+            done += 1
+        self.note(work.id, min(done, work.total - 1))
+        if done < work.total:
+            values = {"request": request, "index": done, "path": str(self.frame_path(work, done))}
+            values["scene_name"] = self._scene_name(work.request.bake)
+            self.run_apart(work, "frame of a batch", values, timer.tell)
             timer.next_step()
-        if work.request.format == "mp4":
-            target, fps = self.video_path(work), work.request.fps
-            write_video(target.parent, fps, target, lambda: not self.is_wanted(work.id))
-        self._pack(work)
+            return done + 1 if done + 1 < work.total else self._packed(work)
+        return self._packed(work)
 
-    def _paint_frame(self, transfer: Opened, work: Render, index: int, camera: Camera | None, tell: Progress) -> None:
-        path, request = self.frame_path(work, index), work.request
-        if path.exists():
-            return
-        view = transfer.views[request.view]
-        eye = None if camera is None else (camera, request.size or (view.width, view.height))
-
-        def render(look: Any, progress: Progress) -> F32:
-            image = self._library.render(
-                transfer, request.view, look, progress=progress, for_display=request.format != "exr",
-                cancelled=lambda: not self.is_wanted(work.id), eye=eye, exact=request.exact,
-            )  # fmt: skip
-            return image if request.size is None or eye is not None else shrink(image, request.size)
-
-        look = look_of(request, transfer.default_look, index)
-        if request.format == "exr":
-            self._export(path, render, look, transfer, request, camera or view.camera, tell)
-        else:
-            write_image(path, render(look, tell), look.display.exposure, look.display.tone_map)
-
-    def _export(
-        self,
-        path: Path,
-        render: Any,
-        look: Any,
-        transfer: Opened,
-        request: RenderRequest,
-        camera: Camera,
-        progress: Progress,
-    ) -> None:
-        view = transfer.views[request.view]
-        layers = layers_of(look, reflects=Axis.BOUNCES in transfer.axes) if request.layers else []
-        origin = Origin(transfer.scene_id, self._scene_name(transfer.scene_id), request.bake)
-        size = request.size or (view.width, view.height)
-        attributes = attributes_of(origin, camera, size, look, layers)
-        export_exr(path, render, look, layers, attributes, request.precision, progress)
-
-    def _pack(self, render: Render) -> None:
-        with replacing(self.archive_path(render)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-            for index in range(render.total):
-                archive.write(self.frame_path(render, index), self.download_name(render, index))
+    def _packed(self, work: Render) -> int:
+        frames = [(str(self.frame_path(work, k)), self.download_name(work, k)) for k in range(work.total)]
+        video = str(self.video_path(work)) if work.request.format == "mp4" else None
+        values = {"frames": frames, "archive": str(self.archive_path(work)), "video": video, "fps": work.request.fps}
+        self.run_apart(work, "pack of a batch", values, lambda share: None)
+        return work.total
 
 
 def _stem(render: Render) -> str:

@@ -1,11 +1,11 @@
-"""The one queue of long work: rows of a table, and one thread that works through them, oldest first.
+"""The one queue of long work: rows of a table, and one thread that has them done step by step, in fair turns.
 
 A row is queued, running, ready, failed or stopped. What a killed server left running is gone on with at the next
 start; the work itself must keep on disk what it has done.
 
 Libraries for this (Celery, Dramatiq, RQ, Huey) run functions in processes of their own behind a broker. Here the row is
-what REST answers, stops, resumes and forgets, the work shares the opened bakes and the memory of this process, and a
-server needs nothing beside its database.
+what REST answers, stops, resumes and forgets, clients have their turns between the steps of one work, a step yields to
+every hand that drags, and a server needs nothing beside its database.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import shutil
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
@@ -26,18 +26,26 @@ from sqlalchemy import CursorResult, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import CancelledError, NotFoundError, RelumeError
-from relume.resident import give_back
+from server.apart.step import RunStep, Step
+from server.apart.step_timer import StepTimer
 from server.errors import BusyError, problem_of
-from server.queues.step_timer import StepTimer
+from server.queues.turns import Turns, Waiting
 from server.records.tables import WorkRow
 
 log = logging.getLogger(__name__)
-MAX_QUEUED = 100
 _LOOK_AGAIN_S = 2.0
 _ASK_AGAIN_S = 0.1
 _ACTIVE = ("queued", "running")
 
 Request = TypeVar("Request", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Quota:
+    """How much work of one kind may wait or run: of all clients together, and of each."""
+
+    of_all: int
+    of_each: int
 
 
 @dataclass(frozen=True)
@@ -65,22 +73,23 @@ class WorkQueue(ABC, Generic[Request]):
     """Work of one kind; its files lie in `folder`/<id>/.
 
     A kind says which table its rows are in, what people call one of them, what a request is, how many steps it takes,
-    and how it is done.
+    which go first, and how a step is done.
     """
 
     row: ClassVar[type[WorkRow]]
     noun: ClassVar[str]
     request_type: type[Request]
 
-    def __init__(self, sessions: sessionmaker[Session], folder: Path) -> None:
+    def __init__(self, sessions: sessionmaker[Session], folder: Path, run: RunStep, quota: Quota) -> None:
         """
         Args:
             sessions: of the database. folder: made where it is missing.
+            run: does a step, apart from this process. quota: how much may wait.
         """
-        self._sessions, self.folder = sessions, folder
+        self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
+        self._turns, self._timers = Turns(), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._wanted: tuple[str, float] = "", 0.0
-        self._running: tuple[str, StepTimer] = "", StepTimer(None)
         self._thread = threading.Thread(target=self._run, name=f"relume-{self.noun}s", daemon=True)
 
     @abstractmethod
@@ -92,12 +101,29 @@ class WorkQueue(ABC, Generic[Request]):
         """Seconds that a step of such a request has taken before; None where that is not known."""
 
     @abstractmethod
-    def work(self, work: Work[Request], timer: StepTimer) -> None:
-        """Do what is not done yet; calls `note` before each step, tells `timer`, and ends by returning.
+    def is_first(self, request: Request) -> bool:
+        """Whether it is so small that it goes before all others."""
 
+    @abstractmethod
+    def step(self, work: Work[Request], timer: StepTimer) -> int:
+        """Do what comes next; calls `note` before, and tells `timer`.
+
+        Returns:
+            How many steps are done now; as many as there are: all is.
         Raises:
-            CancelledError: `note` said so, or `is_wanted` did in the middle of a step.
+            CancelledError: it is not wanted any more.
         """
+
+    def run_apart(
+        self, work: Work[Request], kind: str, values: Mapping[str, Any], tell: Callable[[float], object]
+    ) -> Mapping[str, Any]:
+        """Have a step of work done in another process, for as long as it is wanted.
+
+        Args:
+            work: whose step it is. kind, values: of the step. tell: called with the share done.
+        """
+        step = Step(kind, self.is_first(work.request), values)
+        return self.run(step, tell, lambda: self.is_wanted(work.id))
 
     def start(self) -> None:
         """Go on with what was left."""
@@ -109,15 +135,28 @@ class WorkQueue(ABC, Generic[Request]):
         self._wake.set()
         self._thread.join(timeout=30)
 
-    def submit(self, request: Request) -> str:
-        """Queue a request that was checked; returns its id. Raises BusyError."""
-        identity, row = secrets.token_hex(8), self.row
+    def submit(self, request: Request, client: str = "") -> str:
+        """Queue a request that was checked.
+
+        Args:
+            request: what is asked for. client: who asks; clients have their turns one after another.
+        Returns:
+            The id of the work.
+        Raises:
+            BusyError: enough is waiting already, of this client or of all.
+        """
+        identity, row, quota = secrets.token_hex(8), self.row, self._quota
         with self._sessions.begin() as session:
-            waiting = session.scalars(select(row.id).where(row.state.in_(_ACTIVE)))
-            if len(waiting.all()) >= MAX_QUEUED:
-                raise BusyError(f"{MAX_QUEUED} {self.noun}s are waiting; try again when some are done")
-            text = request.model_dump_json()
-            session.add(row(id=identity, request=text, state="queued", done=0, created=time.time()))
+            waiting = session.scalars(select(row.client).where(row.state.in_(_ACTIVE))).all()
+            if len(waiting) >= quota.of_all:
+                raise BusyError(f"{quota.of_all} {self.noun}s are waiting; try again when some are done")
+            if sum((other or "") == client for other in waiting) >= quota.of_each:
+                raise BusyError(f"{quota.of_each} {self.noun}s of yours are waiting; try again when some are done")
+            text, created = request.model_dump_json(), time.time()
+            session.add(
+                row(id=identity, request=text, state="queued", done=0, created=created, client=client,
+                    is_first=self.is_first(request))
+            )  # fmt: skip
         self._wake.set()
         return identity
 
@@ -128,10 +167,9 @@ class WorkQueue(ABC, Generic[Request]):
         if row is None:
             raise NotFoundError(f"there is no {self.noun} {identity[:40]}; start one first")
         request = self.request_type.model_validate_json(row.request)
-        running, timer = self._running
-        total, is_running = self.steps(request), row.state == "running" and running == identity
-        progress = min(1.0, (row.done + (timer.share if is_running else 0.0)) / total)
-        seconds_left = timer.seconds_left(total - row.done) if is_running else None
+        total, timer = self.steps(request), self._timers.get(identity) if row.state == "running" else None
+        progress = min(1.0, (row.done + (timer.share if timer is not None else 0.0)) / total)
+        seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         return Work(row.id, request, row.state, row.done, total, progress, seconds_left, row.problem)
 
     def delete(self, identity: str) -> None:
@@ -187,7 +225,6 @@ class WorkQueue(ABC, Generic[Request]):
                 identity = self._next()
                 if identity is not None:
                     self._do(self.get(identity))
-                    give_back()
                     continue
             except Exception:  # the database may be away for a while; the thread must outlive that
                 log.exception("the queue of %ss cannot be read; trying again", self.noun)
@@ -196,26 +233,28 @@ class WorkQueue(ABC, Generic[Request]):
 
     def _next(self) -> str | None:
         row = self.row
-        query = select(row.id).where(row.state.in_(_ACTIVE)).order_by(row.created)
+        query = select(row.id, row.client, row.is_first, row.created).where(row.state.in_(_ACTIVE))
         with self._sessions() as session:
-            return session.scalars(query.limit(1)).first()
+            found = session.execute(query).all()
+        waiting = [Waiting(one.id, one.client or "", bool(one.is_first), one.created) for one in found]
+        self._timers = {one.id: self._timers[one.id] for one in waiting if one.id in self._timers}
+        return self._turns.next(waiting).id if waiting else None
 
     def _do(self, work: Work[Request]) -> None:
-        """One row; every failure ends in it as a sentence."""
-        folder, timer = self.folder / work.id, StepTimer(self.step_s(work.request))
-        self._running = work.id, timer
+        """A step of one row; every failure ends in it as a sentence."""
+        folder = self.folder / work.id
+        timer = self._timers.setdefault(work.id, StepTimer(self.step_s(work.request)))
+        timer.begin()
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self.work(work, timer)
-            self._update(work.id, _ACTIVE, state="ready", done=work.total)
+            done = self.step(work, timer)
+            self._update(work.id, _ACTIVE, done=done, **({"state": "ready"} if done >= work.total else {}))
         except CancelledError:  # closing, stopped, or deleted
             pass
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self.noun, work.id)
             self._update(work.id, _ACTIVE, state="failed", problem=problem_of(error).detail)
-        finally:
-            self._running = "", StepTimer(None)
         if not self._is_there(work.id):
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -31,7 +31,10 @@ class ShareRow(Base):
 
 
 class WorkRow(Base):
-    """A long work of the server, see `server.queues.work_queue`. `request` is the body as JSON."""
+    """A long work of the server, see `server.queues.work_queue`. `request` is the body as JSON.
+
+    `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither.
+    """
 
     __abstract__ = True
 
@@ -41,6 +44,8 @@ class WorkRow(Base):
     done: Mapped[int]
     problem: Mapped[str | None] = mapped_column(Text)
     created: Mapped[float]
+    client: Mapped[str | None]
+    is_first: Mapped[bool | None]
 
 
 class RenderRow(WorkRow):

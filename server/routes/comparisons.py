@@ -29,7 +29,7 @@ async def submit_comparison(request: TruthRequest, services: Shared, response: R
         await run_in_threadpool(_check, request, transfer)
         if request.dry_run:
             response.status_code = 200
-            seconds = await run_in_threadpool(services.comparisons.seconds, request, transfer)
+            seconds = await run_in_threadpool(services.comparisons.seconds, request)
             return TruthPlanBody(passes=request.passes, seconds=seconds)
     identity = await run_in_threadpool(services.comparisons.submit, request)
     response.headers["Location"] = f"/api/truths/{identity}"

@@ -12,9 +12,9 @@ from fastapi.responses import FileResponse
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
 from relume.picture.transfer import Eyes, Opened
+from server.apart.animation import check_animation, document_of
 from server.errors import NotReadyError
 from server.files.video import check_encoder
-from server.queues.animation import check_animation, document_of
 from server.queues.renders import Render
 from server.routes.bakes import ready_bake
 from server.services import Shared

@@ -15,8 +15,8 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
-from server.queues.work_queue import MAX_QUEUED
 from server.records import looks, shares
+from server.settings import Settings
 from server.wire import bodies, protocol, renders
 from worker import cameras
 
@@ -60,7 +60,7 @@ ROWS = {
     ),
     "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
     "frames whose looks are told at once; all together": f"{renders.MAX_TOLD}; {renders.MAX_TOLD_BYTES // MIB} MiB",
-    "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {MAX_QUEUED}",
+    "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {Settings().max_queued}",
     "pixels of a view whose eye moves": f"{protocol.MAX_EYE_PIXELS:,}",
 }
 

@@ -1,7 +1,7 @@
 """Stand-ins for the library: a picture whose every pixel is known, a bake method that computes nothing."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +19,11 @@ from relume.render.finder import Finder
 from relume.scene.archive import load_scene, make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.store import open_store
+from server.apart.step import IsWanted, Step, Tell
+from server.apart.steps import do_step
+from server.apart.workshop import Workshop
 from server.library.ports import Library
+from server.settings import Settings
 
 THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
@@ -322,6 +326,25 @@ class Control:
         progress(1.0)
         noise = np.random.default_rng(pass_index).standard_normal((size[1], size[0], 3))
         return (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
+
+
+class BatchesHere:
+    """Does steps in the thread that asks, with the library that the server has."""
+
+    def __init__(self, settings: Settings, library: Library) -> None:
+        self._shop = Workshop(settings.data, library)
+
+    def run(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+        return do_step(self._shop, step, tell, lambda: not is_wanted())
+
+    def resident_bytes(self) -> int:
+        return 0
+
+    def let_go(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
 
 
 def colour_and_sigma(look: Any) -> float:

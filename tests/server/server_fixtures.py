@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, Control, FakeMethod, tiny_scene
+from server_fakes import SIZE, BatchesHere, Control, FakeMethod, tiny_scene
 from session_client import Baked
 
 from relume.bake import Recipe
@@ -50,7 +50,7 @@ def open_fake_bakes(settings: Settings) -> BakeService:
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     monkeypatch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
     monkeypatch.setattr("server.live.sending.coefficient_budget.MIN_COEFFICIENTS", 512)  # nor does it take more steps
-    app = create_app(settings, open_library=control.open_library, open_bakes=open_fake_bakes)
+    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
     with TestClient(app, raise_server_exceptions=False) as client:
         yield client
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
-from server_fakes import SIZE, Control, FakeTransfer
+from server_fakes import SIZE, BatchesHere, Control, FakeTransfer
 from session_client import Baked
 
 from server.app import create_app
@@ -75,10 +75,10 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     # as a kill after three passes leaves it
     queue._update(identity, ("ready",), state="running", request=request)
     if is_upgraded:
-        monkeypatch.setattr("server.queues.comparisons.truth_code", lambda: "0123456789abcdef")
+        monkeypatch.setattr("server.apart.passes.truth_code", lambda: "0123456789abcdef")
     later = Control()
     later.may_trace.set()
-    with TestClient(create_app(settings, open_library=later.open_library)) as restarted:
+    with TestClient(create_app(settings, open_library=later.open_library, open_batches=BatchesHere)) as restarted:
         assert wait_until(restarted, url, is_done)["passes"] == 5
     assert later.passes_asked == asked
 

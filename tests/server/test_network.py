@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 import uvicorn
-from server_fakes import SIZE, Control, tiny_scene
+from server_fakes import SIZE, BatchesHere, Control, tiny_scene
 from server_fixtures import open_fake_bakes
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -25,7 +25,7 @@ from worker.scenes import register_scene
 def url(settings: Settings, control: Control) -> Iterator[str]:
     """Address of the session of a bake that is ready."""
     settings.allowed_hosts = ["127.0.0.1"]
-    app = create_app(settings, open_library=control.open_library, open_bakes=open_fake_bakes)
+    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
     server = uvicorn.Server(configure(app, settings))
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})

@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from fastapi.testclient import TestClient
 from PIL import Image
-from server_fakes import SIZE, Control
+from server_fakes import SIZE, BatchesHere, Control
 from session_client import Baked
 
 from relume.look import Look
@@ -233,7 +233,7 @@ def test_render_continues_after_a_restart(settings: Settings, client: TestClient
     services.renders.archive_path(status).unlink()
     untouched = services.renders.frame_path(status, 0).stat().st_mtime_ns
     control = Control()
-    with TestClient(create_app(settings, open_library=control.open_library)) as restarted:
+    with TestClient(create_app(settings, open_library=control.open_library, open_batches=BatchesHere)) as restarted:
         assert wait_until_done(restarted, url)["state"] == "ready"
         assert restarted.get(f"{url}/frames/1").status_code == 200
     assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched

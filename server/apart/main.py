@@ -1,0 +1,99 @@
+"""A process that does steps: `python -m server.apart.main DATA BYTES THREADS`, started by `server.apart.process`.
+
+One line of JSON comes in for each step, `"stop"` for one that is not wanted any more; lines with `share`, and at last
+one with `answer`, `problem` or `cancelled` go out. It yields to everything else on the machine, and ends when nobody is
+left who could ask.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import queue
+import sys
+import threading
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+log = logging.getLogger(__name__)
+_TELL_S = 0.1
+
+
+def main() -> None:
+    """The process itself."""
+    data, num_bytes, num_threads = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
+    _yield_to_others()
+    out = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)  # whatever a library prints is no answer
+    os.environ["RELUME_THREADS"] = num_threads
+    asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    stop = threading.Event()
+    threading.Thread(target=_listen, args=(asked, stop), daemon=True).start()
+
+    # after the above, which is to hold for all threads that they start
+    from relume.btf.shelf import STORE as BTFS
+    from relume.environments.asset_store import STORE as ENVIRONMENTS
+    from relume.measured.asset_store import STORE as MATERIALS
+    from relume.resident import give_back
+    from server.apart.workshop import Workshop
+    from server.library.opening import open_library
+    from worker.paths import btfs_path, environments_path, materials_path
+
+    with ExitStack() as stack:
+        for store, path in ((MATERIALS, materials_path), (BTFS, btfs_path), (ENVIRONMENTS, environments_path)):
+            stack.enter_context(store.at(path(data)))
+        shop = Workshop(data, open_library(num_bytes, 0))
+        while True:
+            message = asked.get()
+            out.write(json.dumps(_answer(shop, message, stop, out)) + "\n")
+            give_back()
+
+
+def _yield_to_others() -> None:
+    """Threads that start later inherit it."""
+    os.nice(19)
+    if hasattr(os, "SCHED_IDLE"):
+        with suppress(OSError):  # a container may forbid it
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _listen(asked: queue.SimpleQueue[dict[str, Any]], stop: threading.Event) -> None:
+    for line in sys.stdin:
+        message = json.loads(line)
+        if message == "stop":
+            stop.set()
+        else:
+            stop.clear()
+            asked.put(message)
+    os._exit(0)
+
+
+def _answer(shop: Any, message: dict[str, Any], stop: threading.Event, out: Any) -> dict[str, Any]:
+    from relume.errors import CancelledError, RelumeError
+    from server.apart.step import Step
+    from server.apart.steps import do_step
+    from server.errors import problem_of
+
+    told_s = 0.0
+
+    def tell(share: float) -> None:
+        nonlocal told_s
+        if (now := time.monotonic()) - told_s >= _TELL_S:
+            told_s = now
+            out.write(json.dumps({"share": share}) + "\n")
+
+    try:
+        return {"answer": do_step(shop, Step(**message), tell, stop.is_set)}
+    except CancelledError:
+        return {"cancelled": True}
+    except Exception as error:
+        if not isinstance(error, RelumeError | OSError):
+            log.exception("a %s failed", message["kind"])
+        return {"problem": problem_of(error).detail}
+
+
+if __name__ == "__main__":
+    main()

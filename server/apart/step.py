@@ -1,0 +1,52 @@
+"""One step of work that runs apart: small enough to be a line of JSON, and its files say what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+Tell = Callable[[float], object]
+IsWanted = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to do.
+
+    Attributes:
+        kind: a name in `server.apart.steps.STEPS`.
+        is_first: somebody waits for it; it goes before what takes its time.
+        values: what the step of this kind is called with; JSON.
+    """
+
+    kind: str
+    is_first: bool = False
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+class RunStep(Protocol):
+    """Runs steps; blocks."""
+
+    def __call__(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+        """Do one step.
+
+        Args:
+            step: is done once, or once more where a process ended under it.
+            tell: called with the share done, 0…1. is_wanted: asked a few times a second.
+        Returns:
+            What the step answers.
+        Raises:
+            CancelledError: it was not wanted any more. RelumeError: it failed; the sentence says why.
+        """
+        ...
+
+
+class Batches(Protocol):
+    """Where steps are done; see `server.apart.pool`."""
+
+    @property
+    def run(self) -> RunStep: ...
+    def resident_bytes(self) -> int: ...
+    def let_go(self) -> None: ...
+    def close(self) -> None: ...

@@ -1,0 +1,33 @@
+"""The list of steps that run apart. To add one: write its function and add a line here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from relume.picture.jobs import Cancelled, Progress
+from server.apart.frames import pack, paint_frame
+from server.apart.passes import make_frame, make_pass, time_pass
+from server.apart.step import Step
+from server.apart.workshop import Workshop
+
+STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
+    "frame of a batch": paint_frame,
+    "pack of a batch": pack,
+    "frame of a comparison": make_frame,
+    "pass of a comparison": make_pass,
+    "time of a pass": time_pass,
+}
+
+
+def do_step(shop: Workshop, step: Step, tell: Progress, cancelled: Cancelled) -> Mapping[str, Any]:
+    """Do one step in this process.
+
+    Args:
+        shop: what it works with.
+        step: of a kind that is listed.
+        tell: called with the share done. cancelled: asked now and then.
+    Raises:
+        CancelledError: `cancelled` said so. And what the step raises.
+    """
+    return STEPS[step.kind](shop, tell, cancelled, **step.values)

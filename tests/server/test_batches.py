@@ -1,0 +1,199 @@
+"""Processes that do steps: killed, stopped, exchanged; and whose turn it is."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from relume.errors import CancelledError, RelumeError
+from relume.resident import resident_bytes
+from server.apart import process as processes
+from server.apart.pool import Pool
+from server.apart.step import Step
+from server.errors import BusyError
+from server.queues.turns import Turns, Waiting
+from server.queues.work_queue import Quota, WorkQueue
+from server.records.tables import RenderRow
+from server.wire.renders import RenderRequest
+from worker.database import open_database
+from worker.ledger import Ledger
+
+STAND_IN = """
+import json, os, sys, time
+for line in sys.stdin:
+    message = json.loads(line)
+    if message == "stop":
+        continue
+    kind = message["kind"]
+    if kind == "grow":
+        held = bytearray(1 << 28)
+    if kind == "fail":
+        print(json.dumps({"problem": "no."}), flush=True)
+        continue
+    if kind == "hang":
+        print(json.dumps({"share": 0.5}), flush=True)
+        time.sleep(600)
+    if kind == "die" or (kind == "die once" and not os.path.exists(message["values"]["mark"])):
+        open(message["values"]["mark"], "a").write("died ")
+        os._exit(9)
+    print(json.dumps({"answer": {"pid": os.getpid()}}), flush=True)
+"""
+"""A process that speaks as `server.apart.main` does, and starts at once."""
+
+
+def ignore(share: float) -> None:
+    pass
+
+
+def always() -> bool:
+    return True
+
+
+@pytest.fixture
+def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pool]:
+    monkeypatch.setattr(processes, "COMMAND", ["-c", STAND_IN])
+    found = Pool(tmp_path, 1, 1 << 20, 1, idle_s=0.0)
+    yield found
+    found.close()
+
+
+def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: Pool) -> None:
+    first, second = (pool.run(Step("work"), ignore, always)["pid"] for _ in range(2))
+    assert [first] == [second] == pool.pids()
+    assert pool.resident_bytes() > 0
+    pool.let_go()
+    assert pool.pids() == []
+    assert resident_bytes(first) == 0
+    assert pool.run(Step("work"), ignore, always)["pid"] != first
+
+
+def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: Pool, tmp_path: Path) -> None:
+    values = {"mark": str(tmp_path / "once")}
+    assert pool.run(Step("die once", values=values), ignore, always)["pid"] > 0
+    mark = tmp_path / "twice"
+    with pytest.raises(RelumeError, match=r"was ended twice.*; make the picture smaller"):
+        pool.run(Step("die", values={"mark": str(mark)}), ignore, always)
+    assert mark.read_text() == "died died "
+    assert pool.run(Step("work"), ignore, always)["pid"] > 0
+
+
+def test_what_a_step_says_is_why_it_failed(pool: Pool) -> None:
+    with pytest.raises(RelumeError, match=r"^no\.$"):
+        pool.run(Step("fail"), ignore, always)
+    assert len(pool.pids()) == 1
+
+
+def test_a_step_that_does_not_listen_is_ended_with_its_process(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "_STOP_S", 0.05)
+    running, seen = threading.Event(), []
+
+    def tell(share: float) -> None:
+        seen.extend([share, *pool.pids()])
+        running.set()
+
+    with pytest.raises(CancelledError):
+        pool.run(Step("hang"), tell, lambda: not running.is_set())
+    share, pid = seen
+    assert share == 0.5
+    assert resident_bytes(pid) == 0
+    assert pool.run(Step("work"), ignore, always)["pid"] != pid
+
+
+def test_a_process_that_has_grown_is_exchanged(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.apart.pool._PROGRAM_BYTES", 1 << 27)
+    small = pool.run(Step("work"), ignore, always)["pid"]
+    assert pool.run(Step("grow"), ignore, always)["pid"] == small
+    assert pool.pids() == []
+
+
+def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool) -> None:
+    order: list[str] = []
+    gate = threading.Event()
+
+    def run(name: str, is_first: bool) -> None:
+        pool.run(Step("work", is_first), ignore, always)
+        order.append(name)
+
+    held = threading.Thread(target=lambda: pool.run(Step("hang"), ignore, lambda: not gate.is_set()))
+    held.start()
+    wait_for(lambda: bool(pool.pids()))
+    threads = []
+    for name, is_first in (("animation", False), ("picture", True)):
+        threads.append(threading.Thread(target=run, args=(name, is_first)))
+        threads[-1].start()
+        wait_for(lambda: len(pool._waiting) == len(threads))
+    gate.set()
+    os.killpg(pool.pids()[0], signal.SIGKILL)
+    for thread in (held, *threads):
+        thread.join(30)
+    assert order == ["picture", "animation"]
+
+
+def wait_for(is_reached: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 30
+    while not is_reached():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:
+    turns = Turns()
+    waiting = [Waiting("a1", "ann", False, 1.0), Waiting("a2", "ann", False, 2.0), Waiting("b1", "bob", False, 3.0)]
+    assert [turns.next(waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
+    waiting.append(Waiting("a3", "ann", True, 4.0))
+    assert [turns.next(waiting).id for _ in range(2)] == ["a3", "a3"]
+    del waiting[0], waiting[-1]
+    waiting.append(Waiting("c1", "cem", False, 5.0))
+    assert [turns.next(waiting).id for _ in range(3)] == ["c1", "b1", "a2"]
+
+
+class Counting(WorkQueue[RenderRequest]):
+    """Its steps only say what they are of."""
+
+    row, noun, request_type = RenderRow, "render", RenderRequest
+
+    def steps(self, request: RenderRequest) -> int:
+        return request.num_frames
+
+    def step_s(self, request: RenderRequest) -> float | None:
+        return None
+
+    def is_first(self, request: RenderRequest) -> bool:
+        return False
+
+    def step(self, work: Any, timer: Any) -> int:
+        self.note(work.id, work.done)
+        self.run_apart(work, str(work.request.name), {}, ignore)
+        return int(work.done) + 1
+
+
+def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) -> None:
+    done: list[str] = []
+
+    def run(step: Step, tell: object, is_wanted: Callable[[], bool]) -> Mapping[str, Any]:
+        assert is_wanted()
+        done.append(step.kind)
+        return {}
+
+    with Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}")) as ledger:
+        queue = Counting(ledger.sessions, tmp_path / "renders", run, Quota(of_all=3, of_each=2))
+
+        def submit(name: str, client: str) -> str:
+            asked = {"bake": "0" * 16, "view": "front", "format": "png", "looks": [{}] * 2, "name": name}
+            return queue.submit(RenderRequest.model_validate(asked), client)
+
+        last = [submit("a", "ann"), submit("A", "ann")][-1]
+        with pytest.raises(BusyError, match="of yours"):
+            submit("x", "ann")
+        submit("b", "bob")
+        with pytest.raises(BusyError, match="3 renders are waiting"):
+            submit("x", "cem")
+        queue.start()
+        wait_for(lambda: queue.get(last).state == "ready")
+        queue.close()
+    assert done == ["a", "b", "a", "b", "A", "A"]
