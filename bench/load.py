@@ -39,13 +39,15 @@ def measure(tiny: bool) -> list[Figure]:
         client.exact(0)
         hand = _Hand(client)
         hand.drag(seconds)  # what is made once is made
-        alone, beside, painted = [], [], 0
+        alone: list[float] = []
+        beside: list[float] = []
+        painted = 0
         for _ in range(rounds):
             alone.append(hand.drag(seconds))
             queued = _fill(server, house)
             beside.append(hand.drag(seconds))
             found = [_call(server, "GET", address) for address in queued]
-            painted += sum(body.get("done", body.get("passes")) for body in found)
+            painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in found)
             for address in queued:
                 _call(server, "DELETE", f"{address}?forget=true" if "truths" in address else address)
             time.sleep(0.5)

@@ -1,10 +1,9 @@
 """Processes that do steps: killed, stopped, exchanged; and whose turn it is."""
 
-import os
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +110,8 @@ def test_a_process_that_has_grown_is_exchanged(pool: Pool, monkeypatch: pytest.M
     assert pool.pids() == []
 
 
-def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool) -> None:
+def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "_STOP_S", 0.05)
     order: list[str] = []
     gate = threading.Event()
 
@@ -119,7 +119,11 @@ def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool) ->
         pool.run(Step("work", is_first), ignore, always)
         order.append(name)
 
-    held = threading.Thread(target=lambda: pool.run(Step("hang"), ignore, lambda: not gate.is_set()))
+    def hang() -> None:
+        with suppress(CancelledError):
+            pool.run(Step("hang"), ignore, lambda: not gate.is_set())
+
+    held = threading.Thread(target=hang)
     held.start()
     wait_for(lambda: bool(pool.pids()))
     threads = []
@@ -128,7 +132,6 @@ def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool) ->
         threads[-1].start()
         wait_for(lambda: len(pool._waiting) == len(threads))
     gate.set()
-    os.killpg(pool.pids()[0], signal.SIGKILL)
     for thread in (held, *threads):
         thread.join(30)
     assert order == ["picture", "animation"]
@@ -180,7 +183,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         done.append(step.kind)
         return {}
 
-    with Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}")) as ledger:
+    with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as ledger:
         queue = Counting(ledger.sessions, tmp_path / "renders", run, Quota(of_all=3, of_each=2))
 
         def submit(name: str, client: str) -> str:
