@@ -17,6 +17,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
@@ -224,7 +225,8 @@ class WorkQueue(ABC, Generic[Request]):
             try:
                 identity = self._next()
                 if identity is not None:
-                    self._do(self.get(identity))
+                    with suppress(NotFoundError):  # somebody has deleted it since
+                        self._do(self.get(identity))
                     continue
             except Exception:  # the database may be away for a while; the thread must outlive that
                 log.exception("the queue of %ss cannot be read; trying again", self.noun)
