@@ -1,4 +1,4 @@
-"""A process that does steps: `python -m server.apart.main DATA BYTES THREADS`, started by `server.apart.process`.
+"""A process that does steps: `python -m server.apart.main DATA BYTES THREADS NICE`, started by `server.apart.process`.
 
 One line of JSON comes in for each step, `"stop"` for one that is not wanted any more; lines with `share`, and at last
 one with `answer`, `problem` or `cancelled` go out. It yields to everything else on the machine, and ends when nobody is
@@ -14,7 +14,7 @@ import queue
 import sys
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ _TELL_S = 0.1
 def main() -> None:
     """The process itself."""
     data, num_bytes, num_threads = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
-    _yield_to_others()
+    os.nice(int(sys.argv[4]))  # threads that start later inherit it
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # whatever a library prints is no answer
     os.environ["RELUME_THREADS"] = num_threads
@@ -50,14 +50,6 @@ def main() -> None:
             message = asked.get()
             out.write(json.dumps(_answer(shop, message, stop, out)) + "\n")
             give_back()
-
-
-def _yield_to_others() -> None:
-    """Threads that start later inherit it."""
-    os.nice(19)
-    if hasattr(os, "SCHED_IDLE"):
-        with suppress(OSError):  # a container may forbid it
-            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 def _listen(asked: queue.SimpleQueue[dict[str, Any]], stop: threading.Event) -> None:

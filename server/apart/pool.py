@@ -22,15 +22,18 @@ _TRIES = 2
 class Pool:
     """Runs steps, so many at once; those that somebody waits for go before all others, else who came first."""
 
-    def __init__(self, data: Path, num_processes: int, num_bytes: int, num_threads: int, idle_s: float) -> None:
+    def __init__(
+        self, data: Path, num_processes: int, num_bytes: int, num_threads: int, niceness: int, idle_s: float
+    ) -> None:
         """
         Args:
             data: the data directory. num_processes: at most.
             num_bytes: that each may keep of what it makes. num_threads: of the kernels of each.
+            niceness: how much they yield to others, 0…19.
             idle_s: how long a process that has nothing to do is kept.
         """
         self._data, self._num_processes = data, num_processes
-        self._num_bytes, self._num_threads, self._idle_s = num_bytes, num_threads, idle_s
+        self._limits, self._idle_s = (num_bytes, num_threads, niceness), idle_s
         self._changed = threading.Condition()
         self._arrivals = itertools.count()
         self._waiting: list[tuple[bool, int]] = []
@@ -117,14 +120,14 @@ class Pool:
                     break
                 process.kill()  # what it leaves
             else:
-                process = Process(self._data, self._num_bytes, self._num_threads)
+                process = Process(self._data, *self._limits)
             self._busy.add(process)
             return process
 
     def _give(self, process: Process) -> None:
         """Keep it for the next step, or end it where it has grown."""
         held = process.resident_bytes()
-        is_kept = process.is_alive and held <= self._num_bytes + _PROGRAM_BYTES and process.num_steps < MAX_STEPS
+        is_kept = process.is_alive and held <= self._limits[0] + _PROGRAM_BYTES and process.num_steps < MAX_STEPS
         with self._changed:
             self._busy.discard(process)
             is_kept = is_kept and not self._is_closed

@@ -33,12 +33,14 @@ class LostError(RelumeError):
 class Process:
     """Does one step at a time; used by one thread at a time."""
 
-    def __init__(self, data: Path, num_bytes: int, num_threads: int) -> None:
+    def __init__(self, data: Path, num_bytes: int, num_threads: int, niceness: int) -> None:
         """
         Args:
             data: the data directory. num_bytes: that it may keep of what it makes. num_threads: of its kernels.
+            niceness: how much it yields to others, 0…19.
         """
-        command = [sys.executable, *COMMAND, str(data.resolve()), str(num_bytes), str(num_threads)]
+        numbers = map(str, (num_bytes, num_threads, niceness))
+        command = [sys.executable, *COMMAND, str(data.resolve()), *numbers]
         # a group of its own: Ctrl-C is the server's, and what it starts itself can be killed with it
         self._process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, process_group=0,

@@ -56,7 +56,7 @@ def always() -> bool:
 @pytest.fixture
 def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pool]:
     monkeypatch.setattr(processes, "COMMAND", ["-c", STAND_IN])
-    found = Pool(tmp_path, 1, 1 << 20, 1, idle_s=0.0)
+    found = Pool(tmp_path, 1, 1 << 20, 1, 0, idle_s=0.0)
     yield found
     found.close()
 

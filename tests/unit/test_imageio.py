@@ -7,7 +7,7 @@ import OpenImageIO
 import pytest
 from PIL import Image
 
-from relume.errors import ParameterError, RelumeError, ShapeMismatchError
+from relume.errors import DiskFullError, ParameterError, RelumeError, ShapeMismatchError
 from relume.imageio.files import to_bytes, write_image
 from relume.imageio.tonemap import tone_map
 
