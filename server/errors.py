@@ -18,7 +18,7 @@ from starlette.exceptions import HTTPException
 from relume import errors as relume_errors
 from relume.errors import ProtocolError, RelumeError
 from server.wire.protocol import Problem
-from worker.faults import told
+from worker.database.faults import told
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"

@@ -77,15 +77,9 @@ def open_bakes(settings: Settings) -> BakeService:
 
 def open_batches(settings: Settings, library: Library) -> Batches:
     """Processes of their own, which have a library of their own."""
-    num_threads = max(1, num_cores() // settings.batch_processes)
-    return Pool(
-        settings.data,
-        settings.batch_processes,
-        settings.batch_bytes,
-        num_threads,
-        settings.batch_nice,
-        settings.idle_seconds,
-    )
+    num, num_threads = settings.batch_processes, max(1, num_cores() // settings.batch_processes)
+    limits = settings.batch_bytes, num_threads, settings.batch_nice
+    return Pool(settings.data, num, *limits, settings.idle_seconds)
 
 
 @asynccontextmanager

@@ -12,6 +12,8 @@ from xdist.scheduler import LoadScopeScheduling
 
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
+os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests beside which others run would wait for ever for renders
+
 TOGETHER = ("gestures", "journeys", "btf")  # folders whose tests share what is dear: a server and a browser, a BTF
 
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 
 from relume.errors import NotFoundError
-from worker.faults import AWAY, Complaint
+from worker.database.faults import AWAY, Complaint
 from worker.ledger import Ledger
 from worker.status import BakeStatus
 

@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 
 from relume.errors import NotFoundError, ParameterError
 from relume.scene.placed_camera import PlacedCamera, read_placed
+from worker.database.models import CameraRow
 from worker.ledger import Ledger
-from worker.models import CameraRow
 from worker.scenes import SceneRecord, get_scene
 
 Views: TypeAlias = tuple[tuple[str, ...], tuple[PlacedCamera, ...]]

@@ -14,7 +14,7 @@ import threading
 import uuid
 from collections.abc import Callable
 
-from worker.faults import AWAY, Complaint
+from worker.database.faults import AWAY, Complaint
 
 log = logging.getLogger(__name__)
 

@@ -22,10 +22,10 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.bake import Plan, Recipe, Task
 from relume.code_version import bake_code
 from relume.errors import NotFoundError
+from worker.database.models import BakeRow, TaskRow
 from worker.estimate import Finished, crowding, load_of_machine
 from worker.executor import is_tiny
 from worker.lease import is_alive
-from worker.models import BakeRow, TaskRow
 from worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
 

@@ -17,8 +17,8 @@ from relume.remarks import Remark, remark_of
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
 from relume.scene.projected import are_projected
+from worker.database.models import CameraRow, SceneRow
 from worker.ledger import Ledger
-from worker.models import CameraRow, SceneRow
 from worker.paths import bake_path, scene_path, staging_path
 
 

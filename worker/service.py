@@ -18,9 +18,9 @@ from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
+from worker.database.faults import Complaint
 from worker.estimate import crowding, load_of_machine, seconds_for
 from worker.executor import Executors, is_tiny
-from worker.faults import Complaint
 from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger

@@ -32,6 +32,7 @@ from server.apart.step_timer import StepTimer
 from server.errors import BusyError, problem_of
 from server.queues.turns import Turns, Waiting
 from server.records.tables import WorkRow
+from worker.database.faults import Complaint
 
 log = logging.getLogger(__name__)
 _LOOK_AGAIN_S = 2.0
@@ -91,6 +92,7 @@ class WorkQueue(ABC, Generic[Request]):
         self._turns, self._timers = Turns(), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._wanted: tuple[str, float] = "", 0.0
+        self._complaint = Complaint(log, f"the queue of {self.noun}s cannot be read")
         self._thread = threading.Thread(target=self._run, name=f"relume-{self.noun}s", daemon=True)
 
     @abstractmethod
@@ -224,12 +226,13 @@ class WorkQueue(ABC, Generic[Request]):
         while not self._closing.is_set():
             try:
                 identity = self._next()
+                self._complaint.well()
                 if identity is not None:
                     with suppress(NotFoundError):  # somebody has deleted it since
                         self._do(self.get(identity))
                     continue
-            except Exception:  # the database may be away for a while; the thread must outlive that
-                log.exception("the queue of %ss cannot be read; trying again", self.noun)
+            except Exception as error:  # the database may be away for a while; the thread must outlive that
+                self._complaint.meet(error)
             self._wake.wait(timeout=_LOOK_AGAIN_S)
             self._wake.clear()
 

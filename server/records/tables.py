@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlalchemy import Text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from worker.models import Base
+from worker.database.models import Base
 
 
 class LookRow(Base):

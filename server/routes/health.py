@@ -10,7 +10,7 @@ from sqlalchemy import select
 
 from server.errors import BusyError
 from server.services import Shared
-from worker.models import BakeRow
+from worker.database.models import BakeRow
 
 router = APIRouter(tags=["health"])
 

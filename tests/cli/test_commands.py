@@ -140,7 +140,7 @@ def test_bake_without_watch_is_left_in_the_queue(data: Path, capsys: pytest.Capt
 
 
 def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from worker.models import SceneRow
+    from worker.database.models import SceneRow
 
     ledger = open_ledger(data)
     with ledger.sessions.begin() as session:

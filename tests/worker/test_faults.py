@@ -10,7 +10,7 @@ from sqlalchemy.exc import OperationalError
 
 from relume.errors import DatabaseDamagedError, DiskFullError
 from worker.database import open_database
-from worker.faults import Complaint
+from worker.database.faults import Complaint
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from server.live.state.client_socket import ClientSocket
 from server.wire.protocol import BakeMessage
-from worker.faults import AWAY, Complaint
+from worker.database.faults import AWAY, Complaint
 from worker.status import BakeStatus
 
 log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ from sqlalchemy import Column, Connection, Engine, MetaData, Table, create_engin
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import DBAPIError
 
-from worker.faults import name_fault
-from worker.models import Base
+from worker.database.faults import name_fault
+from worker.database.models import Base
 
 BUSY_TIMEOUT_MS = 30_000
 CREATE_ATTEMPTS = 5
