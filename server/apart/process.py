@@ -50,6 +50,7 @@ class Process:
         self._pipe = self._process.stdin
         self.num_steps, self.idle_since_s = 0, time.monotonic()
         self._told: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
+        self._has_ended = threading.Event()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
@@ -60,8 +61,8 @@ class Process:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it can be asked."""
-        return self._process.poll() is None
+        """Whether it can be asked; one that ends has closed its pipe some time before it is gone."""
+        return not self._has_ended.is_set() and self._process.poll() is None
 
     def resident_bytes(self) -> int:
         """All that it holds."""
@@ -115,6 +116,7 @@ class Process:
         with self._process.stdout as lines, suppress(ValueError):  # it was killed in the middle of a line
             for line in lines:
                 self._told.put(json.loads(line))
+        self._has_ended.set()
         self._told.put(None)
 
 

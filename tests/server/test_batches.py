@@ -200,3 +200,10 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         wait_for(lambda: queue.get(last).state == "ready")
         queue.close()
     assert done == ["a", "b", "a", "b", "A", "A"]
+
+
+def test_a_process_that_ends_is_asked_no_more_though_it_is_not_gone_yet(
+    pool: Pool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("subprocess.Popen.poll", lambda process: process.returncode)  # as long as nobody has waited
+    assert pool.run(Step("die once", values={"mark": str(tmp_path / "once")}), ignore, always)["pid"] > 0
