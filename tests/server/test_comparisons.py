@@ -108,7 +108,8 @@ def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, cont
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next one has its turn
     passes = client.get(url).json()["passes"]
     resumed = client.post(f"{url}/resume")
-    assert (resumed.status_code, resumed.json()["state"]) == (202, "queued")
+    assert resumed.status_code == 202
+    assert resumed.json()["state"] in ("queued", "running")  # the queue may be quicker than the answer
     on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
     assert on["seconds_left"] > 0
     assert len(control.passes_asked) - len(set(control.passes_asked)) <= 3  # no finished pass was made again
