@@ -81,11 +81,9 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
 
 def harmonic_bytes(num_points: int, num_cells: int) -> int:
     """What its arrays need in a store, at most."""
-    num = num_functions(POINT_DEGREE) * NUM_HARMONICS
-    basis = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num
-    return (
-        basis + num_points * (1 + 2 * NUM_COMPONENTS) + 2 * num_cells * (1 + num_functions(CELL_DEGREE)) * NUM_HARMONICS
-    )
+    basis = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(POINT_DEGREE) * NUM_HARMONICS
+    of_points = num_points * (1 + 2 * NUM_COMPONENTS)
+    return basis + of_points + 2 * num_cells * (1 + num_functions(CELL_DEGREE)) * NUM_HARMONICS
 
 
 def read_harmonic_light(store: StoreReader, cells: CellLight) -> HarmonicLight | None:
