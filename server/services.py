@@ -16,6 +16,7 @@ from relume.environments.built_in import built_in
 from relume.resident import held_bytes
 from server.apart.pool import Pool
 from server.apart.step import Batches
+from server.files.importers import Importers
 from server.files.importing import remove_stray_uploads
 from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
@@ -44,6 +45,7 @@ class Services:
     """What routes use.
 
     Attributes:
+        importers: read files.
         session_slots: one is held by each live session. import_slots: one by each import that runs.
     """
 
@@ -59,6 +61,7 @@ class Services:
     caretaker: Caretaker
     thumbnails: Thumbnails
     live: SessionServices
+    importers: Importers
     session_slots: threading.BoundedSemaphore
     import_slots: asyncio.Semaphore
 
@@ -127,6 +130,8 @@ async def open_services(
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)
+    importers = Importers(settings.waiting_importers)
+    importers.start()
     renders.start()
     comparisons.start()
     rounds = asyncio.create_task(caretaker.run())
@@ -144,11 +149,13 @@ async def open_services(
             caretaker=caretaker,
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
             live=live,
+            importers=importers,
             session_slots=threading.BoundedSemaphore(settings.max_sessions),
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
         rounds.cancel()
+        await asyncio.to_thread(importers.close)
         await asyncio.to_thread(comparisons.close)
         await asyncio.to_thread(renders.close)
         await asyncio.to_thread(batch.close)

@@ -1,26 +1,24 @@
 """Imports an uploaded file in a process of its own, with limits: a hostile file can end that process, not the server.
 
 `python -m server.files.importing` reads one `ImportRequest` as JSON from stdin and writes one line of JSON to stdout:
-{"id": id} or {"problem": sentence}.
+{"id": id}, {"problem": sentence}, or {"full": sentence} where the disk is. `server.files.importers` starts it.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from relume.errors import DiskFullError, RelumeError, SceneError, is_no_room
+from relume.errors import DiskFullError, RelumeError, is_no_room
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
     from relume.scene.model import Scene
@@ -85,33 +83,6 @@ class ImportRequest:
         )
 
 
-def import_in_process(request: ImportRequest) -> str:
-    """Import and register; returns the id. Blocks.
-
-    Raises:
-        SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
-    """
-    command = [sys.executable, "-m", "server.files.importing"]
-    # No thread pools in a short-lived process: each thread would reserve address space that counts against the limit.
-    environ = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    told = json.dumps(asdict(request)).encode()
-    limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"
-    try:
-        done = subprocess.run(  # noqa: S603
-            command, input=told, capture_output=True, timeout=request.seconds, check=False, env=environ
-        )
-        if -done.returncode in DAMAGED:
-            raise SceneError("the file made its reader fail, it is damaged; export it again")
-        answer = json.loads(done.stdout[-MAX_OUTPUT_BYTES:].splitlines()[-1])
-    except (subprocess.TimeoutExpired, ValueError, IndexError):
-        raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file") from None
-    if "full" in answer:
-        raise DiskFullError("what was imported")
-    if "problem" in answer:
-        raise SceneError(answer["problem"])
-    return str(answer["id"])
-
-
 def remove_stray_uploads(data: Path, older_than_s: float) -> None:
     """Delete uploads that a killed server left behind; younger ones may be another server's."""
     for folder in data.glob(f"{UPLOAD_PREFIX}*"):
@@ -122,12 +93,23 @@ def remove_stray_uploads(data: Path, older_than_s: float) -> None:
 
 def main() -> int:
     """The process itself."""
-    request = ImportRequest(**json.loads(sys.stdin.buffer.read()))
+    _load()
+    told = sys.stdin.buffer.read()
+    if not told:  # nobody is left who could ask
+        return 0
+    request = ImportRequest(**json.loads(told))
     resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     sys.stdout.write("\n" + json.dumps(answer_of(request)) + "\n")
     return 0
+
+
+def _load() -> None:
+    """Load what imports need, while nobody waits for it."""
+    import worker.database
+    import worker.ledger
+    import worker.scenes  # noqa: F401
 
 
 def answer_of(request: ImportRequest) -> dict[str, str]:

@@ -9,7 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.scene.built_in import BUILT_IN
-from server.files.importing import ImportRequest, import_in_process
+from server.files.importing import ImportRequest
 from server.routes.scenes import get_one
 from server.services import Shared
 from server.wire.bodies import BuiltInBody, SceneBody
@@ -33,6 +33,6 @@ async def take_one(name: Annotated[str, Path(max_length=256)], services: Shared,
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
     order = ImportRequest.of(services.settings, "built_in", None, name)
     async with services.import_slots:
-        identity = await run_in_threadpool(import_in_process, order)
+        identity = await run_in_threadpool(services.importers.run, order)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)

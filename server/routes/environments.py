@@ -15,7 +15,7 @@ from relume.asset_store import check_name
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
-from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_process
+from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.png import A_DAY, PngResponse
 from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
@@ -44,7 +44,7 @@ def _import(environment: UploadFile, name: str, services: Services) -> str:
     settings = services.settings
     name = check_name(name or plain_stem(environment.filename) or "Environment")
     with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        return import_in_process(
+        return services.importers.run(
             ImportRequest.of(settings, "environment", keep_upload(environment, Path(folder) / "environment"), name)
         )
 

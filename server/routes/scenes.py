@@ -14,7 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.files.importing import UPLOAD_PREFIX, ImportRequest, import_in_process
+from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.thumbnails import MAX_WIDTH
 from server.files.uploads import keep_upload, plain_stem
 from server.services import Services, Shared
@@ -81,7 +81,7 @@ def _import(
         }
         name = name.strip() or plain_stem(scene.filename) or "Scene"
         order = ImportRequest.of(settings, "scene", file, name, lit_by, scene.filename or "", beside)
-        return import_in_process(replace(order, ground=ground))
+        return services.importers.run(replace(order, ground=ground))
 
 
 @router.post("/{scene}/ground", status_code=201)
@@ -91,7 +91,7 @@ async def add_ground(scene: Id, services: Shared, response: Response) -> SceneBo
     settings = services.settings
     order = ImportRequest.of(settings, "grounded", scene_path(settings.data, scene), f"{record.name[:185]} on a ground")
     async with services.import_slots:
-        identity = await run_in_threadpool(import_in_process, order)
+        identity = await run_in_threadpool(services.importers.run, order)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 

@@ -38,6 +38,7 @@ def settings(tmp_path: Path, ack_seconds: float) -> Settings:
         max_body_bytes=2 * 1024**2,
         max_upload_bytes=4 * 1024**2,
         max_sessions=3,
+        waiting_importers=0,
         ack_seconds=ack_seconds,
     )
 

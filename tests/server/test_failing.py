@@ -3,14 +3,13 @@
 import errno
 import logging
 import os
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 from fastapi.testclient import TestClient
 
-from relume.errors import DiskFullError
 from server.files import importing
-from server.files.importing import ImportRequest, answer_of, import_in_process
+from server.files.importing import ImportRequest, answer_of
 from server.settings import Settings
 
 
@@ -48,18 +47,6 @@ def test_a_disk_that_is_nearly_full_is_not_ready(client: TestClient, monkeypatch
     assert "12 MB left" in answer.json()["detail"]
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
     assert client.get("/readyz").status_code == 200
-
-
-def test_an_import_without_room_is_no_fault_of_the_file(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
-    def ended(*_: Any, **__: Any) -> Any:
-        class Done:
-            returncode, stdout = 0, b'\n{"full": "relume.db cannot be written"}\n'
-
-        return Done()
-
-    monkeypatch.setattr("subprocess.run", ended)
-    with pytest.raises(DiskFullError, match="free some space"):
-        import_in_process(ImportRequest.of(settings, "built_in", None, "cornell_box"))
 
 
 def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
