@@ -180,6 +180,7 @@ def arriving(transfer, view: View, index, look):
             transfer.preview_lights_in,
             transfer.memory,
             transfer.key,
+            transfer.harmonic,
         )
         every = light._replace(environment_gain=look.environment.gain)
         arrived = on_cells.arrived(every, reflecting, is_preview=False)

@@ -79,13 +79,18 @@ def _components(rows: F32, of: NDArray[np.intp], num_clusters: int, num: int) ->
 
 def strongest(rows: F32, num: int) -> F32:
     """Find where rows (n, R) reach farthest, orthonormal. (≤ num, R)"""
-    is_wide = len(rows) < rows.shape[1]  # then the vectors on their other side are fewer
-    values, vectors = np.linalg.eigh((rows @ rows.T if is_wide else rows.T @ rows).astype(np.float64))
-    kept = vectors[:, ::-1][:, :num].T[values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)]
-    if is_wide:
-        kept = kept @ rows.astype(np.float64)
-        kept /= np.linalg.norm(kept, axis=1, keepdims=True)
-    return np.ascontiguousarray(kept, np.float32)
+    if len(rows) < rows.shape[1]:  # then the vectors of their other side are fewer
+        exact = rows.astype(np.float64)  # what is found is divided by its length, which may be little
+        found = _largest(exact @ exact.T, num) @ exact
+        return np.ascontiguousarray(found / np.linalg.norm(found, axis=1, keepdims=True), np.float32)
+    return np.ascontiguousarray(_largest((rows.T @ rows).astype(np.float64), num), np.float32)
+
+
+def _largest(symmetric: F64, num: int) -> F64:
+    """Find the eigenvectors of the largest eigenvalues, those of next to nothing left out. (≤ num, n)"""
+    values, vectors = np.linalg.eigh(symmetric)
+    is_kept = values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)
+    return np.asarray(vectors[:, ::-1][:, :num].T[is_kept])
 
 
 def _apart(rows: F32, centres: F32) -> F32:
