@@ -45,7 +45,7 @@ class _Rested(NamedTuple):
 def measure(tiny: bool) -> list[Figure]:
     """Bake both scenes, move the eye, wait."""
     still = _rested("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
-    box = _rested("cornell_box", (48, 48) if tiny else (400, 400), tiny)
+    box = still if tiny else _rested("cornell_box", (400, 400), tiny)
     (rest_s, tracing_s, error), (direct_s, _, _) = still
     context = {"size": "640×480", "tracing_s": tracing_s, "direct_s": direct_s, "moving_error": error}
     of_box = {"cornell_box_400": box[0].rest_s, "its_tracing_s": box[0].tracing_s, "its_direct_s": box[1].rest_s}

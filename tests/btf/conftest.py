@@ -1,5 +1,6 @@
 """A small synthetic BTF, made once, and where looks find it."""
 
+import shutil
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,9 +28,11 @@ class Corduroy(NamedTuple):
 def small_btf(tmp_path_factory):
     folder = tmp_path_factory.mktemp("btf")
     with STORE.at(folder):
-        wanted = Made("corduroy", SIZE, GRID, 0.02)
-        record = make_btf(folder, wanted, "Corduroy", lambda share: None, lambda: False)
-        values = Values(tmp_path_factory.mktemp("values"), ubo_rings(), (SIZE, SIZE))
+        rendered = tmp_path_factory.mktemp("values")
+        values = Values(rendered, ubo_rings(), (SIZE, SIZE))
         small = SmallGeometry(corduroy(), ubo_rings(), (SIZE, SIZE), GRID, 1)
         values.fill(small.seen_from, lambda share: None, lambda: False)
+        wanted = Made("corduroy", SIZE, GRID, 0.02)
+        shutil.copytree(rendered, folder / "making" / f"corduroy-{SIZE}-{GRID}")  # goes on where it was, at the end
+        record = make_btf(folder, wanted, "Corduroy", lambda share: None, lambda: False)
         yield Corduroy(folder, record, values)

@@ -68,6 +68,7 @@ def test_a_damaged_one_hides_no_others_from_lists(small_btf, tmp_path, caplog):
     assert "0123456789abcdef is damaged" in caplog.text
 
 
+@pytest.mark.slow
 def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
     asked = []
 
