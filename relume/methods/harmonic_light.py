@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.basis.harmonics import NUM_HARMONICS, harmonics
-from relume.basis.zernike import num_functions
+from relume.basis.zernike import QUICK_DEGREE, num_functions
 from relume.errors import ChunkDamagedError
 from relume.light.smooth import Divided, divide
 from relume.light.triangles import TriangleLights
@@ -30,7 +30,6 @@ from relume.project.harmonic_transfer import NUM_CLUSTERS, NUM_COMPONENTS, Clust
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-POINT_DEGREE = 4  # of the in-basis: what is seen while a hand moves a light
 CELL_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
 
 
@@ -39,7 +38,7 @@ class HarmonicLight:
     """Transfer of harmonics to the points and cells of a bake.
 
     Attributes:
-        of_points: in the in-basis of `POINT_DEGREE`.
+        of_points: in the in-basis of `QUICK_DEGREE`.
         irradiance: of cells. (C, NUM_HARMONICS) float32
         vectors: of their first points, of `CELL_DEGREE`. (C, K, NUM_HARMONICS) float32
         brought: by the bake's lights in light that is a harmonic. (M, NUM_HARMONICS)
@@ -62,7 +61,7 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
     points, visible, cells = read_surface_points(store), store.read("points/visibility"), read_cells(store)
 
     def matrices(rows: NDArray[np.intp]) -> F32:
-        return transfer_matrices(points.rows(rows), visible[rows], *asked, POINT_DEGREE)
+        return transfer_matrices(points.rows(rows), visible[rows], *asked, QUICK_DEGREE)
 
     clustered = ClusteredTransfer.of(points.num_points, matrices, np.random.default_rng(seed))
     of_points = transfer_matrices(
@@ -81,7 +80,7 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
 
 def harmonic_bytes(num_points: int, num_cells: int) -> int:
     """What its arrays need in a store, at most."""
-    basis = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(POINT_DEGREE) * NUM_HARMONICS
+    basis = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(QUICK_DEGREE) * NUM_HARMONICS
     of_points = num_points * (1 + 2 * NUM_COMPONENTS)
     return basis + of_points + 2 * num_cells * (1 + num_functions(CELL_DEGREE)) * NUM_HARMONICS
 
@@ -96,7 +95,7 @@ def read_harmonic_light(store: StoreReader, cells: CellLight) -> HarmonicLight |
         return None
     of_points = ClusteredTransfer(*(store.read(f"harmonics/{name}") for name in ClusteredTransfer._fields))
     irradiance, vectors = (store.read(f"harmonics/{name}").astype(np.float32) for name in ("irradiance", "vectors"))
-    shape = num_functions(POINT_DEGREE), NUM_HARMONICS
+    shape = num_functions(QUICK_DEGREE), NUM_HARMONICS
     fits = len(of_points.cluster) == len(of_points.weight) == store.shape("points/material")[0]
     fits = fits and of_points.basis.shape[1:] == (1 + of_points.weight.shape[1], *shape)
     fits = fits and int(of_points.cluster.max(initial=0)) < len(of_points.basis)

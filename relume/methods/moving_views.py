@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.basis.zernike import NUM_FUNCTIONS
+from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
 from relume.memory import Memory
-from relume.methods.harmonic_light import POINT_DEGREE
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
@@ -152,7 +151,7 @@ class MovingViews:
             for source in element.local:
                 seen = self.lit.local.preview(source.geometry, points).visible
                 rays.append(self.lit.local.preview_rays(source, seen))
-        found = ray_vectors(points, rays, POINT_DEGREE)
+        found = ray_vectors(points, rays, QUICK_DEGREE)
         lights = self.lit.preview_lights_of(element)
         if lights.num_lights:
             found += self._quick_sky(lights, points, chosen)
@@ -165,15 +164,15 @@ class MovingViews:
         """Light vectors of an environment at some points, by harmonics where the bake has them."""
         harmonic = self.lit.harmonic
         if harmonic is None:
-            return light_vectors(points, self._visible[chosen], lights, (), POINT_DEGREE)
+            return light_vectors(points, self._visible[chosen], lights, (), QUICK_DEGREE)
         divided = harmonic.divided(lights)
         seen = visible_of(self._visible, chosen, divided.chosen)
-        beyond = light_vectors(points, seen, divided.beyond, (), POINT_DEGREE)
+        beyond = light_vectors(points, seen, divided.beyond, (), QUICK_DEGREE)
         return beyond + harmonic.of_points.vectors(divided.smooth, chosen)
 
     @cached_property
     def _functions_of_rays(self) -> F32:
-        return weighed_functions(self._pattern, 0, POINT_DEGREE)  # all points have one seed
+        return weighed_functions(self._pattern, 0, QUICK_DEGREE)  # all points have one seed
 
     def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
         """What white points of a material would send if nothing were in the light's way; of others nothing.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.moving.arriving import Arriving
 from relume.moving.evaluate import tables_of
 from relume.moving.points.surface import Textures
@@ -49,10 +49,12 @@ def test_light_vectors_survive_half_precision_whatever_their_size(size: float) -
 
 def test_what_was_found_quickly_is_sent_up_to_its_degree() -> None:
     vectors = np.zeros((5, 3, NUM_FUNCTIONS), np.float32)
-    vectors[:, :, :10] = 1
+    num = num_functions(QUICK_DEGREE)
+    vectors[:, :, :num] = 1
     sent = tables._light(Arriving(vectors, vectors), has_narrow=False, is_rough=True)
-    assert sent["vectors"].reshape(5, 3, -1).shape == (5, 3, 12)
-    assert sent["vectors_scale"][0, 1] == 3
+    assert sent["vectors"].reshape(5, 3, -1).shape == (5, 3, 16)  # as much as holds all of them
+    assert (sent["vectors"].reshape(5, 3, -1) > 0).sum() == 5 * 3 * num
+    assert sent["vectors_scale"][0, 1] == 4
 
 
 def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:

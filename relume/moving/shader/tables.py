@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder, num_functions
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.brdf.albedo import TEXTURES
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
@@ -22,7 +22,7 @@ from relume.views.resolve import encode_pixels
 F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
-_ROUGH = -(-num_functions(3) // 4)  # texels of four functions that are not nothing in what is found quickly
+_ROUGH = -(-num_functions(QUICK_DEGREE) // 4)  # texels of four functions that are not nothing in what is found quickly
 _MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
