@@ -68,7 +68,7 @@ def sources_of(names: Iterable[str], but_for: Collection[str] = (), package: Pat
         path = todo.pop()
         if path not in found and left_out.isdisjoint((path.with_suffix(""), *path.parents)):
             found.add(path)
-            todo.extend(_imported(package, path))
+            todo.extend(imported(package, path))
     return found
 
 
@@ -80,8 +80,8 @@ def _roots(package: Path, name: str) -> list[Path]:
     return found
 
 
-def _imported(package: Path, path: Path) -> Iterator[Path]:
-    """Modules of the package that a source imports: `from a.b import c` may mean module a.b, or a.b.c."""
+def imported(package: Path, path: Path) -> Iterator[Path]:
+    """Modules of a package that a source imports: `from a.b import c` may mean module a.b, or a.b.c."""
     for origin, names, module in _IMPORT.findall(path.read_text("utf-8")):
         top, _, inside = (origin or module).partition(".")
         if top != package.name:

@@ -1,8 +1,9 @@
-"""The folder of compiled kernels: another one for other sources, ours alone, and always somewhere."""
+"""Folders of compiled kernels: others for other sources, the same for all checkouts, ours alone, always somewhere."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -12,63 +13,119 @@ from pathlib import Path
 import pytest
 
 from relume import kernel_cache
+from relume.kernel_cache import cache_folder, kernel_sources
+
+SOURCES = {
+    "__init__": "",
+    "kernel": "import numba as nb\nfrom package.inner import helper\nfrom package.inner.plain import SIZE\n",
+    "inner/__init__": "",
+    "inner/helper": "from numba import njit\nfrom package.inner.scale import SCALE\n",
+    "inner/plain": "from package.inner.numbers import SIZE\n",
+    "inner/scale": "SCALE = 2\n",
+    "inner/numbers": "SIZE = 1\n",
+    "inner/unused": "import numba as nb\n",
+}
 
 
 @pytest.fixture
 def package(tmp_path):
-    folder = tmp_path / "package"
-    (folder / "inner").mkdir(parents=True)
-    (folder / "kernel.py").write_text("import numba as nb\n")
-    (folder / "inner" / "helper.py").write_text("from numba import njit\n")
-    (folder / "plain.py").write_text("x = 1\n")
-    return folder
+    for name, text in SOURCES.items():
+        path = tmp_path / "package" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path / "package"
 
 
-def test_hash_follows_kernel_sources_and_no_others(package):
-    first = kernel_cache.kernel_hash(package)
-    (package / "plain.py").write_text("x = 2\n")
-    assert kernel_cache.kernel_hash(package) == first
-    (package / "inner" / "helper.py").write_text("from numba import njit  # corrected\n")
-    second = kernel_cache.kernel_hash(package)
-    assert second != first
-    (package / "kernel.py").rename(package / "other.py")
-    assert kernel_cache.kernel_hash(package) != second
-
-
-def test_importing_relume_points_numba_there_and_imports_no_numba(tmp_path):
-    code = "import sys, os, relume; print('numba' in sys.modules, os.environ['NUMBA_CACHE_DIR'])"
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    output = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    imported, folder = output.stdout.split()
-    assert imported == "False"
-    assert folder == str(tmp_path / "relume" / "numba" / kernel_cache.kernel_hash())
-    assert stat.S_IMODE(os.stat(folder).st_mode) & 0o022 == 0
-
-
-def test_folder_is_the_same_for_every_process(tmp_path, monkeypatch):
+@pytest.fixture
+def user_cache(tmp_path, monkeypatch):
+    """A user's cache of this test; the process goes back to its own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert kernel_cache.cache_folder("abc") == kernel_cache.cache_folder("abc") == tmp_path / "relume" / "numba" / "abc"
+    cache_folder.cache_clear()
+    yield tmp_path / "relume" / "numba"
+    cache_folder.cache_clear()
 
 
-def test_unusable_user_cache_falls_back_to_a_temporary_folder(tmp_path, monkeypatch):
+def test_kernels_are_made_of_those_they_call_and_of_modules_with_their_constants(package):
+    found = {
+        path.relative_to(package).with_suffix("").as_posix() for path in kernel_sources(package / "kernel.py", package)
+    }
+    assert found == {"kernel", "inner/__init__", "inner/helper", "inner/plain", "inner/scale"}
+
+
+_COMPILE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from relume.basis import zernike
+from relume.kernel_cache import module_folder
+from pathlib import Path
+print(module_folder(Path(zernike.__file__)))
+
+"""
+
+
+def _folder_of(checkout: Path, cache: Path) -> Path:
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    code = [sys.executable, "-c", _COMPILE, str(checkout)]
+    output = subprocess.run(code, env=environment, capture_output=True, text=True, check=True)
+    return Path(output.stdout.split()[0])
+
+
+def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp_path):
+    original = Path(kernel_cache.__file__).parent
+    checkouts = [tmp_path / "one", tmp_path / "two"]
+    for checkout in checkouts:
+        shutil.copytree(original, checkout / "relume", ignore=shutil.ignore_patterns("__pycache__"))
+    first, second = (_folder_of(checkout, tmp_path / "cache") for checkout in checkouts)
+    assert first == second
+    assert first.is_dir()
+    changed = checkouts[1] / "relume" / "basis" / "zernike.py"
+    changed.write_text(changed.read_text() + "# corrected\n")
+    assert _folder_of(checkouts[1], tmp_path / "cache") != first
+
+
+def test_compiled_kernels_lie_in_the_folder_of_their_module(user_cache):
+    code = (
+        "import numpy as np\n"
+        "from relume.imageio.tonemap import tone_map\n"
+        "tone_map(np.ones((2, 2, 3), np.float32), 0.0, 'agx')\n"
+    )
+    subprocess.run([sys.executable, "-c", code], env={**os.environ}, check=True)
+    (folder,) = user_cache.rglob("imageio.tonemap-*")
+    assert list(folder.glob("*.nbc"))
+    assert stat.S_IMODE(folder.stat().st_mode) & 0o022 == 0
+
+
+def test_importing_relume_imports_no_numba():
+    code = "import sys, os, relume; print('numba' in sys.modules, os.environ['NUMBA_CACHE_LOCATOR_CLASSES'])"
+    output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    imported, locators = output.stdout.split()
+    assert imported == "False"
+    assert locators.startswith("relume.kernel_cache.KernelLocator,")
+
+
+def test_functions_of_others_are_left_to_numba():
+    assert kernel_cache.KernelLocator.from_function(lambda: None, __file__) is None
+
+
+def test_unusable_user_cache_falls_back_to_a_temporary_folder(tmp_path, monkeypatch, user_cache):
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
-    folder = kernel_cache.cache_folder("abc")
+    folder = cache_folder()
     assert folder.parent.parent == tmp_path / "tmp"
-    assert kernel_cache.cache_folder("abc") == folder
+    cache_folder.cache_clear()
+    assert cache_folder() == folder
 
 
-def test_folder_that_others_may_write_to_is_not_used(tmp_path, monkeypatch):
+def test_folder_that_others_may_write_to_is_not_used(tmp_path, monkeypatch, user_cache):
     # what lies in a kernel cache is run: somebody else's must not be
-    open_to_all = tmp_path / "relume" / "numba" / "abc"
-    open_to_all.mkdir(parents=True)
-    open_to_all.chmod(0o777)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    ours = cache_folder()
+    cache_folder.cache_clear()
+    ours.chmod(0o777)
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
-    assert tmp_path / "tmp" in kernel_cache.cache_folder("abc").parents
+    assert tmp_path / "tmp" in cache_folder().parents
 
 
 def _kernels(folder: Path, name: str, days: float) -> Path:
@@ -80,24 +137,28 @@ def _kernels(folder: Path, name: str, days: float) -> Path:
     return made
 
 
-def test_folders_unused_for_a_month_go_when_a_new_one_is_made(tmp_path):
-    caches = tmp_path / "relume" / "numba"
-    old, recent = _kernels(caches, "0123456789abcdef", 31), _kernels(caches, "fedcba9876543210", 29)
+def test_folders_unused_for_a_month_go_when_a_new_one_is_made(user_cache):
+    caches = cache_folder()
+    old, recent = (
+        _kernels(caches, "trace.old-0123456789abcdef", 31),
+        _kernels(caches, "light.tiles-fedcba9876543210", 29),
+    )
     foreign = _kernels(caches, "notes", 400)
-    linked = caches / "aaaaaaaaaaaaaaaa"
+    linked = caches / "linked-aaaaaaaaaaaaaaaa"
     linked.symlink_to(foreign)
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    subprocess.run([sys.executable, "-c", "import relume"], env=environment, check=True)
+    made = _folder_of(Path(kernel_cache.__file__).parent.parent, user_cache.parent.parent)
+    assert made.is_dir()
     assert not old.exists()
     assert (recent / "kernel.nbi").exists()
     assert (foreign / "kernel.nbi").exists()
     assert linked.is_symlink()
 
 
-def test_folder_in_use_is_marked_and_prunes_nothing(tmp_path):
-    caches = tmp_path / "relume" / "numba"
-    present, old = _kernels(caches, kernel_cache.kernel_hash(), 400), _kernels(caches, "0123456789abcdef", 400)
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    subprocess.run([sys.executable, "-c", "import relume"], env=environment, check=True)
+def test_folder_in_use_is_marked_and_prunes_nothing(user_cache):
+    checkout = Path(kernel_cache.__file__).parent.parent
+    present = _folder_of(checkout, user_cache.parent.parent)
+    os.utime(present, (0, 0))
+    old = _kernels(cache_folder(), "trace.old-0123456789abcdef", 400)
+    assert _folder_of(checkout, user_cache.parent.parent) == present
     assert time.time() - present.stat().st_mtime < 86_400
     assert old.exists()

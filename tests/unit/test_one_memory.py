@@ -150,6 +150,7 @@ BOUNDED = {
     "code_version.py",
     "environments/asset_store.py",
     "environments/built_in.py",
+    "kernel_cache.py",
     "look/library/materials.py",
     "look/library/navigation.py",
     "measured/asset_store.py",
