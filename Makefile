@@ -87,7 +87,7 @@ $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
 
 $(KERNEL_STAMP): $(PROJECT_STAMP) $(KERNEL_SOURCES)
 	@echo "Compiling kernels (once, a minute or two) …"
-	@$(BIN)/python -m relume.warm
+	@$(ONE_THREAD) $(BIN)/python -m relume.warm
 	@touch $@
 
 $(CLIENT_STAMP): client_web/package-lock.json

@@ -8,6 +8,10 @@ the cache that `relume.kernel_cache` has chosen; every later process loads them 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +25,12 @@ from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
 from relume.measured.lookup import NUM_KNOTS, Part, quotients
 from relume.memory import Memory
+from relume.methods.base import TransferMethod
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.bumps import towards_light
 from relume.moving.picture import MovingPicture
+from relume.parallel import num_threads
 from relume.picture.picture import Picture
 from relume.picture.transfer import Transfer
 from relume.reference import Points, reference_radiance, texels_of
@@ -34,31 +40,53 @@ from relume.scene.model import Scene
 from relume.store import bake_here
 from relume.trace.geometry import merge
 
-SIZE, NUM_LIGHTS = (64, 48), 64
+SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 64, 4000
 CACHE_BYTES = 1 << 28
 
 
 def warm() -> None:
     """Bake with every method, edit each analytic term by each curve and along parameters, add and move local lights.
 
-    Cost: a minute and a half of one core, 10 s when everything is compiled.
+    Cost: two minutes of two cores, 10 s when everything is compiled.
     """
-    with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
-        folder = Path(name)
-        save_scene(demo_scene(), folder / "scene")
-        scene = load_scene(folder / "scene")  # as the worker has it
-        for method in METHODS.values():
-            recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS)
-            transfer: Any = open_bake(
-                bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES)
-            )
-            if isinstance(transfer, MovingViews):
-                _move_eyes(transfer, MovingPicture(transfer, recipe.views[0], is_watched=True))
-                continue
-            _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
-            _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
+    parts = (_warm_pictures, _warm_rays)
+    with ProcessPoolExecutor(min(len(parts), num_threads()), get_context("spawn")) as pool:
+        for done in [pool.submit(part) for part in parts]:
+            done.result()
+
+
+def _warm_pictures() -> None:
+    """Compile what pictures of light triangles are made by, half of all there is."""
+    with _scene() as (scene, folder):
+        _try(METHODS["direct"], scene, folder)
         _compare(scene)
     _look_up()
+
+
+def _warm_rays() -> None:
+    """Compile what gather rays need more; `gather` last, by when what it shares with `direct` is there."""
+    with _scene() as (scene, folder):
+        for method in (METHODS["surface"], METHODS["gather"]):
+            _try(method, scene, folder)
+
+
+@contextmanager
+def _scene() -> Iterator[tuple[Scene, Path]]:
+    """The built-in scene, as the worker has it, and a folder for its bakes."""
+    with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
+        save_scene(demo_scene(), Path(name) / "scene")
+        yield load_scene(Path(name) / "scene"), Path(name)
+
+
+def _try(method: TransferMethod, scene: Scene, folder: Path) -> None:
+    """Bake, open, edit, and move what can be moved."""
+    recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_points=NUM_POINTS)
+    transfer: Any = open_bake(bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES))
+    if isinstance(transfer, MovingViews):
+        _move_eyes(transfer, MovingPicture(transfer, recipe.views[0], is_watched=True))
+        return
+    _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
+    _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
 
 
 def _edit_everything(transfer: Transfer, picture: Picture) -> None:
