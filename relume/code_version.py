@@ -20,8 +20,7 @@ _TRUTHS = (*_IMAGES, "reference")
 _BAKES = ("methods.registry", "scene.archive", "store.fill")
 _AFTER_BAKES = (  # methods import these to open what was baked
     "operators", "picture", "project",
-    "methods.cell_light", "methods.local_lights", "methods.moving_views", "methods.reflected", "methods.thinned",
-    "methods.transfer",
+    "methods.local_lights", "methods.moving_views", "methods.reflected", "methods.thinned", "methods.transfer",
 )  # fmt: skip
 
 
@@ -59,14 +58,14 @@ def sources_of(names: Iterable[str], but_for: Collection[str] = (), package: Pat
         but_for: packages and modules inside it that are left out, with what only they import.
         package: folder of the package.
     Raises:
-        ModuleNotFoundError: one of `names` is not there.
+        ModuleNotFoundError: one of `names` or `but_for` is not there.
     """
-    left_out = {package.joinpath(*name.split(".")) for name in but_for}
+    left_out = {source.with_suffix("") for name in but_for for source in _roots(package, name)}
     found: set[Path] = set()
     todo = [source for name in names for source in _roots(package, name)]
     while todo:
         path = todo.pop()
-        if path not in found and left_out.isdisjoint((path.with_suffix(""), *path.parents)):
+        if path not in found and path.with_suffix("") not in left_out:
             found.add(path)
             todo.extend(imported(package, path))
     return found

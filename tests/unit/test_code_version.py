@@ -45,6 +45,8 @@ def test_sources_are_all_that_is_imported_directly_or_not(package):
 def test_a_module_that_has_moved_is_missed_aloud(package):
     with pytest.raises(ModuleNotFoundError, match="no sources"):
         sources_of(["trace.photons"], package=package)
+    with pytest.raises(ModuleNotFoundError, match="no sources"):
+        sources_of(["trace.rays"], but_for=["trace.photons"], package=package)
 
 
 def test_the_hash_follows_what_is_imported_and_nothing_else(package):
