@@ -19,6 +19,7 @@ from server.library.opening import open_library
 from server.metrics import Metrics
 from server.routes import (
     bakes,
+    btf_works,
     btfs,
     built_ins,
     cameras,
@@ -50,6 +51,7 @@ ROUTE_GROUPS = (
     models,
     materials,
     btfs,
+    btf_works,
     library,
     environments,
     bakes,

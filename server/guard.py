@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from relume.measured.merl import FILE_BYTES
 from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
 
+UPLOADS = ("/api/scenes", "/api/materials/btf-works")  # as large as the settings allow
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {
@@ -109,7 +110,7 @@ class Guard:
         return dressed
 
     def _limit(self, scope: Scope) -> int:
-        if scope["path"] == "/api/scenes":
+        if scope["path"] in UPLOADS:
             return self._max_upload_bytes
         return MAX_MATERIAL_BYTES if scope["path"] == "/api/materials/measured" else self._max_body_bytes
 

@@ -27,6 +27,7 @@ from server.live.sending.bake_news import BakeNews
 from server.live.session import SessionServices
 from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
+from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
 from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
@@ -56,6 +57,7 @@ class Services:
     shares: ShareStore
     renders: RenderQueue
     comparisons: ComparisonQueue
+    btfs: BtfQueue
     threads: Threads
     transfers: TransferPool
     caretaker: Caretaker
@@ -108,6 +110,7 @@ async def open_services(
 
     renders = RenderQueue(sessions, settings.data, batch.run, quota, scene_name)
     comparisons = ComparisonQueue(sessions, settings.data, batch.run, quota)
+    btfs = BtfQueue(sessions, settings.data, batch.run, quota)
     live = SessionServices(
         library=library,
         threads=threads,
@@ -132,8 +135,9 @@ async def open_services(
     await asyncio.to_thread(service.start)
     importers = Importers(settings.waiting_importers)
     importers.start()
-    renders.start()
-    comparisons.start()
+    queues = renders, comparisons, btfs
+    for queue in queues:
+        queue.start()
     rounds = asyncio.create_task(caretaker.run())
     try:
         yield Services(
@@ -144,6 +148,7 @@ async def open_services(
             shares=ShareStore(service.ledger.sessions),
             renders=renders,
             comparisons=comparisons,
+            btfs=btfs,
             threads=threads,
             transfers=transfers,
             caretaker=caretaker,
@@ -156,8 +161,8 @@ async def open_services(
     finally:
         rounds.cancel()
         await asyncio.to_thread(importers.close)
-        await asyncio.to_thread(comparisons.close)
-        await asyncio.to_thread(renders.close)
+        for queue in reversed(queues):
+            await asyncio.to_thread(queue.close)
         await asyncio.to_thread(batch.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)

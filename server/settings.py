@@ -46,7 +46,7 @@ class Settings(BaseSettings):
     max_queued: int = Field(default=100, ge=1, description="renders, and comparisons, that wait or run")
     max_queued_each: int = Field(default=100, ge=1, description="of them, of one client")
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
-    max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest scene upload")
+    max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a scene or of a BTF's images")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
     least_free_bytes: int = Field(default=256 * 1024**2, ge=0, description="room on the disk for /readyz")
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")

@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, cameras, models, protocol, renders, surface
+from server.wire import bodies, btfs, cameras, models, protocol, renders, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -55,6 +55,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     models.TermsRequest,
     bodies.TruthRequest,
     bodies.ShareRequest,
+    btfs.SyntheticBtfRequest,
 )
 OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
@@ -74,6 +75,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.EnvironmentBody,
     bodies.MeasuredBody,
     bodies.BtfBody,
+    btfs.BtfWorkBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,

@@ -153,6 +153,14 @@ export interface StreamMessage {
   quality?: number;
 }
 
+/** A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured. */
+export interface SyntheticBtfRequest {
+  geometry: "weave" | "pebbles" | "corduroy";
+  size?: number;
+  error?: number;
+  name?: string | null;
+}
+
 /** Terms as they stand in a look. */
 export interface TermsRequest {
   terms: Record<string, unknown>[];
@@ -252,6 +260,18 @@ export interface BtfBody {
   components: number;
   error: number[];
   ratio: number;
+}
+
+/** A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. */
+export interface BtfWorkBody {
+  id: string;
+  name: string;
+  geometry: "weave" | "pebbles" | "corduroy" | null;
+  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  progress: number;
+  seconds_left: number | null;
+  material: string | null;
+  problem: string | null;
 }
 
 /** A scene made by code; `size` and `method` of a bake show it well. */

@@ -19,18 +19,20 @@ def import_zip(
     bound: float,
     progress: Callable[[float], object],
     cancelled: Callable[[], bool],
+    making: Path | None = None,
 ) -> BtfRecord:
     """Import a zip of images; the same again is the same BTF.
 
     Args:
         folder: of the asset store. file: the zip. name: what people call it. bound: relative RMS that may be missed.
         progress: called with the share done. cancelled: asked now and then.
+        making: folder of what was found so far; by default in `folder`, by the file's content.
     Raises:
         MaterialError: it is no such file, or the store is full. CancelledError: `cancelled` said so; what was found
             stays.
     """
     images = ZippedBtf(file)
-    making = folder / "making" / STORE.identity_of(file)
+    making = making or folder / "making" / STORE.identity_of(file)
     begun = Begun(making, {"bound": bound})
     record = keep(folder, file, name, None, lambda: compress(images, bound, progress, cancelled, begun))
     shutil.rmtree(making, ignore_errors=True)

@@ -63,18 +63,20 @@ def make_btf(
     name: str,
     progress: Callable[[float], object],
     cancelled: Callable[[], bool],
+    making: Path | None = None,
 ) -> BtfRecord:
     """Render and compress; the same again is the same BTF, and one that was begun goes on.
 
     Args:
         folder: of the asset store. wanted: what. name: what people call it.
         progress: called with the share done. cancelled: asked now and then.
+        making: folder of what was rendered so far; by default in `folder`, by what is wanted.
     Raises:
         ParameterError: it cannot be made. CancelledError: `cancelled` said so; what was rendered stays.
         MaterialError: the store is full.
     """
     wanted.check()
-    making = folder / "making" / "-".join(str(part) for part in wanted[:3])
+    making = making or folder / "making" / "-".join(str(part) for part in wanted[:3])
     making.mkdir(parents=True, exist_ok=True)
     recipe = making / "recipe.json"
     recipe.write_text(json.dumps({"synthetic": wanted._asdict(), "seed": _SEED}, sort_keys=True))

@@ -138,11 +138,12 @@ class WorkQueue(ABC, Generic[Request]):
         self._wake.set()
         self._thread.join(timeout=30)
 
-    def submit(self, request: Request, client: str = "") -> str:
+    def submit(self, request: Request, client: str = "", prepare: Callable[[Path], object] | None = None) -> str:
         """Queue a request that was checked.
 
         Args:
             request: what is asked for. client: who asks; clients have their turns one after another.
+            prepare: puts what the work needs into its folder, quickly.
         Returns:
             The id of the work.
         Raises:
@@ -155,6 +156,9 @@ class WorkQueue(ABC, Generic[Request]):
                 raise BusyError(f"{quota.of_all} {self.noun}s are waiting; try again when some are done")
             if sum((other or "") == client for other in waiting) >= quota.of_each:
                 raise BusyError(f"{quota.of_each} {self.noun}s of yours are waiting; try again when some are done")
+            if prepare is not None:
+                (self.folder / identity).mkdir(parents=True)
+                prepare(self.folder / identity)
             text, created = request.model_dump_json(), time.time()
             session.add(
                 row(id=identity, request=text, state="queued", done=0, created=created, client=client,
@@ -174,6 +178,16 @@ class WorkQueue(ABC, Generic[Request]):
         progress = min(1.0, (row.done + (timer.share if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         return Work(row.id, request, row.state, row.done, total, progress, seconds_left, row.problem)
+
+    def all(self) -> list[Work[Request]]:
+        """All rows, oldest first."""
+        with self._sessions() as session:
+            found = session.scalars(select(self.row.id).order_by(self.row.created)).all()
+        works = []
+        for identity in found:
+            with suppress(NotFoundError):  # somebody has deleted it since
+                works.append(self.get(identity))
+        return works
 
     def delete(self, identity: str) -> None:
         """Stop the work and forget its files. Raises NotFoundError."""

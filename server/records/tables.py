@@ -54,6 +54,12 @@ class RenderRow(WorkRow):
     __tablename__ = "renders"
 
 
+class BtfRow(WorkRow):
+    """A BTF that is made or imported, in one step."""
+
+    __tablename__ = "btfs"
+
+
 class ComparisonRow(WorkRow):
     """A comparison with brute force; `done` passes are finished."""
 

@@ -1,9 +1,9 @@
 /** Materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
-import { useRef } from "preact/hooks";
 import { libraryOpen } from "../state/panels";
 import { models } from "../state/scene";
 import { selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
+import { Makings } from "./Makings";
 import { NavigationMap } from "./NavigationMap";
 import {
   BTFS,
@@ -12,12 +12,11 @@ import {
   group,
   groups,
   hasKinds,
-  importMeasured,
+  importMaterial,
   MEASURED,
   model,
   putOnSelected,
   query,
-  sending,
   shown,
 } from "./library";
 
@@ -49,30 +48,23 @@ function Filters() {
   );
 }
 
-function ImportMeasured() {
-  const picker = useRef<HTMLInputElement>(null);
-  const take = (event: Event) => {
-    const input = event.currentTarget as HTMLInputElement;
-    const file = input.files?.[0];
-    input.value = "";
-    if (file !== undefined) void importMeasured(file);
-  };
-  return (
-    <div class="library-import">
-      <input ref={picker} type="file" accept=".binary" aria-label="Measured material" hidden onChange={take} />
-      <button disabled={sending.value !== null} onClick={() => picker.current?.click()}>
-        Import a measured material…
-      </button>
-      {sending.value !== null && (
-        <span role="status">{sending.value < 1 ? `Sending, ${Math.round(100 * sending.value)} %` : "Factorising…"}</span>
-      )}
-    </div>
-  );
+/** Files that are dropped onto the panel are materials, wherever else they would be scenes. */
+function takeFiles(event: DragEvent): void {
+  const files = [...(event.dataTransfer?.files ?? [])];
+  if (files.length === 0) return;
+  event.preventDefault();
+  event.stopPropagation();
+  for (const file of files) void importMaterial(file);
 }
 
 export function LibraryPanel() {
   return (
-    <aside class="panel library" aria-label="Library of materials">
+    <aside
+      class="panel library"
+      aria-label="Library of materials"
+      onDragOver={(event) => event.preventDefault()}
+      onDrop={takeFiles}
+    >
       <header class="panel-head">
         <h2>Library</h2>
         <IconButton icon="close" label="Close" onClick={() => (libraryOpen.value = false)} />
@@ -95,7 +87,7 @@ export function LibraryPanel() {
         onKeyDown={(event) => event.stopPropagation()}
       />
       <Filters />
-      <ImportMeasured />
+      <Makings />
       {shown.value.length === 0 && query.value !== "" && (
         <p class="library-help" role="status">
           Nothing here is called “{query.value}”.
@@ -106,8 +98,8 @@ export function LibraryPanel() {
       )}
       {shown.value.length === 0 && query.value === "" && model.value === BTFS && (
         <p class="library-help">
-          No such textures yet. In a terminal, <code>relume material make-btf weave</code> renders a synthetic cloth, and{" "}
-          <code>relume material import FILE.zip</code> takes measured images.
+          No such textures yet. Render one here, or import measured images: a zip whose files are named by the directions of
+          light and view.
         </p>
       )}
       <ul class="library-balls">

@@ -5,9 +5,11 @@ import { edit } from "../edit/edit";
 import { listBtfs, listMaterials, listMeasured, materialThumbnail } from "../net/api";
 import { uploadMeasured } from "../net/upload";
 import type { BtfBody, MaterialBody, MeasuredBody, Term } from "../protocol";
+import { libraryOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
 import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
+import { followMakings, type Geometry, goOnMaking, importImages, makeSynthetic } from "./making";
 
 export const DRAG_TYPE = "application/x-relume-material";
 /** Among the models: what was measured and is not fitted. */
@@ -80,14 +82,36 @@ export function isFound({ name, about }: Pick<Entry, "name" | "about">, typed: s
 export async function openLibrary(): Promise<void> {
   togglePanel("library");
   await attempt(async () => {
-    btfs.value = await listBtfs(); // commands make them meanwhile
-    if (library.value.length > 0) return;
-    [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
+    await refreshBtfs(); // commands make them meanwhile
+    if (library.value.length === 0) [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
+    if (libraryOpen.value) await followMakings(refreshBtfs);
   });
 }
 
+async function refreshBtfs(): Promise<void> {
+  btfs.value = await listBtfs();
+}
+
+/** Begin something that is made on the server, show it, and follow it. */
+async function begin(work: () => Promise<void>): Promise<void> {
+  await attempt(async () => {
+    model.value = BTFS;
+    await work();
+    await followMakings(refreshBtfs);
+  });
+}
+
+export const make = (geometry: Geometry) => begin(() => makeSynthetic(geometry));
+export const goOn = (id: string) => begin(() => goOnMaking(id));
+
+/** A zip of images is a texture from all sides, anything else a MERL file. */
+export async function importMaterial(file: File): Promise<void> {
+  if (file.name.toLowerCase().endsWith(".zip")) await begin(() => importImages(file));
+  else await importMeasured(file);
+}
+
 /** Import a MERL file and show it among the measurements. */
-export async function importMeasured(file: File): Promise<void> {
+async function importMeasured(file: File): Promise<void> {
   await attempt(async () => {
     sending.value = 0;
     try {

@@ -13,6 +13,7 @@ import type {
   MaterialBody,
   MaterialMapBody,
   BtfBody,
+  BtfWorkBody,
   MeasuredBody,
   ModelBody,
   Problem,
@@ -22,6 +23,7 @@ import type {
   ShareBody,
   ShareEntry,
   ShareRequest,
+  SyntheticBtfRequest,
   Term,
   TruthBody,
   TruthPlanBody,
@@ -83,6 +85,21 @@ export async function takeBuiltIn(name: string): Promise<SceneBody> {
 export const listModels = () => getJson<ModelBody[]>("/api/models");
 export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
 export const listBtfs = () => getJson<BtfBody[]>("/api/materials/btf");
+const btfWork = (id: string) => `/api/materials/btf-works/${encodeURIComponent(id)}`;
+export const listBtfWorks = () => getJson<BtfWorkBody[]>("/api/materials/btf-works");
+export async function startBtf(body: SyntheticBtfRequest): Promise<BtfWorkBody> {
+  return (await (await request("/api/materials/btf-works/synthetic", json("POST", body))).json()) as BtfWorkBody;
+}
+/** What was found so far is kept. */
+export async function stopBtfWork(id: string): Promise<void> {
+  await request(btfWork(id), { method: "DELETE" });
+}
+export async function resumeBtfWork(id: string): Promise<void> {
+  await request(`${btfWork(id)}/resume`, { method: "POST" });
+}
+export async function forgetBtfWork(id: string): Promise<void> {
+  await request(`${btfWork(id)}?forget=true`, { method: "DELETE" });
+}
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
 export const materialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);

@@ -1,6 +1,6 @@
 /** Imports: multipart uploads with progress, which fetch cannot report. */
 import type { Dropped } from "../files/dropped";
-import type { EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
+import type { BtfWorkBody, EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
 import { ApiError } from "./api";
 
 export interface Upload {
@@ -14,7 +14,7 @@ export interface Upload {
 
 function answer(request: XMLHttpRequest): unknown {
   const body = JSON.parse(request.responseText || "null") as unknown;
-  if (request.status === 201) return body;
+  if (request.status === 201 || request.status === 202) return body;
   const { detail, title } = (body ?? {}) as { detail?: unknown; title?: string };
   throw new ApiError(
     typeof detail === "string" ? detail : (title ?? `The server answered ${request.status}.`),
@@ -62,4 +62,11 @@ export function uploadMeasured(file: File, progress: (fraction: number) => void)
   const form = new FormData();
   form.append("material", file);
   return post("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
+}
+
+/** A zip of images of a texture from all sides; the server compresses them from then on. */
+export function uploadBtf(file: File, progress: (fraction: number) => void): Promise<BtfWorkBody> {
+  const form = new FormData();
+  form.append("images", file);
+  return post("/api/materials/btf-works", form, progress) as Promise<BtfWorkBody>;
 }

@@ -1,0 +1,57 @@
+"""BTFs that are made or imported: rendered from a small geometry, or compressed from images that were sent."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sqlalchemy.orm import Session, sessionmaker
+
+from server.apart.btfs import FOUND, IMAGES
+from server.apart.step import RunStep
+from server.apart.step_timer import StepTimer
+from server.queues.work_queue import Quota, Work, WorkQueue
+from server.records.tables import BtfRow
+from server.wire.btfs import BtfRequest
+
+BtfWork = Work[BtfRequest]
+
+
+class BtfQueue(WorkQueue[BtfRequest]):
+    """BTFs in the database, what is found so far in `data`/btf-works/<id>/; all of one is a step that goes on."""
+
+    row, noun, request_type = BtfRow, "BTF", BtfRequest
+
+    def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
+        """
+        Args:
+            sessions: of the database. data: directory of what is made.
+            run: does the steps. quota: how much may wait.
+        """
+        super().__init__(sessions, data / "btf-works", run, quota)
+
+    def steps(self, request: BtfRequest) -> int:
+        """One, which keeps what it has found when it is stopped."""
+        return 1
+
+    def step_s(self, request: BtfRequest) -> float | None:
+        """Two of them have little in common."""
+        return None
+
+    def is_first(self, request: BtfRequest) -> bool:
+        """All of them take their time."""
+        return False
+
+    def material(self, identity: str) -> str | None:
+        """Id of the BTF that a work has made; None where it is not ready."""
+        path = self.folder / identity / FOUND
+        return str(json.loads(path.read_text())["material"]) if path.exists() else None
+
+    def step(self, work: BtfWork, timer: StepTimer) -> int:
+        """Make it, or go on with it."""
+        folder = self.folder / work.id
+        self.note(work.id, 0)
+        values = {"request": work.request.model_dump(mode="json"), "folder": str(folder)}
+        self.run_apart(work, "BTF", values, timer.tell)
+        (folder / IMAGES).unlink(missing_ok=True)
+        return 1

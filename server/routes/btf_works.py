@@ -1,0 +1,88 @@
+"""/api/materials/btf-works: BTFs are rendered or imported, which takes minutes; followed, stopped, gone on with."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi.concurrency import run_in_threadpool
+
+from relume.asset_store import check_name
+from server.apart.btfs import IMAGES
+from server.files.importing import UPLOAD_PREFIX
+from server.files.uploads import keep_upload, plain_stem
+from server.queues.btfs import BtfWork
+from server.services import Services, Shared
+from server.wire.body import Id
+from server.wire.btfs import BOUND, Bound, BtfRequest, BtfWorkBody, SyntheticBtfRequest
+
+PREFIX = "/api/materials/btf-works"
+router = APIRouter(prefix=PREFIX, tags=["materials"])
+ImagesFile = Annotated[UploadFile, File(description="zip of images named by light and view (UBO2003)")]
+BtfName = Annotated[str, Form(max_length=200)]
+BoundField = Annotated[Bound, Form()]
+
+
+@router.post("", status_code=202)
+async def import_btf(
+    images: ImagesFile, services: Shared, response: Response, name: BtfName = "", error: BoundField = BOUND
+) -> BtfWorkBody:
+    """Queue the import of a zip of images; what is wrong with it the work says."""
+    async with services.import_slots:
+        identity = await run_in_threadpool(_submit_images, images, name, error, services)
+    return _answer(identity, services, response)
+
+
+def _submit_images(images: UploadFile, name: str, error: float, services: Services) -> str:
+    request = BtfRequest(name=check_name(name or plain_stem(images.filename) or "BTF"), error=error)
+    with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
+        path = keep_upload(images, Path(folder) / IMAGES)
+        return services.btfs.submit(request, prepare=lambda into: shutil.move(path, into / IMAGES))
+
+
+@router.post("/synthetic", status_code=202)
+async def make_synthetic_btf(request: SyntheticBtfRequest, services: Shared, response: Response) -> BtfWorkBody:
+    """Queue the rendering of a small geometry from all sides in light from all sides."""
+    name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
+    wanted = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
+    return _answer(await run_in_threadpool(services.btfs.submit, wanted), services, response)
+
+
+def _answer(identity: str, services: Services, response: Response) -> BtfWorkBody:
+    response.headers["Location"] = f"{PREFIX}/{identity}"
+    return _body(services.btfs.get(identity), services)
+
+
+@router.get("")
+def list_btf_works(services: Shared) -> list[BtfWorkBody]:
+    """All that were asked for and not forgotten, oldest first."""
+    return [_body(work, services) for work in services.btfs.all()]
+
+
+@router.get("/{work}")
+def get_btf_work(work: Id, services: Shared) -> BtfWorkBody:
+    """State and progress."""
+    return _body(services.btfs.get(work), services)
+
+
+@router.delete("/{work}", status_code=204)
+def stop_btf_work(work: Id, services: Shared, forget: bool = False) -> Response:
+    """Stop it; what was found so far is kept, unless `forget` says that nobody needs it. A BTF that is ready stays."""
+    (services.btfs.delete if forget else services.btfs.stop)(work)
+    return Response(status_code=204)
+
+
+@router.post("/{work}/resume", status_code=202)
+def resume_btf_work(work: Id, services: Shared) -> BtfWorkBody:
+    """Go on with what was stopped."""
+    services.btfs.resume(work)
+    return _body(services.btfs.get(work), services)
+
+
+def _body(work: BtfWork, services: Services) -> BtfWorkBody:
+    request = work.request
+    material = services.btfs.material(work.id) if work.state == "ready" else None
+    return BtfWorkBody.of(work, name=request.name, geometry=request.geometry, material=material)

@@ -1,0 +1,44 @@
+"""Bodies of BTFs that are made or imported."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.wire.body import Body, Id, Name
+
+Geometry = Literal["weave", "pebbles", "corduroy"]
+Bound = Annotated[float, Field(ge=1e-4, le=0.5, description="relative RMS that compression may miss")]
+BOUND = 0.05
+
+
+class SyntheticBtfRequest(Body):
+    """A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured."""
+
+    geometry: Geometry
+    size: Annotated[int, Field(ge=8, le=256)] = 128
+    error: Bound = BOUND
+    name: Name | None = None
+
+
+class BtfRequest(Body):
+    """A BTF to be made: rendered from `geometry`, or of images that were sent."""
+
+    name: Name
+    error: Bound
+    geometry: Geometry | None = None
+    size: int = 0
+
+
+class BtfWorkBody(Body):
+    """A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent."""
+
+    id: Id
+    name: str
+    geometry: Geometry | None
+    state: Literal["queued", "running", "ready", "failed", "stopped"]
+    progress: float
+    seconds_left: float | None
+    material: Id | None
+    problem: str | None

@@ -1,0 +1,117 @@
+"""BTFs that are made and imported over REST: the way to the library, what is wrong with files, stop and resume."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from btf_zips import zipped
+from fastapi.testclient import TestClient
+from server_fakes import Control
+
+from relume.btf.importing import import_zip
+from relume.errors import CancelledError
+from server.settings import Settings
+
+WORKS = "/api/materials/btf-works"
+WAIT_S = 60.0
+
+
+def wait_for(client: TestClient, url: str, *states: str) -> dict[str, Any]:
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        body: dict[str, Any] = client.get(url).json()
+        if body["state"] in states:
+            return body
+        time.sleep(0.02)
+    raise TimeoutError(url)
+
+
+def send(client: TestClient, path: Path, **form: Any) -> str:
+    with path.open("rb") as file:
+        answer = client.post(WORKS, files={"images": ("Felt.zip", file)}, data=form)
+    assert answer.status_code == 202, answer.text
+    return str(answer.headers["location"])
+
+
+def test_images_become_a_material_of_the_library(client: TestClient, settings: Settings, tmp_path: Path) -> None:
+    url = send(client, zipped(tmp_path / "a.zip"), error=0.02)
+    body = wait_for(client, url, "ready", "failed")
+    assert (body["state"], body["name"], body["geometry"], body["problem"]) == ("ready", "Felt", None, None)
+    (listed,) = client.get("/api/materials/btf").json()
+    assert (listed["id"], listed["name"], listed["synthetic"]) == (body["material"], "Felt", None)
+    assert listed["error"][-1] <= 0.02
+    assert not list(settings.data.rglob("images.zip"))
+    assert [work["id"] for work in client.get(WORKS).json()] == [body["id"]]
+    assert client.delete(f"{url}?forget=true").status_code == 204
+    assert client.get(url).status_code == 404
+    assert client.get(WORKS).json() == []
+    assert not (settings.data / "btf-works" / body["id"]).exists()
+    assert len(client.get("/api/materials/btf").json()) == 1
+
+
+@pytest.mark.slow
+def test_a_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.apart.btfs._GRID", 1)
+    answer = client.post(f"{WORKS}/synthetic", json={"geometry": "corduroy", "size": 8, "error": 0.3})
+    assert answer.status_code == 202
+    body = wait_for(client, answer.headers["location"], "ready", "failed")
+    assert (body["state"], body["name"], body["geometry"]) == ("ready", "Corduroy (synthetic)", "corduroy")
+    assert client.get(f"/api/materials/btf/{body['material']}").json()["synthetic"] == "corduroy"
+
+
+def test_what_is_wrong_with_a_file_is_said_and_the_next_one_is_taken(client: TestClient, tmp_path: Path) -> None:
+    (tmp_path / "no.zip").write_bytes(b"no zip")
+    body = wait_for(client, send(client, tmp_path / "no.zip"), "ready", "failed")
+    assert (body["state"], body["material"]) == ("failed", None)
+    assert "not a zip of images" in body["problem"]
+    assert wait_for(client, send(client, zipped(tmp_path / "a.zip")), "ready", "failed")["state"] == "ready"
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [{"geometry": "fur"}, {"geometry": "weave", "size": 4}, {"geometry": "weave", "size": 10**9},
+     {"geometry": "weave", "error": 0}, {"geometry": "weave", "name": ""}, {}],
+)  # fmt: skip
+def test_what_cannot_be_made_is_refused(client: TestClient, wanted: dict[str, Any]) -> None:
+    assert client.post(f"{WORKS}/synthetic", json=wanted).status_code == 422
+    assert client.get(WORKS).json() == []
+
+
+def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
+    client: TestClient, control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    has_begun, has_ended, found = threading.Event(), threading.Event(), []
+
+    def slow(folder: Path, file: Path, name: str, bound: float, tell: Callable[[float], object],
+             cancelled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
+        found.append(making.exists())
+        if not has_begun.is_set():
+            making.mkdir()
+            tell(0.5)
+            has_begun.set()
+            while not cancelled():
+                time.sleep(0.01)
+            has_ended.set()
+            raise CancelledError("stopped")
+        return import_zip(folder, file, name, bound, tell, cancelled, making)
+
+    monkeypatch.setattr("server.apart.btfs.import_zip", slow)
+    url = send(client, zipped(tmp_path / "a.zip"))
+    assert has_begun.wait(WAIT_S)
+    assert client.get(url).json()["progress"] == 0.5
+    assert client.delete(url).status_code == 204
+    assert client.get(url).json()["state"] == "stopped"
+    assert has_ended.wait(WAIT_S)
+    assert client.post(f"{url}/resume").status_code == 202
+    assert wait_for(client, url, "ready", "failed")["state"] == "ready"
+    assert found == [False, True]
+
+
+def test_uploads_and_forms_that_are_too_large_are_refused(client: TestClient, settings: Settings) -> None:
+    large = b"0" * (settings.max_upload_bytes + 1)
+    assert client.post(WORKS, files={"images": ("a.zip", large)}).status_code == 413
+    assert client.post(WORKS, files={"images": ("a.zip", b"0")}, data={"error": 7}).status_code == 422
+    assert client.get(WORKS).json() == []
