@@ -1,13 +1,16 @@
-"""The step that makes a BTF."""
+"""The step that makes a BTF, or goes on with it for a while: others have their turns meanwhile."""
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from relume.btf.importing import import_zip
+from relume.btf.shelf import BtfRecord
+from relume.errors import CancelledError
 from relume.picture.jobs import Cancelled, Progress
 from relume.replacing import replacing
 from relume.synthetic.make import Made, make_btf
@@ -16,8 +19,9 @@ from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
 
 IMAGES, FOUND = "images.zip", "found.json"
-_MAKING = "making"
+_MAKING, _REACHED = "making", "reached.txt"
 _GRID = 3  # places along each side of a texel
+TURN_S = 30.0
 
 
 def make(
@@ -27,13 +31,53 @@ def make(
 
     Args:
         request: the work's. folder: its files, the images among them.
+    Returns:
+        `is_done`: whether it is kept; else it is to be gone on with.
     """
-    asked, where, shelf = BtfRequest.model_validate(request), Path(folder), btfs_path(shop.data)
-    if asked.geometry is None:
-        record = import_zip(shelf, where / IMAGES, asked.name, asked.error, tell, cancelled, where / _MAKING)
-    else:
-        wanted = Made(asked.geometry, asked.size, _GRID, asked.error)
-        record = make_btf(shelf, wanted, asked.name, tell, cancelled, where / _MAKING)
+    asked, where = BtfRequest.model_validate(request), Path(folder)
+    turn = _Turn(tell, cancelled, where / _REACHED)
+    try:
+        record = _made(asked, where, btfs_path(shop.data), turn)
+    except CancelledError:
+        if cancelled():
+            raise
+        turn.leave()
+        return {"is_done": False}
     with replacing(where / FOUND) as unfinished:
         unfinished.write_text(json.dumps({"material": record.id}))
-    return {}
+    return {"is_done": True}
+
+
+def _made(asked: BtfRequest, where: Path, shelf: Path, turn: _Turn) -> BtfRecord:
+    if asked.geometry is None:
+        return import_zip(shelf, where / IMAGES, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
+    wanted = Made(asked.geometry, asked.size, _GRID, asked.error)
+    return make_btf(shelf, wanted, asked.name, turn.tell, turn.is_over, where / _MAKING)
+
+
+class _Turn:
+    """Ends after a while, though not before something was found that no turn before it had.
+
+    Args:
+        tell: called with the share done. cancelled: asked now and then. path: file that says what turns have reached.
+    """
+
+    def __init__(self, tell: Progress, cancelled: Cancelled, path: Path) -> None:
+        self._tell, self._cancelled, self._path = tell, cancelled, path
+        self._until_s = time.monotonic() + TURN_S
+        self._before = float(path.read_text()) if path.exists() else 0.0
+        self._share = 0.0
+
+    def tell(self, share: float) -> None:
+        """So much is done, of all turns."""
+        self._share = share
+        self._tell(share)
+
+    def is_over(self) -> bool:
+        """Whether to stop: for now, or because it is not wanted any more."""
+        return self._cancelled() or (self._share > self._before and time.monotonic() > self._until_s)
+
+    def leave(self) -> None:
+        """Say what was reached."""
+        with replacing(self._path) as unfinished:
+            unfinished.write_text(str(max(self._share, self._before)))

@@ -110,6 +110,31 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     assert found == [False, True]
 
 
+def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.apart.btfs.TURN_S", 0.0)
+    done: list[float] = []
+
+    def render(shelf: Path, wanted: Any, name: str, tell: Callable[[float], object],
+               cancelled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
+        while not cancelled():
+            tell(0.1 * len(done))
+            done.append(0.1 * len(done))
+            if len(done) == 7:
+                return import_zip(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
+            if len(done) == 3:
+                images.append(send(client, zipped(tmp_path / "a.zip")))
+        raise CancelledError("for now")
+
+    images: list[str] = []
+    monkeypatch.setattr("server.apart.btfs.make_btf", render)
+    url = client.post(f"{WORKS}/synthetic", json={"geometry": "weave"}).headers["location"]
+    assert wait_for(client, url, "ready", "failed")["state"] == "ready"
+    assert len(done) == 7
+    assert client.get(images[0]).json()["state"] == "ready"
+
+
 def test_uploads_and_forms_that_are_too_large_are_refused(client: TestClient, settings: Settings) -> None:
     large = b"0" * (settings.max_upload_bytes + 1)
     assert client.post(WORKS, files={"images": ("a.zip", large)}).status_code == 413
