@@ -119,7 +119,7 @@ def check_scene(
         SceneError: something does not fit; it says what to do.
     """
     if not meshes:
-        raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+        raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
     if not cameras:
         raise SceneError("the scene has no camera; add one")
     if len(materials) > MAX_MATERIALS:

@@ -88,7 +88,7 @@ class _Reading:
         if len(self.meshes) > _MANY:
             self.meshes = joined(self.meshes)
         if not self.meshes:
-            raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+            raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
         emissions = [np.array(understood.emission) for understood in self.materials]
         own = [understood.material for understood in self.materials]
         lit = self._collector.shine(own, emissions, self.meshes)

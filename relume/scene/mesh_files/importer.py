@@ -105,6 +105,6 @@ def _scene(
     lights: Sequence[Light] = (),
 ) -> Scene:
     if not meshes:
-        raise SceneError("the scene has no triangles; export at least one mesh made of triangles")
+        raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
     cameras = [framing_camera(meshes, "front")]
     return finished_scene(name, meshes, materials, cameras, environment or studio(), warnings, lights=lights)
