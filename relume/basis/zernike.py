@@ -145,6 +145,29 @@ def functions_of(rungs, num, wi, scratch, out):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def functions_along(rungs, x, y, out):  # type: ignore[no-untyped-def]
+    """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
+
+    Args:
+        rungs: the `ladder`. x, y: of the direction, local, unit. out: written. (K,) float32
+    """
+    argument = np.float32(2) * (x * x + y * y) - np.float32(1)
+    re, im = np.float32(1), np.float32(0)
+    before, last = np.float32(0), np.float32(1)
+    for rung in range(rungs.order.shape[0]):
+        a = rungs.a[rung]
+        if a == 0:
+            if rungs.order[rung] > 0:
+                re, im = re * x - im * y, re * y + im * x
+            before, last = np.float32(0), np.float32(1)
+        else:
+            before, last = last, (a * argument + rungs.b[rung]) * last - rungs.c[rung] * before
+        value = rungs.norm[rung] * last
+        out[rungs.sine[rung]] = value * im
+        out[rungs.cosine[rung]] = value * re
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _begin(num, wi, x):  # type: ignore[no-untyped-def]
     for n in range(num):
         x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)

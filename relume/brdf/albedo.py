@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.quadrature import Quadrature
 from relume.brdf.registry import TERMS
 from relume.brdf.symmetry import about_normal, is_isotropic
 
@@ -57,8 +58,13 @@ def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
     Returns:
         What `shares_in` reads.
     """
+    return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True))
+
+
+@lru_cache(maxsize=256)
+def _reflectances(terms_text: str) -> bytes:
     total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
-    for term in terms:
+    for term in json.loads(terms_text):
         found = shares(term)
         if not is_diffuse(term):  # else all light would be made anew with each step of a hand on a highlight
             found = np.round(found * _STEPS) / _STEPS
@@ -97,16 +103,27 @@ def _white(term_document: Mapping[str, Any]) -> str:
 def _of_lobe(term_text: str) -> F64:
     """As `_of_even`, of a term whose light crowds about the mirror direction, as the places of ωi do. (3, pairs)"""
     places, arriving = _about_mirrors(), _arriving(term_text)
-    return np.stack([places.h_o[:, j] @ arriving[..., k] for j, k in PAIRS], axis=-1)
+    together = np.tensordot(places.h_o, arriving, axes=(0, 0))  # (rungs, 3, rungs)
+    rows, columns = np.array(PAIRS).T
+    return np.asarray(together[rows, :, columns].T)
 
 
 @lru_cache(maxsize=256)
 def _arriving(term_text: str) -> F64:
     """What each function of ωi sends towards each ωo, weighed as `_Places`. (o, 3, rungs)"""
     document, places = json.loads(term_text), _about_mirrors()
-    turns = _TURNS[:1] if is_isotropic(document) else _TURNS
-    value = np.mean([eval_brdf(document, places.wi @ turn.T, places.wo @ turn.T) for turn in turns], axis=0)
-    return np.asarray(np.einsum("onc,onk->ock", value, places.h_i, optimize=True), np.float64)
+    if is_isotropic(document):
+        value = _quadrature().values(document)
+    else:
+        turned = [eval_brdf(document, places.wi @ turn.T, places.wo @ turn.T) for turn in _TURNS]
+        value = np.moveaxis(np.mean(turned, axis=0), -1, 0)
+    sent = np.moveaxis((value[..., None, :] @ places.h_i)[..., 0, :], 0, 1)
+    return np.broadcast_to(sent, (_NUM_OUT, 3, sent.shape[-1]))
+
+
+@lru_cache(maxsize=1)
+def _quadrature() -> Quadrature:
+    return Quadrature(_about_mirrors().wi, _about_mirrors().wo)
 
 
 def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[F64, F64]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Angle, Curve
 
 F64 = NDArray[np.float64]
 
@@ -24,21 +27,45 @@ def about_normal(phi: float) -> F64:
 
 def is_isotropic(term_document: Mapping[str, Any]) -> bool:
     """Tell whether a term looks the same when both directions turn about the normal, or are mirrored."""
-    return _stays(term_document, (about_normal(1.2345), _MIRRORED["y"]))  # an angle that no other symmetry has
+    declared = TERMS[term_document["model"]]
+    if all(map(_is_round, declared.settled(term_document).curves)):
+        return _has_round_quotient(declared.model, declared.fixed_values(term_document))
+    return _stays(lambda wi, wo: eval_brdf(term_document, wi, wo), _ALL_AROUND)
 
 
 def is_mirrored(term_document: Mapping[str, Any]) -> bool:
     """Tell whether a term looks the same on both sides of its tangent, and of what lies across that."""
-    return _stays(term_document, tuple(_MIRRORED.values()))
+    return _stays(lambda wi, wo: eval_brdf(term_document, wi, wo), tuple(_MIRRORED.values()))
 
 
-def _stays(term_document: Mapping[str, Any], maps: Sequence[F64]) -> bool:
-    """Tell whether a term has the same values after each of some maps of both directions, at a few of them."""
+_ALL_AROUND = (about_normal(1.2345), _MIRRORED["y"])  # an angle that no other symmetry has
+
+
+def _is_round(curve: Curve) -> bool:
+    """Whether a curve's angle stays the same when both directions turn about the normal, or are mirrored."""
+    if curve.angle is Angle.LOBE:
+        return curve.axes[0] == curve.axes[1]
+    return curve.angle not in (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
+
+
+@lru_cache(maxsize=256)
+def _has_round_quotient(model: str, fixed: tuple[tuple[str, float | str], ...]) -> bool:
+    """Tell whether a term whose curves are round is so itself: no edit of a curve changes that."""
+    term = TERMS[model].settled_by(fixed)
+
+    def quotient(wi: F64, wo: F64) -> F64:
+        return np.moveaxis(term.quotients(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0)), 0, -1)
+
+    return _stays(quotient, _ALL_AROUND)
+
+
+def _stays(evaluate: Callable[[F64, F64], F64], maps: Sequence[F64]) -> bool:
+    """Tell whether a function of both directions is the same after each of some maps of them, at a few of them."""
     rng = np.random.default_rng(1)
     wi, wo = (np.abs(rng.normal(size=(256, 3))) for _ in range(2))
     wi[:128, 0] *= -1
     wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    plain = eval_brdf(term_document, wi, wo)
+    plain = evaluate(wi, wo)
     scale = np.abs(plain).max() + 1e-30
-    others = (eval_brdf(term_document, wi @ one.T, wo @ one.T) for one in maps)
+    others = (evaluate(wi @ one.T, wo @ one.T) for one in maps)
     return all(np.abs(other - plain).max() <= _SAME * scale for other in others)

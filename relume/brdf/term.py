@@ -141,9 +141,11 @@ class Term:
 
     def settled(self, document: Mapping[str, Any]) -> Term:
         """This term with its fixed parameters put in: quotient and angles have none left."""
-        if self.settle is None:
-            return self
-        return replace(self, **self.settle(dict(self.fixed_values(document))))
+        return self.settled_by(self.fixed_values(document))
+
+    def settled_by(self, fixed: tuple[tuple[str, float | str], ...]) -> Term:
+        """The same from the `fixed_values` of a document."""
+        return self if self.settle is None else replace(self, **self.settle(dict(fixed)))
 
     def quotients(self, *directions: NDArray[np.floating] | float) -> NDArray[Any]:
         """The quotient with its channels first, (1, ...) or (3, ...); directions as it takes them."""

@@ -36,13 +36,13 @@ class SkyLight(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _take_off(points, material, lobes, light, eye, glances, is_needed, start, stop, sent):  # type: ignore[no-untyped-def]
-    """Take L off what points [start, stop) send. sent: (points, groups, 3)"""
+def _take_off(points, material, lobes, light, eye, glances, rows, start, stop, sent):  # type: ignore[no-untyped-def]
+    """Take L off what the points that are [start, stop) of rows send. sent: (points, groups, 3)"""
     position, normal, _, _ = points
     found = np.empty(3, np.float32)
-    for p in range(start, stop):
+    for p in rows[start:stop]:
         lobe = lobes.of[material[p]]
-        if not is_needed[p] or lobe < 0 or not lobes.is_told[lobe]:
+        if lobe < 0 or not lobes.is_told[lobe]:
             continue
         n = normal[p, 0], normal[p, 1], normal[p, 2]
         x, y, z = position[p, 0] - eye[0], position[p, 1] - eye[1], position[p, 2] - eye[2]
@@ -69,5 +69,6 @@ def take_off_lobes(
         is_needed: points that are asked. (points,) uint8
         sent: by them, written. (points, groups, 3) float32
     """
-    args = (surface.points, surface.material, lobes, light, np.ascontiguousarray(eye, np.float32), glances, is_needed)
-    for_shares(lambda start, stop: _take_off(*args, start, stop, sent), len(sent))
+    rows = np.flatnonzero(is_needed)
+    args = (surface.points, surface.material, lobes, light, np.ascontiguousarray(eye, np.float32), glances, rows)
+    for_shares(lambda start, stop: _take_off(*args, start, stop, sent), len(rows))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numba as nb
 import numpy as np
@@ -35,6 +35,15 @@ class Tables(NamedTuple):
     even: F32
     uneven: F32
     of: NDArray[np.int32]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Tables]) -> Self:
+        """Those of some materials, then of others."""
+        even, uneven = (np.concatenate([part[kind] for part in parts]) for kind in (0, 1))
+        num = np.array([[len(part.even), len(part.uneven)] for part in parts], np.int32)
+        first = np.repeat(np.cumsum(num, axis=0, dtype=np.int32) - num, [len(part.of) for part in parts], axis=0)
+        of = np.concatenate([part.of for part in parts])
+        return cls(even, uneven, np.where(of >= 0, of + first[:, None], of))
 
 
 def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
@@ -67,14 +76,12 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _send(rungs, points, material, vectors, tables, eye, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
-    """Evaluate points [start, stop). out: (points, groups, 3), written where needed"""
+def _send(rungs, points, material, vectors, tables, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Evaluate the points that are [start, stop) of rows. out: (points, groups, 3), written there"""
     position, normal, tangent, _ = points
     num_rungs = rungs.order.shape[0]
     turned_light = np.empty((3, num_rungs), np.float32)
-    for p in range(start, stop):
-        if not is_needed[p]:
-            continue
+    for p in rows[start:stop]:
         row, share, cosine_phi, sine_phi = _seen_from(position[p], normal[p], tangent[p], eye)
         re, im = np.float32(1), np.float32(0)
         for rung in range(num_rungs):
@@ -136,17 +143,26 @@ def _uneven(table, row, share, cosine_phi, sine_phi, channel, vector):  # type: 
     return total
 
 
-def send(surface: Surface, vectors: F32, tables: Tables, eye: F32, is_needed: NDArray[np.uint8]) -> F32:
+def send(
+    surface: Surface,
+    vectors: F32,
+    tables: Tables,
+    eye: F32,
+    is_needed: NDArray[np.uint8],
+    out: F32 | None = None,
+) -> F32:
     """Find what points send to an eye.
 
     Args:
         surface: whose points. vectors: t of each. (points, 3, K) float32
         tables: of all materials. eye: where it is. (3,) float32
-        is_needed: points that are evaluated; the others are black. (points,) uint8
+        is_needed: points that are evaluated. (points,) uint8
+        out: written where needed; None: the others are black.
     Returns:
         Radiance, by groups of terms as in `Tables`. (points, groups, 3) float32
     """
-    out = np.zeros((len(vectors), NUM_GROUPS, 3), np.float32)
+    found = np.zeros((len(vectors), NUM_GROUPS, 3), np.float32) if out is None else out
+    rows = np.flatnonzero(is_needed)
     args = (
         ladder(),
         surface.points,
@@ -154,10 +170,10 @@ def send(surface: Surface, vectors: F32, tables: Tables, eye: F32, is_needed: ND
         vectors,
         tables,
         np.ascontiguousarray(eye, np.float32),
-        is_needed,
+        rows,
     )
-    for_shares(lambda start, stop: _send(*args, start, stop, out), len(vectors))
-    return out
+    for_shares(lambda start, stop: _send(*args, start, stop, found), len(rows))
+    return found
 
 
 def send_numpy(surface: Surface, vectors: F32, tables: Tables, eye: F32, point: int) -> F64:

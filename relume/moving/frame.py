@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.look import Look
+from relume.moving.again import Part, Shown, resolve_some
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import Lobes, lobes_of
 from relume.moving.behind import Caught, lay_over, seen_behind
@@ -30,6 +31,14 @@ from relume.scene.model import Camera
 F32 = NDArray[np.float32]
 
 
+class Projected(NamedTuple):
+    """The terms of one material, and what the in-basis and lobes make of them."""
+
+    terms: Sequence[Mapping[str, Any]]
+    tables: Tables
+    lobes: Lobes
+
+
 class Materials(NamedTuple):
     """What materials send.
 
@@ -37,20 +46,24 @@ class Materials(NamedTuple):
         tables: of what the in-basis tells. lobes: of the rest.
         sends: whether a material sends anything of a group of terms. (materials, groups) bool
         covers: of materials whose every texel sends something else.
+        each: the terms of each, projected.
     """
 
     tables: Tables
     lobes: Lobes
     sends: NDArray[np.bool_]
     covers: Sequence[Cover]
+    each: Sequence[Projected]
 
     @classmethod
-    def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]]) -> Self:
-        """Project the terms of each, of a complete look."""
-        tables, lobes = tables_of(terms), lobes_of(terms)
+    def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Sequence[Projected] = ()) -> Self:
+        """Project the terms of each, of a complete look. before: what has been projected, material for material."""
+        known = {k: one for k, one in enumerate(before) if one.terms == terms[k]}
+        each = [known.get(k) or Projected(one, tables_of([one]), lobes_of([one])) for k, one in enumerate(terms)]
+        tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends, covers_of(terms))
+        return cls(tables, lobes, sends, covers_of(terms), each)
 
 
 class Wanted(NamedTuple):
@@ -69,16 +82,34 @@ class Wanted(NamedTuple):
     is_rough: bool
 
 
+class Sums(NamedTuple):
+    """What a frame was summed from.
+
+    Attributes:
+        glances: of points along their lobes. (points, 4) float32. sent: by points. (points, groups, 3) float32
+        at_vertices: both of vertices. towards_light: of vertices, see `Sent`.
+        radiance: along the rays. (rays, 3) float32
+    """
+
+    glances: F32
+    sent: F32
+    at_vertices: tuple[F32, F32]
+    towards_light: F32
+    radiance: F32
+
+
 class Frame(NamedTuple):
     """A finished one.
 
     Attributes:
         image: linear radiance. (height, width, 3) float32
         hides: how much of what is behind it, where the background is transparent, else None. (height, width) float32
+        sums: what it was summed from.
     """
 
     image: F32
     hides: F32 | None
+    sums: Sums
 
 
 def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, size: tuple[int, int]) -> Frame:
@@ -89,7 +120,8 @@ def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camer
         seen: by the rays of the camera. size: width and height in pixels.
     """
     (width, height), surface, light = size, transfer.surface, wanted.light
-    out = _radiance(transfer, wanted, seen, camera, height)
+    sums = _summed(transfer, wanted, seen, Part(seen.is_needed, seen.is_seen, None), camera, height)
+    out = sums.radiance
     if (wanted.gain != 1).any():
         out *= wanted.gain
     caught = _caught(transfer, wanted, seen)
@@ -98,25 +130,72 @@ def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camer
     out, hides = lay_over_glass(seen.panes, out), hide_less(seen.panes, hides)
     image = resolve(out, seen.owner, width * height).reshape(height, width, 3)
     if wanted.look.background.kind != "transparent":
-        return Frame(image, None)
-    return Frame(image, resolve(hides, seen.owner, width * height).reshape(height, width))
+        return Frame(image, None, sums)
+    return Frame(image, resolve(hides, seen.owner, width * height).reshape(height, width), sums)
 
 
-def _radiance(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, height: int) -> F32:
-    """What surfaces send along the rays. (rays, 3)"""
-    surface, (tables, lobes, sends, covers), arriving = transfer.surface, wanted.materials, wanted.arriving
-    eye = camera.to_world[:3, 3].astype(np.float32)
-    glances = glance(surface, transfer.sky_share, arriving.others, lobes, eye, seen.is_needed)
-    sky, sent_by_points = _sky_in(transfer, wanted.light), send(surface, arriving.total, tables, eye, seen.is_needed)
-    take_off_lobes(surface, lobes, sky, eye, glances, seen.is_needed, sent_by_points)
-    broad = at_vertices(surface, seen.is_seen, sent_by_points)
-    mirrored = Mirrored(lobes, sky, at_vertices(surface, seen.is_seen, glances))
+def only_materials_differ(before: Wanted, after: Wanted) -> bool:
+    """Whether two frames of one eye differ in what materials send alone, without any whose light comes otherwise."""
+    one, other = before.look, after.look
+    catchers = (material.catcher for look in (one, other) for material in look.materials.values())
+    return (
+        before.arriving is after.arriving
+        and before.light._replace(reflectances=after.light.reflectances) == after.light
+        and np.array_equal(before.gain, after.gain)
+        and one.background == other.background
+        and not any(catchers)
+        and not before.materials.covers
+        and not after.materials.covers
+    )
+
+
+def change(
+    transfer: MovingTransfer,
+    wanted: Wanted,
+    seen: Seen,
+    camera: Camera,
+    frame: Frame,
+    shown: Shown,
+    words: NDArray[np.uint32],
+) -> None:
+    """Bring a frame to what materials send now, where `only_materials_differ`.
+
+    Args:
+        transfer, seen, camera: as in `frame_of`. wanted: what is shown from now on.
+        frame: changed. words: its pixels, packed; changed too. (pixels,) uint32
+        shown: what of it shows those materials.
+    """
+    height, radiance, rays = len(frame.image), frame.sums.radiance, shown.part.rays
+    _summed(transfer, wanted, seen, shown.part, camera, height, frame.sums)
+    if (wanted.gain != 1).any():
+        radiance[rays] *= wanted.gain
+    resolve_some(radiance, seen.owner, shown, frame.image.reshape(-1, 3), words)
+
+
+def _summed(
+    transfer: MovingTransfer,
+    wanted: Wanted,
+    seen: Seen,
+    part: Part,
+    camera: Camera,
+    height: int,
+    into: Sums | None = None,
+) -> Sums:
+    """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
+    surface, materials, arriving = transfer.surface, wanted.materials, wanted.arriving
+    lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
+    glances, sent, (broad, along), towards, out = into or (None, None, (None, None), None, None)
+    glances = glance(surface, transfer.sky_share, arriving.others, lobes, eye, points, glances)
+    sky, sent = _sky_in(transfer, wanted.light), send(surface, arriving.total, materials.tables, eye, points, sent)
+    take_off_lobes(surface, lobes, sky, eye, glances, points, sent)
+    broad, along = at_vertices(surface, vertices, sent, broad), at_vertices(surface, vertices, glances, along)
+    towards = _towards_light(transfer, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
-    pixel_angle, towards = camera.yfov / height, _towards_light(transfer, arriving, seen)
-    out = combine(surface, seen, pixel_angle, Sent(broad, sends, towards), emission, mirrored)
+    pixel_angle, from_vertices = camera.yfov / height, Sent(broad, materials.sends, towards)
+    out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
     sight = Sight(eye, pixel_angle, seen)
-    show_texels(covers, surface, transfer.positions, sight, arriving.total, emission, out)
-    return out
+    show_texels(materials.covers, surface, transfer.positions, sight, arriving.total, emission, out)
+    return Sums(glances, sent, (broad, along), towards, out)
 
 
 def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:

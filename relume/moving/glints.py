@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import add_light, ladder
+from relume.basis.zernike import functions_along, ladder
 from relume.moving.basis.lobes import Lobes
 from relume.moving.basis.out_factors import NUM_ROWS
 from relume.moving.points.surface import Surface
@@ -54,14 +54,15 @@ def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _glance(rungs, points, material, sky, others, lobes, eye, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
-    """Look from points [start, stop) along their lobes. out: (points, 4), the sky's share, then others' radiance"""
+def _glance(rungs, points, material, sky, others, lobes, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Look along lobes from the points that are [start, stop) of rows. out: (points, 4), the sky's share, then others'
+    radiance"""
     position, normal, tangent, _ = points
-    wi, one = np.empty((2, 1), np.float32), np.ones((3, 1), np.float32)
-    scratch, functions = np.empty((6, 1), np.float32), np.empty((3, sky.shape[1]), np.float32)
-    for p in range(start, stop):
+    functions = np.empty(sky.shape[1], np.float32)
+    for p in rows[start:stop]:
         lobe = lobes.of[material[p]]
-        if not is_needed[p] or lobe < 0:
+        out[p] = 0
+        if lobe < 0:
             continue
         nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
@@ -74,22 +75,29 @@ def _glance(rungs, points, material, sky, others, lobes, eye, is_needed, start, 
         row, share = row_of(cosine)
         mean = lobes.mean[lobe, row] + share * (lobes.mean[lobe, row + 1] - lobes.mean[lobe, row])
         flat = math.sqrt(max(np.float32(1) - mean * mean, np.float32(0)))
-        wi[0, 0] = -flat * across / length if length > 0 else 0
-        wi[1, 0] = -flat * along / length if length > 0 else 0
-        functions[:] = 0
-        add_light(rungs, 1, wi, one, scratch, functions)
+        outward = -flat / length if length > 0 else np.float32(0)
+        functions_along(rungs, np.float32(outward * across), np.float32(outward * along), functions)
+        seen = np.float32(0)
         for k in range(sky.shape[1]):
-            out[p, 0] += functions[0, k] * sky[p, k]
+            seen += functions[k] * sky[p, k]
+        out[p, 0] = min(max(seen, np.float32(0)), np.float32(1))
         if not lobes.is_told[lobe]:
-            for k in range(sky.shape[1]):
-                for channel in range(3):
-                    out[p, 1 + channel] += functions[0, k] * others[p, channel, k]
-        out[p, 0] = min(max(out[p, 0], np.float32(0)), np.float32(1))
-        for channel in range(1, 4):
-            out[p, channel] = max(out[p, channel], np.float32(0))
+            for channel in range(3):
+                radiance = np.float32(0)
+                for k in range(sky.shape[1]):
+                    radiance += functions[k] * others[p, channel, k]
+                out[p, 1 + channel] = max(radiance, np.float32(0))
 
 
-def glance(surface: Surface, sky: F32, others: F32, lobes: Lobes, eye: F32, is_needed: NDArray[np.uint8]) -> F32:
+def glance(
+    surface: Surface,
+    sky: F32,
+    others: F32,
+    lobes: Lobes,
+    eye: F32,
+    is_needed: NDArray[np.uint8],
+    out: F32 | None = None,
+) -> F32:
     """Look from points along their lobes.
 
     Args:
@@ -98,10 +106,12 @@ def glance(surface: Surface, sky: F32, others: F32, lobes: Lobes, eye: F32, is_n
             (points, 3, K) float32
         lobes: of all materials. eye: where it is. (3,) float32
         is_needed: points that are asked. (points,) uint8
+        out: written where needed; None: the others have nothing.
     Returns:
         The share of the sky that is seen there, and the radiance of what hides it. (points, 4) float32
     """
-    out = np.zeros((len(sky), 4), np.float32)
+    found = np.zeros((len(sky), 4), np.float32) if out is None else out
+    rows = np.flatnonzero(is_needed)
     args = (
         ladder(),
         surface.points,
@@ -110,7 +120,7 @@ def glance(surface: Surface, sky: F32, others: F32, lobes: Lobes, eye: F32, is_n
         others,
         lobes,
         np.ascontiguousarray(eye, np.float32),
-        is_needed,
+        rows,
     )
-    for_shares(lambda start, stop: _glance(*args, start, stop, out), len(sky))
-    return out
+    for_shares(lambda start, stop: _glance(*args, start, stop, found), len(rows))
+    return found

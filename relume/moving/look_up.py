@@ -165,11 +165,10 @@ def _need(vertices, is_seen, is_needed):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
-def _spread(vertices, is_seen, values, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find what vertices [start, stop) take from points."""
-    for v in range(start, stop):
-        if not is_seen[v]:
-            continue
+def _spread(vertices, rows, values, start, stop, out):  # type: ignore[no-untyped-def]
+    """Find what the vertices that are [start, stop) of rows take from points."""
+    for v in rows[start:stop]:
+        out[v] = 0
         for k in range(vertices.point.shape[1]):
             w, point = vertices.weight[v, k], vertices.point[v, k]
             if w > 0:
@@ -177,16 +176,17 @@ def _spread(vertices, is_seen, values, start, stop, out):  # type: ignore[no-unt
                     out[v, c] += w * values[point, c]
 
 
-def at_vertices(surface: Surface, is_seen: NDArray[np.uint8], values: F32) -> F32:
+def at_vertices(surface: Surface, is_seen: NDArray[np.uint8], values: F32, out: F32 | None = None) -> F32:
     """Find what vertices take from the points that they follow from.
 
     Args:
-        surface: with both. is_seen: vertices that are asked about; the others get nothing. (vertices,) uint8
-        values: of points. (points, …) float32
+        surface: with both. is_seen: vertices that are asked about. (vertices,) uint8
+        values: of points. (points, …) float32. out: written where asked; None: the others get nothing.
     Returns:
         (vertices, …) float32
     """
     flat = values.reshape(len(values), -1)
-    out = np.zeros((len(is_seen), flat.shape[1]), np.float32)
-    for_shares(lambda start, stop: _spread(surface.vertices, is_seen, flat, start, stop, out), len(out))
-    return out.reshape(len(is_seen), *values.shape[1:])
+    found = np.zeros((len(is_seen), *values.shape[1:]), np.float32) if out is None else out
+    rows, flat_found = np.flatnonzero(is_seen), found.reshape(len(found), -1)
+    for_shares(lambda start, stop: _spread(surface.vertices, rows, flat, start, stop, flat_found), len(rows))
+    return found

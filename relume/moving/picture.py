@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
+from relume.moving.again import Shown, shown_of
 from relume.moving.arriving import Arriving, LightJob, roughly, wholly
 from relume.moving.behind import alpha_of
-from relume.moving.frame import Frame, Materials, Wanted, frame_of
+from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
@@ -23,10 +25,24 @@ from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
 from relume.scene.model import Camera
-from relume.views.resolve import encode_coverage, encode_pixels
+from relume.views.resolve import encode_coverage, encode_pixels, packed
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
+
+
+@dataclass
+class _Drawn:
+    """What was drawn last.
+
+    Attributes:
+        words: its pixels, packed as RGB9_E5; None where nobody has asked for them. (pixels,) uint32
+    """
+
+    wanted: Wanted
+    seen: Seen
+    frame: Frame
+    words: NDArray[np.uint32] | None = None
 
 
 class MovingPicture:
@@ -50,10 +66,12 @@ class MovingPicture:
         self._is_watched = is_watched
         self._is_rough = False  # what is shown was found quickly
         self._shown: tuple[Any, ...] | None = None
-        self._frame = Frame(np.zeros((view.height, view.width, 3), np.float32), None)
+        self._drawn: _Drawn | None = None
+        self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
         self._vectors: tuple[Light, Arriving] | None = None
+        self._quick: tuple[NDArray[np.uint8], Light, Arriving] | None = None  # found quickly, at points that are needed
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
         self.draws = True
         self._told: tuple[Light, Arriving, bool] | None = None
@@ -147,13 +165,33 @@ class MovingPicture:
         has_them = self._vectors is not None and self._vectors[0] == light
         return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
 
-    def _draw(self) -> Frame:
-        """The frame of what is shown, evaluated where that has not been done."""
-        if self._is_stale and self._look is not None:
-            seen = self._look_around()
-            wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-            self._frame, self._is_stale = frame_of(self._transfer, wanted, seen, self._camera, self._size), False
-        return self._frame
+    def _draw(self) -> _Drawn | None:
+        """What is shown, evaluated where that has not been done; None before there is a look."""
+        if not self._is_stale or self._look is None:
+            return self._drawn
+        seen, drawn = self._look_around(), self._drawn
+        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
+        self._is_stale = False
+        if drawn is not None and self._may_change(drawn, wanted, seen):
+            shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
+            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn))
+            drawn.wanted = wanted
+        else:
+            self._drawn = _Drawn(wanted, seen, frame_of(self._transfer, wanted, seen, self._camera, self._size))
+        return self._drawn
+
+    @staticmethod
+    def _may_change(drawn: _Drawn, wanted: Wanted, seen: Seen) -> bool:
+        return drawn.seen is seen and not len(seen.panes.ray) and only_materials_differ(drawn.wanted, wanted)
+
+    def _shown_of(self, before: Materials, after: Materials, seen: Seen) -> Shown:
+        """What shows materials that were edited; found once while a hand is on them."""
+        is_changed = np.array([one is not other for one, other in zip(before.each, after.each, strict=True)])
+        key = is_changed.tobytes()
+        if self._part is None or self._part[0] is not seen or self._part[1] != key:
+            num_pixels = self._size[0] * self._size[1]
+            self._part = seen, key, shown_of(self._transfer.surface, seen, is_changed, num_pixels)
+        return self._part[2]
 
     def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
         gain = np.array(gain_of(shown, self._solo), np.float32)
@@ -185,7 +223,7 @@ class MovingPicture:
     def _materials_of(self, shown: Look) -> Materials:
         terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
         if self._materials is None or self._materials[0] != terms:
-            self._materials = terms, Materials.of(terms)
+            self._materials = terms, Materials.of(terms, () if self._materials is None else self._materials[1].each)
             self._num_materials += 1
         return self._materials[1]
 
@@ -195,7 +233,10 @@ class MovingPicture:
         if self._is_rough:
             if self._vectors is not None and is_about(self._vectors[0], light):
                 return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
-            return roughly(transfer, light, np.flatnonzero(is_needed))
+            quick = self._quick
+            if quick is None or quick[0] is not is_needed or not is_about(quick[1], light):
+                self._quick = quick = is_needed, light, roughly(transfer, light, np.flatnonzero(is_needed))
+            return quick[2]
         if self._vectors is None or self._vectors[0] != light:
             self._vectors = light, wholly(transfer, light)
         return self._vectors[1]
@@ -206,7 +247,10 @@ class MovingPicture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame: the tiles one after another, row-major."""
-        image = self._draw().image
+        drawn = self._draw()
+        if drawn is not None and form == "rgb9e5" and list(tiles) == self.all_tiles():
+            return _words_of(drawn).tobytes()
+        image = self._image()
         parts = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
         return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
 
@@ -217,12 +261,17 @@ class MovingPicture:
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
-        hides = self._draw().hides
+        drawn = self._draw()
+        hides = None if drawn is None else drawn.frame.hides
         return None if hides is None else alpha_of(hides, for_display=for_display)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""
-        return self._draw().image
+        return self._image().copy()  # the next edit writes to it
+
+    def _image(self) -> F32:
+        drawn = self._draw()
+        return np.zeros((*self._size[::-1], 3), np.float32) if drawn is None else drawn.frame.image
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
         """What a pixel shows, and where its surface is.
@@ -230,12 +279,12 @@ class MovingPicture:
         Raises:
             ParameterError: it lies outside the picture.
         """
-        image = self._draw().image
+        image = self._image()
         height, width, _ = image.shape
         if not (0 <= x < width and 0 <= y < height):
             raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
         found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
-        found["radiance"] = image[y, x]
+        found["radiance"] = image[y, x].copy()
         if self._seen is None:
             return found
         seen, surface = self._seen[1], self._transfer.surface
@@ -263,3 +312,10 @@ class MovingPicture:
         raise EditNotSupportedError(
             self._transfer.method, "a brush over a curve; open a fixed view of the scene for it"
         )
+
+
+def _words_of(drawn: _Drawn) -> NDArray[np.uint32]:
+    """Its pixels, packed, from when somebody asks for them first."""
+    if drawn.words is None:
+        drawn.words = packed(drawn.frame.image.reshape(-1, 3))
+    return drawn.words

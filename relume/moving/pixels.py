@@ -39,11 +39,11 @@ class Mirrored(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _share_above(x):  # type: ignore[no-untyped-def]
-    """Approximate the share of a normal distribution above −x."""
+def _beyond(x):  # type: ignore[no-untyped-def]
+    """Approximate b, with 1 / (1 + b) the share of a normal distribution above −x."""
     if x > _ALL_ABOVE:
-        return np.float32(1)
-    return np.float32(1) / (np.float32(1) + math.exp(np.float32(-1.702) * max(x, np.float32(-20))))
+        return np.float32(0)
+    return math.exp(np.float32(-1.702) * max(x, np.float32(-20)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -66,7 +66,9 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     along = dx * outward[0] + dy * outward[1] + dz * outward[2]
     away = (rx * outward[0] + ry * outward[1] + rz * outward[2]) * (np.float32(-1) if along > 0 else np.float32(1))
     # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
-    above = min(_share_above(away / sigma) / _share_above(abs(along) / sigma), np.float32(1))
+    per = np.float32(1) / sigma
+    hidden, facing = _beyond(per * away), _beyond(per * abs(along))
+    above = min((np.float32(1) + facing) / (np.float32(1) + hidden), np.float32(1))
     for channel in range(3):
         light[channel] *= open_sky * mirrored.sky.gain[channel]
         for k in range(3):
@@ -112,7 +114,7 @@ def footprint_of(distance, pixel_angle, metre, along):  # type: ignore[no-untype
     return distance * pixel_angle * metre / math.sqrt(max(abs(along), _LEAST_SLANT))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _lean(textures, texture, place, footprint, tangents, corners, uv, n, outward, is_behind, scratch):  # type: ignore[no-untyped-def]
     """Look up where the normal n of a pixel leans. outward: of the face. is_behind: its other side is seen."""
     a, b, c = corners
@@ -129,17 +131,19 @@ def _lean(textures, texture, place, footprint, tangents, corners, uv, n, outward
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _combine(  # type: ignore[no-untyped-def]
-    surface, pixel_angle, hits, directions, vertex, weight, sent, sends, towards_light, emission, mirrored,
+    surface, pixel_angle, hits, directions, vertex, weight, sent, sends, towards_light, emission, mirrored, rows,
     start, stop, out,
 ):  # fmt: skip
-    """Sum what vertices and lobes send along the rays of pixels [start, stop), and what surfaces emit."""
+    """Sum what vertices and lobes send along the rays that are [start, stop) of rows, and what surfaces emit."""
     textures, uvs, tangents, faces, face_material, face_normal, uv_scale, normals = surface
     face, uv, distance = hits
     lobes = mirrored.lobes
     texture_value, light = np.empty(3, np.float32), np.empty(3, np.float32)
-    for p in range(start, stop):
+    for r in range(start, stop):
+        p = rows[r]
         f = face[p]
         if f < 0:
+            out[p, 0] = out[p, 1] = out[p, 2] = 0
             continue
         material = face_material[f]
         # tuples, and helpers that are inlined: arrays handed over would be counted as references, several times a ray
@@ -211,18 +215,22 @@ def combine(
     sent: Sent,
     emission: F32,
     mirrored: Mirrored,
+    rows: NDArray[np.int32] | None = None,
+    out: F32 | None = None,
 ) -> F32:
-    """Find the radiance along every ray that sees a surface; the others are black.
+    """Find the radiance along rays that see a surface; the others are black.
 
     Args:
         surface: that is seen. seen: what rays see of it.
         pixel_angle: angle that a pixel spans, radians.
         sent: by every vertex. mirrored: what lobes send besides.
         emission: radiance of each material's own, the mean over its surfaces. (materials, 3) float32
+        rows: rays that are asked; None: all. (n,) int32. out: written there; None: new.
     Returns:
         (rays, 3) float32
     """
-    out = np.zeros((len(seen.directions), 3), np.float32)
+    found = np.zeros((len(seen.directions), 3), np.float32) if out is None else out
+    asked = np.arange(len(found), dtype=np.int32) if rows is None else rows
     hits = (seen.hits.face, seen.hits.uv, seen.hits.distance)
     of_surface = (
         surface.textures, surface.uvs, surface.tangents, surface.faces, surface.face_material, surface.face_normal,
@@ -230,7 +238,7 @@ def combine(
     )  # fmt: skip
     args = (
         of_surface, np.float32(pixel_angle), hits, seen.directions, seen.vertex, seen.weight,
-        *sent, emission, mirrored,
+        *sent, emission, mirrored, asked,
     )  # fmt: skip
-    for_shares(lambda start, stop: _combine(*args, start, stop, out), len(out))
-    return out
+    for_shares(lambda start, stop: _combine(*args, start, stop, found), len(asked))
+    return found

@@ -116,6 +116,11 @@ def encode_pixels(pixels: F32, form: str) -> bytes:
         return pixels.tobytes()
     if form != "rgb9e5":
         raise ParameterError("format", form, "'rgb9e5' or 'f32'")
+    return packed(pixels).tobytes()
+
+
+def packed(pixels: F32) -> NDArray[np.uint32]:
+    """Pack pixels as RGB9_E5. pixels: radiance. (n, 3) float32"""
     out = np.empty(len(pixels), np.uint32)
     for_shares(lambda start, stop: _pack(pixels, start, stop, out), len(pixels))
-    return out.tobytes()
+    return out

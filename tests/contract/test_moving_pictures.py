@@ -2,7 +2,19 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, environment, exponent, light, lit, painted, transport
+from looks_of_pictures import (
+    EDITS,
+    LOBE,
+    drawn,
+    environment,
+    exponent,
+    light,
+    lit,
+    matt,
+    painted,
+    replaced,
+    transport,
+)
 from sessions import look_of, relative_rmse
 
 from relume.errors import CancelledError, ChunkDamagedError, NotFoundError, ParameterError
@@ -47,6 +59,25 @@ def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(
     picture.set_look(look_of(moving, lit()))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
+
+
+@pytest.mark.parametrize("change", [drawn, exponent(60.0), painted, matt, replaced], ids=lambda one: one.__name__)
+def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
+    """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
+    direct = transport(show="direct")
+    picture = seen(moving, direct)
+    picture.encode(picture.all_tiles(), "rgb9e5")
+    before = picture.image()
+    with monkeypatch.context() as nothing_whole:
+        nothing_whole.setattr("relume.moving.picture.frame_of", None)
+        picture.set_look(look_of(moving, lit(direct, change)))
+        assert picture.advance(None).changed
+    anew = seen(moving, direct, change)
+    np.testing.assert_array_equal(picture.image(), anew.image())
+    assert picture.encode(picture.all_tiles(), "rgb9e5") == anew.encode(anew.all_tiles(), "rgb9e5")
+    differs = (picture.image() != before).any(axis=2)
+    assert differs.any()
+    assert not differs.all()
 
 
 def test_a_picture_does_not_depend_on_where_its_eye_was(moving, aside):

@@ -1,9 +1,10 @@
 """The in-basis: orthonormal over the hemisphere, nested, and the kernel that sums light in it."""
 
+import numba as nb
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, functions_along, in_basis, ladder, num_functions
 from relume.light.triangles import TriangleLights
 from relume.points import Points
 from relume.project.light_vectors import light_vectors, light_vectors_numpy
@@ -72,3 +73,16 @@ def test_the_first_number_is_the_irradiance(scattered):
     np.testing.assert_allclose(
         np.sqrt(np.pi) * light_vectors(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
     )
+
+
+def test_functions_along_one_direction_are_all_functions():
+    wi, _ = hemisphere(6, 8)
+
+    @nb.njit
+    def along(rungs, x, y, out):
+        functions_along(rungs, x, y, out)
+
+    for one, expected in zip(wi, in_basis(wi), strict=True):
+        out = np.full(NUM_FUNCTIONS, np.nan, np.float32)
+        along(ladder(), np.float32(one[0]), np.float32(one[1]), out)
+        np.testing.assert_allclose(out, expected, atol=1e-5)

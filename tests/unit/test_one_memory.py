@@ -143,6 +143,8 @@ BOUNDED = {
     "basis/daubechies.py",
     "brdf/albedo.py",
     "brdf/curves.py",
+    "brdf/quadrature.py",
+    "brdf/symmetry.py",
     "brdf/terms/btf.py",
     "brdf/terms/measured.py",
     "btf/rings.py",

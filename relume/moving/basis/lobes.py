@@ -15,15 +15,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import TEXTURES
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_mirrored
-from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors
+from relume.moving.basis.out_factors import NUM_ROWS, cosines, of_white
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -54,15 +55,23 @@ class Lobes(NamedTuple):
     is_told: NDArray[np.bool_]
     of: NDArray[np.int32]
 
+    @classmethod
+    def joined(cls, parts: Sequence[Lobes]) -> Self:
+        """Those of some materials, then of others."""
+        first = np.cumsum([0, *(len(part.albedo) for part in parts)])
+        of = [part.of + np.where(part.of >= 0, row, 0) for part, row in zip(parts, first, strict=False)]
+        joined = cls(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        return joined._replace(of=np.concatenate(of).astype(np.int32))
+
 
 def is_narrow(term_document: Mapping[str, Any]) -> bool:
     """Whether the in-basis cannot tell a term."""
-    return out_factors(term_document).missed > NARROW
+    return of_white(term_document).missed > NARROW
 
 
 def _has_highlight(term_document: Mapping[str, Any]) -> bool:
     degree, bound = _DIRECTED
-    return out_factors(term_document).missed_by_degree[degree] > bound
+    return of_white(term_document).missed_by_degree[degree] > bound
 
 
 def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
@@ -120,31 +129,52 @@ def _about_mirror(num_spokes: int) -> tuple[F64, F64]:
     return away.reshape(-1, 3), area
 
 
+@lru_cache(maxsize=1)
+def _even_quadrature() -> tuple[Quadrature, F64]:
+    """Where isotropic terms are evaluated, and the moments about it."""
+    wi, wo, moments = _about_lobe(0.0, _SPOKES // 2)
+    return Quadrature(wi, wo), moments
+
+
+def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
+    """Spread directions about the mirror directions of eyes in all rows.
+
+    Args:
+        phi: φo of the eyes. num_spokes: of the directions about each.
+    Returns:
+        ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, alone, times what ωi goes away from the eye along the
+        surface, and times cos θi (rows, n, 3).
+    """
+    away, area = _about_mirror(num_spokes)
+    cosine, aside = cosines()[:, None], np.array([np.cos(phi), np.sin(phi), 0.0])
+    sine = np.sqrt(1 - cosine**2)
+    wo = sine * aside + cosine * [0, 0, 1]
+    across = np.broadcast_to([-np.sin(phi), np.cos(phi), 0.0], wo.shape)
+    wi = away @ np.stack([cosine * aside + sine * [0, 0, 1], across, cosine * [0, 0, 1] - sine * aside], axis=1)
+    weight = np.maximum(wi[..., 2], 0) * area
+    return wi, wo[:, None], weight[..., None] * np.stack([np.ones_like(weight), -(wi @ aside), wi[..., 2]], axis=-1)
+
+
+def _moments_of(document: Mapping[str, Any]) -> F64:
+    """∫ ρ cos θi dωi, and the same times the two parts of ωi, the mean over φo. (channels, rows, 3)"""
+    if of_white(document).is_isotropic:
+        quadrature, moments = _even_quadrature()
+        return np.asarray((quadrature.values(document)[..., None, :] @ moments)[..., 0, :])
+    eyes, times = np.arange(_EYES) * (2 * np.pi / _EYES), np.ones(_EYES)  # how many eyes each stands for
+    if is_mirrored(document):
+        eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
+    total = np.zeros((3, NUM_ROWS, 3))
+    for phi, share in zip(eyes, times / times.sum(), strict=True):
+        wi, wo, moments = _about_lobe(phi, _SPOKES)
+        total += share * np.einsum("rnc,rnk->crk", eval_brdf(document, wi, wo), moments, optimize=True)
+    return total
+
+
 @lru_cache(maxsize=_MOST_KNOWN)
 def _lobe_of(term_text: str) -> F64:
     """a of each channel, cos θm, and σ, in each row. (`NUM_ROWS`, 5)"""
-    document = json.loads(term_text)
-    is_even = out_factors(document).is_isotropic
-    eyes = np.arange(_EYES) * (2 * np.pi / _EYES)
-    times = np.ones(_EYES)  # how many eyes each stands for
-    if is_even:
-        eyes, times = eyes[:1], times[:1]
-    elif is_mirrored(document):
-        eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
-    away, area = _about_mirror(_SPOKES // 2 if is_even else _SPOKES)
-    cosine = cosines()[:, None]
-    sine = np.sqrt(1 - cosine**2)
-    sent, mean = np.zeros((NUM_ROWS, 3)), np.zeros((NUM_ROWS, 2))  # along the surface, away from the eye; the normal
-    for phi, share in zip(eyes, times / times.sum(), strict=True):
-        aside = np.array([np.cos(phi), np.sin(phi), 0.0])
-        wo = sine * aside + cosine * [0, 0, 1]
-        across = np.broadcast_to([-np.sin(phi), np.cos(phi), 0.0], wo.shape)
-        frame = np.stack([cosine * aside + sine * [0, 0, 1], across, cosine * [0, 0, 1] - sine * aside], axis=1)
-        wi = away @ frame  # (rows, directions, 3)
-        value = eval_brdf(document, wi, wo[:, None]) * (share * np.maximum(wi[..., 2], 0) * area)[..., None]
-        sent += value.sum(axis=1)
-        luminous = value.mean(axis=2)
-        mean += np.stack([-(luminous * (wi @ aside)).sum(axis=1), (luminous * wi[..., 2]).sum(axis=1)], axis=-1)
+    moments = _moments_of(json.loads(term_text))
+    sent, mean = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T, moments[..., 1:].mean(axis=0)
     reach = np.linalg.norm(mean, axis=1)
     length = reach / np.maximum(sent.mean(axis=1), 1e-30)
     tilt = mean[:, 1] / np.maximum(reach, 1e-30)

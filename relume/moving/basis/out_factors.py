@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, in_basis, ladder, num_functions
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_isotropic, is_mirrored
 from relume.moving.basis.symmetry import all_around
 
@@ -30,6 +31,7 @@ NUM_COLUMNS = 32  # over φo, where a term is not isotropic
 _RADII, _TURNS = 40, 96  # of the quadrature over the disc
 _LEAST_COSINE = 1e-3
 _MOST_KNOWN = 256
+_WHITE = [1.0, 1.0, 1.0]
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,14 @@ def out_factors(term_document: Mapping[str, Any]) -> OutFactors:
     Args:
         term_document: one term of a complete look.
     """
-    white = {**term_document, "color": [1.0, 1.0, 1.0], "texture": None}
-    known = _of_white(json.dumps(white, sort_keys=True))
+    known = of_white(term_document)
     color = np.asarray(term_document["color"], np.float32)
     return OutFactors(known.table * color[:, None], known.missed_by_degree)
+
+
+def of_white(term_document: Mapping[str, Any]) -> OutFactors:
+    """Project a term, its colour and texture left out."""
+    return _of_white(json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True))
 
 
 @lru_cache(maxsize=_MOST_KNOWN)
@@ -96,7 +102,8 @@ def _of_white(term_text: str) -> OutFactors:
     is_even = is_isotropic(document)
     is_quarter = not is_even and is_mirrored(document)
     num = 1 if is_even else NUM_COLUMNS // 4 + 1 if is_quarter else NUM_COLUMNS
-    table, whole = _projected(document, np.linspace(0, 2 * np.pi, NUM_COLUMNS + 1)[:num], is_even)
+    phi = np.linspace(0, 2 * np.pi, NUM_COLUMNS + 1)[:num]
+    table, whole = _projected_even(document) if is_even else _projected(document, phi)
     kept = np.cumsum((table**2).sum(axis=2), axis=-1)[..., [num_functions(n) - 1 for n in range(DEGREE + 1)]]
     missed = np.sqrt(np.clip(1 - kept / np.maximum(whole, 1e-30)[..., None], 0, 1))
     ends = np.where(np.isin(np.arange(num), (0, num - 1)), 0.5, 1.0) if is_quarter else np.ones(num)
@@ -105,20 +112,39 @@ def _of_white(term_text: str) -> OutFactors:
     return OutFactors(whole_table.astype(np.float32), tuple(by_degree.tolist()))
 
 
-def _projected(document: Mapping[str, Any], phi: F64, is_even: bool) -> tuple[F64, F64]:
-    """Project a term seen from all rows and some φo: factors (rows, columns, 3, K), energies (rows, columns)."""
+def _seen_from(phi: F64) -> F64:
+    """ωo of all rows, from some φo. (`NUM_ROWS`, columns, 3)"""
     cosine = np.broadcast_to(cosines()[:, None], (NUM_ROWS, len(phi)))
     sine = np.sqrt(1 - cosine**2)
-    wo = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
-    wi, weight, functions = _disc(is_even)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+
+
+@lru_cache(maxsize=1)
+def _even_quadrature() -> tuple[Quadrature, F64, F64]:
+    """Where isotropic terms are evaluated; weights (n,); weighed functions of the ladder's cosine parts, (n, rungs)."""
+    wi, weight, functions = _disc(is_half=True)
+    weighed = weight[:, None] * functions[:, ladder().cosine]
+    return Quadrature(wi, _seen_from(np.zeros(1))), weight, np.ascontiguousarray(weighed)
+
+
+def _projected_even(document: Mapping[str, Any]) -> tuple[F64, F64]:
+    """Project an isotropic term seen from all rows and φo = 0: factors (rows, 1, 3, K), energies (rows, 1)."""
+    quadrature, weight, weighed = _even_quadrature()
+    value = quadrature.values(document)  # (channels, rows, n)
+    table = np.zeros((NUM_ROWS, 1, 3, NUM_FUNCTIONS))
+    table[..., ladder().cosine] = np.swapaxes(value @ weighed, 0, 1)[:, None]
+    return table, np.broadcast_to(value**2 @ weight, (3, NUM_ROWS)).sum(axis=0)[:, None]
+
+
+def _projected(document: Mapping[str, Any], phi: F64) -> tuple[F64, F64]:
+    """Project a term seen from all rows and some φo: factors (rows, columns, 3, K), energies (rows, columns)."""
+    wo, (wi, weight, functions) = _seen_from(phi), _disc(is_half=False)
     table, whole = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS)), np.empty((NUM_ROWS, len(phi)))
     weighed = weight[:, None] * functions
-    together = NUM_ROWS if is_even else 1  # rows, as many as make arrays of some megabytes
-    for row in range(0, NUM_ROWS, together):
-        rows = slice(row, row + together)
-        value = np.moveaxis(eval_brdf(document, wi, wo[rows, :, None]), -1, -2)  # (rows, columns, 3, directions)
-        table[rows] = value @ weighed
-        whole[rows] = (value**2 @ weight).sum(axis=-1)
+    for row in range(NUM_ROWS):  # so many at once that arrays are of some megabytes
+        value = np.moveaxis(eval_brdf(document, wi, wo[row, :, None]), -1, -2)  # (columns, 3, directions)
+        table[row] = value @ weighed
+        whole[row] = (value**2 @ weight).sum(axis=-1)
     return table, whole
 
 

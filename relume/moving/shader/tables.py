@@ -104,7 +104,7 @@ def numbers_of(transfer: MovingTransfer, wanted: Wanted) -> Numbers:
 
 
 def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
-    tables, lobes, _, _ = wanted.materials
+    tables, lobes = wanted.materials.tables, wanted.materials.lobes
     return {
         "even": tables.even.reshape(-1, 4),
         "uneven": tables.uneven.reshape(-1, 4),
@@ -128,7 +128,7 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
     """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
     lobe, its normal map, whether it is a catcher, how many texels of its light vectors it needs; then the bits of its
     emission, and the image of that. (materials · (groups + 2), 4) int32, −1 for none"""
-    tables, lobes, sends, _ = materials
+    tables, lobes, sends = materials.tables, materials.lobes, materials.sends
     of_material = transfer.surface.textures.of_material
     out = np.full((len(sends), NUM_GROUPS + 2, 4), -1, np.int32)
     out[:, :NUM_GROUPS, :2] = tables.of

@@ -1,0 +1,101 @@
+"""Terms at pairs of directions that stay the same while their parameters change: what an edit leaves is kept.
+
+    f(ωi, ωo) = q(ωi, ωo) Π_c f_c(γ_c(ωi, ωo))
+
+The angles γ belong to the pairs, whatever the term. The quotient q knows only what a term fixes. An edit of a parameter
+or a curve changes functions of one angle alone; each is evaluated at a few thousand angles, once for all that ask, and
+read between them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.curves import curve_values
+from relume.brdf.evaluate import angles_numpy
+from relume.brdf.registry import TERMS
+from relume.brdf.term import F64, Angle
+
+F32 = NDArray[np.float32]
+Fixed = tuple[tuple[str, float | str], ...]  # from `Term.fixed_values`
+
+_STEPS = 4096  # of a curve, closest at both ends: highlights are narrow at 0, masking falls off at π/2
+
+
+class Quadrature:
+    """Pairs of directions.
+
+    Args:
+        wi, wo: local frame, unit, z = normal; they broadcast. (..., 3)
+    """
+
+    def __init__(self, wi: F64, wo: F64) -> None:
+        self.wi, self.wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
+        self.shape = self.wi.shape[:-1]
+
+    def values(self, term_document: Mapping[str, Any]) -> F64:
+        """Evaluate a term, its colour left out; `relume.brdf.evaluate.eval_brdf` is its oracle.
+
+        Args:
+            term_document: one term of a complete look.
+        Returns:
+            1/sr, no cosine. (channels, ...) float64, one channel where all three are alike.
+        """
+        declared = TERMS[term_document["model"]]
+        term, fixed = declared.settled(term_document), declared.fixed_values(term_document)
+        quotient = _quotient(self, declared.model, fixed)
+        given = json.dumps([term_document.get("params"), term_document.get("curves")], sort_keys=True)
+        curves = [_curve(declared.model, fixed, index, given) for index in range(len(term.curves))]
+        is_grey = len(quotient) == 1 and all((curve == curve[0]).all() for curve in curves)
+        num_channels = 1 if is_grey else 3
+        out = np.repeat(quotient, num_channels // len(quotient), axis=0)
+        for curve, values in zip(term.curves, curves, strict=True):
+            places = _places(self, curve.angle, curve.axes)
+            for channel in range(num_channels):
+                _multiply(places, values[channel], out[channel])
+        return out.reshape(num_channels, *self.shape)
+
+
+@lru_cache(maxsize=1)
+def _angles() -> F64:
+    """γ at which curves are evaluated, radians. (`_STEPS` + 1,)"""
+    return (np.pi / 4) * (1 - np.cos(np.linspace(0, np.pi, _STEPS + 1)))
+
+
+@lru_cache(maxsize=32)
+def _curve(model: str, fixed: Fixed, index: int, given: str) -> F64:
+    """A curve of a term at `_angles`: what is asked at one pair of directions after another. (3, `_STEPS` + 1)"""
+    term, (params, drawn) = TERMS[model].settled_by(fixed), json.loads(given)
+    document = {"model": model, **dict(fixed), "params": params, "curves": drawn}
+    return np.ascontiguousarray(curve_values(document, term.curves[index], _angles()))
+
+
+@lru_cache(maxsize=32)
+def _places(pairs: Quadrature, angle: Angle, axes: tuple[float, float, float]) -> F32:
+    """Where the angles of pairs lie among `_angles`. (pairs,)"""
+    gamma = angles_numpy(angle, pairs.wi, pairs.wo, axes).ravel()
+    return np.interp(gamma, _angles(), np.arange(_STEPS + 1)).astype(np.float32)
+
+
+@lru_cache(maxsize=32)
+def _quotient(pairs: Quadrature, model: str, fixed: Fixed) -> F64:
+    """The quotient of a term at pairs. (1 or 3, pairs)"""
+    found = TERMS[model].settled_by(fixed).quotients(*np.moveaxis(pairs.wi, -1, 0), *np.moveaxis(pairs.wo, -1, 0))
+    return np.ascontiguousarray(found, np.float64).reshape(len(found), -1)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _multiply(places, values, out):  # type: ignore[no-untyped-def]
+    """Multiply each pair by a curve, linear between its values."""
+    for n in range(out.shape[0]):
+        x = places[n]
+        first = min(np.int64(x), values.shape[0] - 2)
+        near = values[first]
+        out[n] *= near + np.float64(x - np.float32(first)) * (values[first + 1] - near)
