@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.moving.evaluate import tables_of
 from relume.moving.frame import Materials
 from relume.moving.points.lattice import Lattice, node_of, num_nodes
@@ -51,12 +51,17 @@ def test_light_vectors_survive_half_precision_whatever_their_size(size: float, n
     assert np.abs(found - truth[:, :, :num]).max() <= 1e-3 * np.abs(truth).max()
 
 
-def test_materials_need_the_functions_that_they_know() -> None:
+def test_materials_get_the_functions_that_they_know() -> None:
     bump, narrow = np.array([False, True, False, False]), {**LAMBERT, "model": "ggx", "params": {"alpha": 0.02}}
     materials = Materials.of([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
     total, others = tables.needed_functions(materials, bump)
     assert total.tolist() == [1, NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
     assert others.tolist() == [0, 0, 0, NUM_FUNCTIONS]
+    even = materials.tables.even.copy()
+    even[0, ..., np.flatnonzero(ladder().order == 2)[0]] = 0.1  # of degree 2
+    materials = materials._replace(tables=materials.tables._replace(even=even))
+    total, _ = tables.needed_functions(materials, bump)
+    assert total.tolist() == [num_functions(QUICK_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
 
 
 def test_slots_are_the_vertices_of_the_lattice() -> None:

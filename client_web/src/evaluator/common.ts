@@ -65,7 +65,7 @@ vec3 skyAt(ivec3 level, vec2 place) {
   float y = clamp(place.y * float(level.y) - 0.5, 0.0, float(level.y - 1));
   float left = floor(x), upper = floor(y), fx = x - left, fy = y - upper;
   int column = int(left) - level.z * int(floor(left / float(level.z)));
-  int beside = (column + 1) % level.z, row = int(upper), below = min(row + 1, level.y - 1);
+  int beside = column + 1 == level.z ? 0 : column + 1, row = int(upper), below = min(row + 1, level.y - 1);
   vec3 top = mix(skyTexel(level, row, column), skyTexel(level, row, beside), fx);
   return mix(top, mix(skyTexel(level, below, column), skyTexel(level, below, beside), fx), fy);
 }

@@ -24,6 +24,7 @@ F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
 _ROUGH = num_functions(QUICK_DEGREE)  # that are not nothing in what is found quickly
+_KEPT = np.array([1, _ROUGH, NUM_FUNCTIONS])  # how many are sent: a shader is written for each number
 _MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
@@ -147,8 +148,8 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
 
 
 def needed_functions(materials: Materials, has_map: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find how many functions of light vectors materials need: up to the degree that their tables know, all where a
-    normal map asks where light comes from.
+    """Find how many functions of light vectors materials get: at least up to the degree that their tables know, all
+    where a normal map asks where light comes from.
 
     Args:
         materials: what they send. has_map: whether each has a normal map. (materials,)
@@ -161,7 +162,7 @@ def needed_functions(materials: Materials, has_map: NDArray[np.bool_]) -> tuple[
     total = np.zeros(len(tables.of), np.int64)
     for k, of in enumerate(tables.of):
         degrees = [*of_even[of[:, 0][of[:, 0] >= 0]], *of_uneven[of[:, 1][of[:, 1] >= 0]]]
-        total[k] = num_functions(max(degrees)) if degrees else 0
+        total[k] = _KEPT[np.searchsorted(_KEPT, num_functions(max(degrees)))] if degrees else 0
     total[has_map] = NUM_FUNCTIONS
     others = np.zeros(len(total), np.int64)
     with_lobe = lobes.of >= 0
