@@ -3,7 +3,9 @@
 The editor on the Cornell box, 40k points, 640×480; the mouse drags round and round. Headless Chromium without a GPU
 draws by its software rasteriser, with one sample a pixel, on the same cores as everything else; a browser like that is
 given to the server by itself, whose pictures a second over the same drag stand beside (`server_fps`), as do the bytes
-that came over the network for each picture.
+that came over the network for each picture. So do seconds and bytes from opening the editor to the first picture that
+the browser drew (`first_s`, `first_bytes`), and the bytes of each frame while a hand turns the environment and once it
+rests (`turn_bytes`, `turned_bytes`).
 """
 
 from __future__ import annotations
@@ -22,7 +24,17 @@ from server.settings import Settings
 
 _NAME = "surface.canvas_fps"
 _READY_MS = 120_000
+_TURNS = 10
 _CHOOSE = "localStorage.setItem('relume.drawnBy', '{}')"
+
+_LOADED = (
+    "[performance.now(), performance.getEntriesByType('resource').reduce((sum, one) => sum + one.transferSize, 0)]"
+)
+_GRAPHICS = (
+    "(() => { const gl = new OffscreenCanvas(1, 1).getContext('webgl2');"
+    " const info = gl.getExtension('WEBGL_debug_renderer_info');"
+    " return gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER); })()"
+)
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -44,6 +56,8 @@ def measure(tiny: bool) -> list[Figure]:
         "size": list(size),
         "points": points,
         "bytes_a_picture": here["bytes"] / max(1, here["pictures"]),
+        **here["first"],
+        **here["turn"],
         "server_fps": there["fps"],
         "server_bytes_a_picture": there["bytes"] / max(1, there["pictures"]),
         "graphics": here["graphics"],
@@ -51,51 +65,85 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAME, here["fps"], "frames/s", context)]
 
 
+class _Received:
+    """What has come over the session since it was last cleared: the sizes of frames of each kind, and all bytes."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        self.frames: dict[str, list[int]] = {"picture": [], "tables": []}
+        self.num_bytes = 0
+
+    def count(self, message: Any) -> None:
+        self.num_bytes += len(message)
+        for kind, sizes in self.frames.items():
+            if isinstance(message, bytes) and f'"kind":"{kind}"'.encode() in message[:600]:
+                sizes.append(len(message))
+
+
 def _drag(browser: str, url: str, who: str, moves: int) -> dict[str, Any]:
-    """Turn the eye round and round, drawn by one of both."""
+    """Turn the eye round and round, drawn by one of both; then, where that is the browser, the environment."""
     from playwright.sync_api import sync_playwright
 
-    received = [0, 0]
-
-    def count(message: Any) -> None:
-        received[0] += isinstance(message, bytes) and b'"kind":"picture"' in message[:600]
-        received[1] += len(message)
-
+    received = _Received()
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=browser, args=ARGUMENTS)
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
-        page.on("websocket", lambda socket: socket.on("framereceived", count))
+        page.on("websocket", lambda socket: socket.on("framereceived", received.count))
         page.add_init_script(_CHOOSE.format(who))
         page.goto(url)
+        first = _first(page, received) if who == "browser" else {}
         page.locator(".exactness.is-exact").wait_for(timeout=_READY_MS)
         page.wait_for_timeout(1000)
         box: Any = page.locator(".picture canvas").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         page.mouse.move(x, y)
         page.mouse.down()
-        if who == "browser":  # what it draws with is compiled with the first picture
-            page.mouse.move(x + 20, y)
-            page.wait_for_function("() => window.relumeStats.drawnHere > 1", timeout=_READY_MS)
-            page.wait_for_timeout(1000)
         _turn(page, x, y, moves // 5)
-        received[:] = [0, 0]
+        received.clear()
         drawn, start = page.evaluate("[window.relumeStats.drawnHere, performance.now()]")
         _turn(page, x, y, moves)
         drawn_after, end = page.evaluate("[window.relumeStats.drawnHere, performance.now()]")
+        pictures = drawn_after - drawn if who == "browser" else len(received.frames["picture"])
+        found = {
+            "pictures": pictures,
+            "fps": 1e3 * pictures / (end - start),
+            "bytes": received.num_bytes,
+            "first": first,
+        }
         page.mouse.up()
-        graphics = page.evaluate(
-            "(() => { const gl = new OffscreenCanvas(1, 1).getContext('webgl2');"
-            " const info = gl.getExtension('WEBGL_debug_renderer_info');"
-            " return gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER); })()"
-        )
+        found["turn"] = _turn_environment(page, received) if who == "browser" else {}
+        found["graphics"] = page.evaluate(_GRAPHICS)
         chromium.close()
-    pictures = drawn_after - drawn if who == "browser" else received[0]
-    return {
-        "pictures": pictures,
-        "fps": 1e3 * pictures / (end - start),
-        "bytes": received[1],
-        "graphics": graphics,
-    }
+    return found
+
+
+def _first(page: Any, received: _Received) -> dict[str, float]:
+    """Seconds and bytes until the browser has drawn a picture, on the page's own clock."""
+    page.wait_for_function("() => window.relumeStats && window.relumeStats.drawnHere > 0", timeout=_READY_MS)
+    now_ms, loaded = page.evaluate(_LOADED)
+    return {"first_s": now_ms / 1e3, "first_bytes": loaded + received.num_bytes}
+
+
+def _turn_environment(page: Any, received: _Received) -> dict[str, float]:
+    """Drag the slider of its rotation, and let go: the largest frame meanwhile, and afterwards."""
+    slider = page.get_by_role("slider", name="Rotation").first
+    slider.scroll_into_view_if_needed()
+    page.wait_for_timeout(1000)
+    box: Any = slider.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    received.clear()
+    for k in range(_TURNS):
+        page.mouse.move(x + 2 * k, y)
+        page.wait_for_timeout(200)
+    meanwhile = max(received.frames["tables"], default=0)
+    received.clear()
+    page.mouse.up()
+    page.locator(".exactness.is-exact").wait_for(timeout=_READY_MS)
+    return {"turn_bytes": meanwhile, "turned_bytes": max(received.frames["tables"], default=0)}
 
 
 def _turn(page: Any, x: float, y: float, moves: int) -> None:

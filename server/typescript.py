@@ -92,7 +92,8 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 def generate_protocol() -> str:
     """Messages and bodies; the same models give the same text."""
     parts = [HEAD]
-    for name in ("SUBPROTOCOL", "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"):
+    limits = "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"
+    for name in ("SUBPROTOCOL", *limits, "SURFACE_LAYOUT"):
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
     for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):

@@ -11,6 +11,8 @@ export const MAX_VIEWS_SHOWN = 4;
 
 export const MAX_EYE_PIXELS = 2304000;
 
+export const SURFACE_LAYOUT = 2;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";
@@ -627,13 +629,14 @@ export interface StatusMessage {
   progress: number;
 }
 
-/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
+/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
 export interface SurfaceBody {
   functions: number;
   rows: number;
   columns: number;
   ladder: LadderBody;
   expansions: number[][];
+  first_points: number[];
   has_holes: boolean;
   arrays: string[];
 }

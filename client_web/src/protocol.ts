@@ -45,7 +45,7 @@ export type {
   TruthRequest,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
-export { MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL } from "./protocol.gen";
+export { MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

@@ -26,6 +26,8 @@ MAX_MESSAGE_BYTES = 64 * 1024
 MAX_FRAMES_IN_FLIGHT = 2
 MAX_VIEWS_SHOWN = 4
 MAX_EYE_PIXELS = 1920 * 1200
+# of GET /api/bakes/{id}/surface/…, kept for ever: clients name it, lest what an earlier release gave be taken for it
+SURFACE_LAYOUT = 2
 
 Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
 Name = Annotated[str, Field(min_length=1, max_length=256)]

@@ -19,13 +19,15 @@ class LadderBody(Body):
 
 class SurfaceBody(Body):
     """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
-    `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not
-    everywhere, which the arrays do not say: pictures of the server show it."""
+    `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET
+    /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say:
+    pictures of the server show it."""
 
     functions: int
     rows: int
     columns: int
     ladder: LadderBody
     expansions: list[list[float]]
+    first_points: list[int]
     has_holes: bool
     arrays: list[str]

@@ -1,11 +1,14 @@
 """What goes to a shader: how many functions a table needs, light vectors in half precision, textures that fit."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
-from relume.moving.arriving import Arriving
 from relume.moving.evaluate import tables_of
+from relume.moving.frame import Materials
+from relume.moving.points.lattice import Lattice, node_of, num_nodes
 from relume.moving.points.surface import Textures
 from relume.moving.shader import geometry, tables
 
@@ -36,25 +39,50 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
-def test_light_vectors_survive_half_precision_whatever_their_size(size: float) -> None:
-    vectors = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = tables._light(Arriving(vectors, -vectors), has_narrow=True, is_rough=False)
-    for name, truth in (("vectors", vectors), ("others", -vectors)):
-        scale, texels = sent[f"{name}_scale"][0]
-        assert texels == NUM_FUNCTIONS / 4
-        found = sent[name].astype(np.float64).reshape(vectors.shape) * float(scale)
-        assert np.abs(found - truth).max() <= 1e-3 * np.abs(truth).max()
-    assert "others" not in tables._light(Arriving(vectors, vectors), has_narrow=False, is_rough=False)
+@pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
+def test_light_vectors_survive_half_precision_whatever_their_size(size: float, num: int) -> None:
+    truth = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
+    sent = tables._light("vectors/4", truth, num)
+    scale, told = sent["vectors/4/scale"][0]
+    assert told == num
+    numbers = sent["vectors/4"].astype(np.float64).reshape(50, -1)
+    assert numbers.shape[1] - 3 * num in range(4)  # whole texels
+    found = numbers[:, : 3 * num].reshape(50, 3, num) * float(scale)
+    assert np.abs(found - truth[:, :, :num]).max() <= 1e-3 * np.abs(truth).max()
 
 
-def test_what_was_found_quickly_is_sent_up_to_its_degree() -> None:
-    vectors = np.zeros((5, 3, NUM_FUNCTIONS), np.float32)
-    num = num_functions(QUICK_DEGREE)
-    vectors[:, :, :num] = 1
-    sent = tables._light(Arriving(vectors, vectors), has_narrow=False, is_rough=True)
-    assert sent["vectors"].reshape(5, 3, -1).shape == (5, 3, 16)  # as much as holds all of them
-    assert (sent["vectors"].reshape(5, 3, -1) > 0).sum() == 5 * 3 * num
-    assert sent["vectors_scale"][0, 1] == 4
+def test_materials_get_the_functions_that_they_know() -> None:
+    bump, narrow = np.array([False, True, False, False]), {**LAMBERT, "model": "ggx", "params": {"alpha": 0.02}}
+    materials = Materials.of([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
+    total, others = tables.needed_functions(materials, bump)
+    assert total.tolist() == [1, NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
+    assert others.tolist() == [0, 0, 0, NUM_FUNCTIONS]
+    even = materials.tables.even.copy()
+    even[0, ..., np.flatnonzero(ladder().order == 2)[0]] = 0.1  # of degree 2
+    materials = materials._replace(tables=materials.tables._replace(even=even))
+    total, _ = tables.needed_functions(materials, bump)
+    assert total.tolist() == [num_functions(QUICK_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
+
+
+def test_slots_are_the_vertices_of_the_lattice() -> None:
+    rows = np.array([[1, 3], [0, 2], [1, 0], [0, 0]], np.uint8)
+    counts = num_nodes(rows).ravel()
+    first = (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
+    node = np.random.default_rng(SEED).integers(0, 9, int(counts.sum())).astype(np.uint32)
+    slots = geometry.slots_of(Lattice(rows, first, node))
+    narrow = node[[0, 1, 2, *(first[2, 0] + np.arange(3))]]
+    assert len(slots.vertex) == 10 + 6 + len(np.unique(narrow))
+    for face, side in np.argwhere(rows > 0):
+        r, own, begin = int(rows[face, side]), slots.sides[face, side], int(first[face, side])
+        assert own[3] == r
+        for i, j in itertools.product(range(r + 1), repeat=2):
+            if i + j > r:
+                continue
+            slot = own[0] + node_of(r, i, j) if r > 1 else own[[0, 2, 1][node_of(r, i, j)]]
+            assert slots.vertex[slot] == node[begin + node_of(r, i, j)]
+    assert (slots.sides[1, 0] == slots.sides[1, 1]).all()  # a side without any has what the other has
+    assert (slots.sides[2, 1] == slots.sides[2, 0]).all()
+    assert not slots.sides[3].any()
 
 
 def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:

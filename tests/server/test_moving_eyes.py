@@ -280,7 +280,7 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     of_eye(session, 1)
     session.send(type="evaluate", by="browser")
     first = arrays_in(tables_of(session))
-    assert {"even", "materials", "vectors", "sky"} <= set(first)
+    assert {"even", "materials", "vectors/0", "sky"} <= set(first)
     session.send(**eye(view, 2, 0.4), rest="stay")
     assert arrays_in(tables_of(session)) == {}
     session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
@@ -300,7 +300,10 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     assert len(arrays["sky_share"].content) == num_points * found["functions"] * 2
     corners = np.frombuffer(arrays["corners"].content, np.uint32).reshape(-1, 4)
     assert corners[:, :3].max() < len(arrays["positions"].content) // 16
-    assert np.frombuffer(arrays["nodes"].content, np.uint32).max() < len(arrays["normals"].content) // 16
+    sides = np.frombuffer(arrays["sides"].content, np.uint32).reshape(-1, 4)
+    assert (len(sides), sides[:, :3].max() < len(arrays["normals"].content) // 8) == (2 * len(corners), True)
+    first = found["first_points"]
+    assert (first[0], first[-1], first == sorted(first)) == (0, num_points, True)
 
 
 def test_there_are_no_other_arrays_and_none_of_fixed_views(
@@ -322,7 +325,7 @@ def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Sess
         pass
     for _ in range(2):
         session.send(type="evaluate", by="browser")
-        assert "vectors" in arrays_in(tables_of(session))
+        assert "vectors/0" in arrays_in(tables_of(session))
         session.send(type="evaluate", by="server")
         while (frame := session.frame()).header["kind"] != "picture":
             pass

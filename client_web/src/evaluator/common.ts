@@ -34,11 +34,26 @@ int rowOf(float cosine, out float share) {
 }
 `;
 
-/** Where a direction lies in equirectangular maps. */
+/** Where a unit direction lies in equirectangular maps: arc functions by polynomials of Abramowitz and Stegun
+ * (4.4.46, 4.4.47), at most 1e-5 radians off: those of the language are what software pays most for in a background. */
 export const PLACE = `
 uniform float uTurn;
 const float PI = 3.14159265358979;
-vec2 placeOf(vec3 d) { return vec2(atan(d.z, d.x) * 0.5 / PI + uTurn, 0.5 - asin(clamp(d.y, -1.0, 1.0)) / PI); }
+float arcTangent(float y, float x) {
+  vec2 size = abs(vec2(x, y));
+  float ratio = min(size.x, size.y) / max(max(size.x, size.y), 1e-30), q = ratio * ratio;
+  float angle = ratio * (0.9998660 + q * (-0.3302995 + q * (0.1801410 + q * (-0.0851330 + q * 0.0208351))));
+  angle = size.y > size.x ? 0.5 * PI - angle : angle;
+  angle = x < 0.0 ? PI - angle : angle;
+  return y < 0.0 ? -angle : angle;
+}
+float arcCosine(float x) {
+  float size = min(abs(x), 1.0);
+  float angle = sqrt(1.0 - size) * (1.5707963050 + size * (-0.2145988016 + size * (0.0889789874 + size * (-0.0501743046 +
+    size * (0.0308918810 + size * (-0.0170881256 + size * (0.0066700901 - 0.0012624911 * size)))))));
+  return x < 0.0 ? PI - angle : angle;
+}
+vec2 placeOf(vec3 d) { return vec2(arcTangent(d.z, d.x) * 0.5 / PI + uTurn, arcCosine(d.y) / PI); }
 `;
 
 /** The light of a level of a map: bilinear, round about in u. A level is first texel, height, width. */
@@ -50,7 +65,7 @@ vec3 skyAt(ivec3 level, vec2 place) {
   float y = clamp(place.y * float(level.y) - 0.5, 0.0, float(level.y - 1));
   float left = floor(x), upper = floor(y), fx = x - left, fy = y - upper;
   int column = int(left) - level.z * int(floor(left / float(level.z)));
-  int beside = (column + 1) % level.z, row = int(upper), below = min(row + 1, level.y - 1);
+  int beside = column + 1 == level.z ? 0 : column + 1, row = int(upper), below = min(row + 1, level.y - 1);
   vec3 top = mix(skyTexel(level, row, column), skyTexel(level, row, beside), fx);
   return mix(top, mix(skyTexel(level, below, column), skyTexel(level, below, beside), fx), fy);
 }
@@ -80,12 +95,27 @@ vec3 alongLobe(int of, float share, vec3 n, vec3 d, out vec3 shape) {
 export const albedoOf = (of: string) =>
   `mix(texelFetch(uLobes, at(${of}), 0).rgb, texelFetch(uLobes, at(${of} + ${GROUPS + 1}), 0).rgb, share)`;
 
-/** What lies behind surfaces: a map, or one colour where its gain is nothing. */
-export const BEHIND = `
+/** What lies behind surfaces: a map, or one colour. */
+export const behindBy = (isMap: boolean) =>
+  isMap
+    ? `
 uniform sampler2D uBackground;
 uniform vec3 uBackgroundGain;
+vec3 behind(vec3 d) { return uBackgroundGain * textureLod(uBackground, placeOf(d), 0.0).rgb; }
+`
+    : `
 uniform vec3 uBackgroundColor;
-vec3 behind(vec3 d) {
-  return uBackgroundColor + uBackgroundGain * textureLod(uBackground, placeOf(d), 0.0).rgb;
-}
+vec3 behind(vec3 d) { return uBackgroundColor; }
 `;
+
+/** Texels [start, end) of an array as rectangles of its rows: left, top, width, height. */
+export function rectanglesOf(start: number, end: number): [number, number, number, number][] {
+  const [first, last] = [Math.ceil(start / WIDTH), Math.floor(end / WIDTH)];
+  if (first > last) return [[start % WIDTH, last, end - start, 1]];
+  const parts: [number, number, number, number][] = [
+    [start % WIDTH, first - 1, first * WIDTH - start, 1],
+    [0, first, WIDTH, last - first],
+    [0, last, end - last * WIDTH, 1],
+  ];
+  return parts.filter(([, , width, height]) => width > 0 && height > 0);
+}

@@ -1,11 +1,12 @@
-/** Draws moving views of one bake: points, then vertices, then pixels; what it holds of a look comes in tables. */
+/** Draws moving views of one bake: points, then slots, then pixels; what it holds of a look comes in tables. */
 import { Program } from "../picture/gl";
 import type { FrameHeader, SurfaceBody } from "../protocol";
-import { COVER, GROUPS, MATERIAL, WIDTH } from "./common";
-import { pointShader, vertexShader } from "./pointShader";
+import { COVER, rectanglesOf } from "./common";
+import { classesOf, layersOf, readMaterials, type FaceClass, type Material } from "./materials";
+import { pointShader, slotShader } from "./pointShader";
 import { read } from "./reading";
 import { isSoftware } from "./software";
-import { backgroundShader, CORNERS, surfaceShader, WORDS } from "./surfaceShader";
+import { backgroundShader, cornerShader, surfaceShader, wordsShader, type PictureFeatures } from "./surfaceShader";
 import { Images, Values } from "./targets";
 import { BYTES, Texels, type Kind } from "./texels";
 
@@ -29,22 +30,21 @@ export interface Drawn {
 /** Numbers a texel of what never changes; the server says only what there is. */
 const KEPT: Record<string, [Kind, number]> = {
   corners: ["uint32", 4],
-  lattice: ["uint32", 4],
+  sides: ["uint32", 4],
   facing: ["float32", 4],
   positions: ["float32", 4],
-  nodes: ["uint32", 1],
-  normals: ["float32", 4],
+  normals: ["float16", 4],
   points: ["uint32", 4],
-  weights: ["float32", 4],
+  weights: ["float16", 4],
   places: ["float32", 4],
-  point_normals: ["float32", 4],
-  tangents: ["float32", 4],
+  point_normals: ["float16", 4],
+  tangents: ["float16", 4],
   sky_share: ["float16", 4],
   uvs: ["float32", 4],
   texels: ["float16", 4],
   levels: ["uint32", 4],
 };
-const SAMPLES = 4; // a pixel; a processor that draws has no time for them
+const SAMPLES = 4; // a pixel
 const NEAREST = 1e-4; // of the size of the scene, to the nearest that is seen
 const FARTHEST = 100;
 
@@ -54,21 +54,28 @@ const uniform = (name: string) => `u${name.replace(/(^|_)(.)/g, (_, __, letter: 
 export class Evaluator {
   private readonly gl: WebGL2RenderingContext;
   private readonly texels: Texels;
-  private readonly programs: { background: Program; words: Program };
+  /** A processor draws, which has no time for several samples a pixel. */
+  readonly isSoftware: boolean;
   private readonly samples: number;
   private readonly compiled = new Map<string, Program>();
-  private readonly hasTextures: boolean;
-  private hasGroups = false;
   private readonly ofPoints: Values;
-  private readonly ofVertices: Values;
+  private readonly ofSlots: Values;
+  /** The material of each face. */
+  private readonly faceMaterial: Uint32Array;
   private readonly size: number;
   private images: Images | null = null;
   private numbers: Tables | null = null;
+  private materials: Material[] = [];
+  private faces: (FaceClass & { buffer: WebGLBuffer })[] = [];
+  private layers: number[] = [0];
+  /** What materials were read from. */
+  private rows = { materials: new Uint8Array(), lobes: new Uint8Array() };
   private sky = new Uint8Array();
   private blurred = new Uint8Array();
   /** Which of both lies behind surfaces. */
   private map = new Uint8Array();
-  private scales = { vectors: [1, 0], others: [1, 0] };
+  /** By how much light vectors were divided, and how many functions they have, by their names. */
+  private readonly scales = new Map<string, readonly number[]>();
 
   /** Throws where this browser cannot draw it. */
   constructor(
@@ -80,25 +87,34 @@ export class Evaluator {
     if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("this browser draws no floating-point images");
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.texels = new Texels(gl);
-    for (const [name, bytes] of arrays) {
-      const kept = KEPT[name];
-      if (kept !== undefined) this.texels.put(name, ...kept, bytes);
-    }
-    this.hasTextures = arrays.has("texels");
-    this.samples = isSoftware(gl) ? 0 : SAMPLES;
+    for (const [name, bytes] of arrays) this.keep(name, bytes);
+    this.isSoftware = isSoftware(gl);
+    this.samples = this.isSoftware ? 0 : SAMPLES;
     const count = (name: string) => this.texels.count(name);
-    this.programs = {
-      background: new Program(gl, COVER, backgroundShader(this.samples === 0)),
-      words: new Program(gl, COVER, WORDS),
-    };
     this.ofPoints = new Values(gl, count("places"));
-    this.ofVertices = new Values(gl, count("normals"));
+    this.ofSlots = new Values(gl, count("normals"));
+    this.faceMaterial = wordsOf(arrays.get("corners") ?? new Uint8Array()).filter((_, index) => index % 4 === 3);
     this.size = sizeOf(arrays.get("positions") ?? new Uint8Array());
+  }
+
+  /** Keep an array of what never changes. */
+  keep(name: string, bytes: Uint8Array): void {
+    const kept = KEPT[name];
+    if (kept !== undefined) this.texels.put(name, ...kept, bytes);
   }
 
   /** Whether there is a look to be drawn. */
   get isReady(): boolean {
-    return this.numbers !== null && !this.gl.isContextLost();
+    return this.numbers !== null && !this.lacksSkyShare && !this.isLost;
+  }
+
+  get isLost(): boolean {
+    return this.gl.isContextLost();
+  }
+
+  /** Whether the look has lobes, which ask for an array that is not there yet. */
+  get lacksSkyShare(): boolean {
+    return this.layers.includes(3) && this.texels.count("sky_share") === 0;
   }
 
   /** Give the context back: a browser has few of them. */
@@ -111,14 +127,14 @@ export class Evaluator {
     let start = 0;
     for (const { name, dtype, shape } of tables.arrays) {
       const bytes = payload.subarray(start, (start += shape[0] * shape[1] * BYTES[dtype]));
-      if (name === "vectors_scale" || name === "others_scale") {
-        this.scales[name === "vectors_scale" ? "vectors" : "others"] = [...new Float32Array(bytes.slice().buffer)];
+      if (name.endsWith("/scale")) {
+        this.scales.set(name, [...new Float32Array(bytes.slice().buffer)]);
         continue;
       }
       if (name === "background") this.blurred = bytes.slice();
       else this.texels.put(name, name === "sky" ? "rgb9e5" : dtype, shape[1], bytes);
       if (name === "sky") this.sky = bytes.slice();
-      if (name === "materials") this.hasGroups = sendsByGroups(new Int32Array(bytes.slice().buffer));
+      if (name === "materials" || name === "lobes") this.rows[name] = bytes.slice();
     }
     const map = tables.background === "blurred" ? this.blurred : this.sky;
     if (isMap(tables) && map !== this.map) {
@@ -126,101 +142,145 @@ export class Evaluator {
       this.texels.putMap("background", width, height, map);
       this.map = map;
     }
+    this.takeMaterials();
     this.numbers = tables;
+  }
+
+  /** What materials make use of, and which faces show what. */
+  private takeMaterials(): void {
+    const { gl, rows, scales } = this;
+    const [of, lobes] = [new Int32Array(rows.materials.buffer), new Float32Array(rows.lobes.buffer)];
+    const before = JSON.stringify(this.materials.map(({ pixels }) => pixels));
+    this.materials = readMaterials(of, lobes, this.surface.rows, (name, k) => scales.get(`${name}/${k}/scale`)?.[1] ?? 0);
+    this.layers = layersOf(this.materials);
+    if (JSON.stringify(this.materials.map(({ pixels }) => pixels)) === before) return;
+    for (const { buffer } of this.faces) gl.deleteBuffer(buffer);
+    this.faces = classesOf(this.materials, this.faceMaterial).map((one) => {
+      const buffer = gl.createBuffer();
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, one.corners, gl.STATIC_DRAW);
+      return { ...one, buffer };
+    });
   }
 
   /** The picture from an eye; throws where the context was lost. */
   async draw(camera: Camera, width: number, height: number): Promise<Drawn> {
     const { gl, numbers } = this;
     if (numbers === null) throw new Error("there is no look yet");
-    if (this.images?.width !== width || this.images.height !== height) {
+    const hides = numbers.background === "transparent";
+    if (this.images?.width !== width || this.images.height !== height || this.images.hides !== hides) {
       this.images?.dispose();
-      this.images = new Images(gl, width, height, this.samples);
+      this.images = new Images(gl, width, height, this.samples, hides);
     }
     const images = this.images;
     gl.disable(gl.DEPTH_TEST);
     this.drawPoints(camera, numbers);
-    this.drawVertices();
+    this.drawSlots();
     this.drawPixels(camera, numbers, images);
     if (images.radiance !== null) this.drawWords(images, images.radiance);
-    const [words, hides] = await read(gl, images.words, numbers.background === "transparent" ? 2 : 1, width, height);
+    const [words, hiding] = await read(gl, images.words, hides ? 2 : 1, width, height);
     if (gl.isContextLost() || words === undefined) throw new Error("the graphics context was lost");
-    return { width, height, words, hides: hides?.filter((_, index) => index % 4 === 0) ?? null };
+    return { width, height, words, hides: hiding?.filter((_, index) => index % 4 === 0) ?? null };
   }
 
   private drawPoints(camera: Camera, numbers: Tables): void {
-    const { gl } = this;
-    const features = { uneven: this.texels.count("uneven") > 0, lobes: this.hasLobes, maps: this.hasTextures };
-    const made = this.program(features, () => new Program(gl, COVER, pointShader(this.surface, features)));
-    const program = this.use(made, ["vectors", "others", "sky_share", "places", "point_normals", "tangents", "even", "uneven", "lobes", "materials", "sky"]);
-    gl.uniform1i(program.at("uNumPoints"), this.texels.count("places"));
-    gl.uniform1i(program.at("uStride"), this.scales.vectors[1] as number);
-    gl.uniform1f(program.at("uScale"), this.scales.vectors[0] as number);
-    gl.uniform1i(program.at("uOthersStride"), this.scales.others[1] as number);
-    gl.uniform1f(program.at("uOthersScale"), this.scales.others[0] as number);
-    this.saySky(program, numbers);
-    gl.uniform3fv(program.at("uEye"), placeOf(camera));
-    this.cover(this.ofPoints.buffer, WIDTH, this.ofPoints.rows);
+    const { gl, layers, surface } = this;
+    this.ofPoints.begin(layers);
+    gl.enable(gl.SCISSOR_TEST);
+    this.materials.forEach(({ points, tables, lobe }, k) => {
+      const [first, end] = [surface.first_points[k] as number, surface.first_points[k + 1] as number];
+      if (first === end) return;
+      const made = this.program({ points, layers }, () => new Program(gl, COVER, pointShader(surface, points, layers)));
+      const program = this.use(made, ["sky_share", "places", "point_normals", "tangents", "even", "uneven", "lobes", "sky"]);
+      this.bindVectors(program, "vectors", k, 8);
+      this.bindVectors(program, "others", k, 9);
+      gl.uniform1i(program.at("uFirst"), first);
+      gl.uniform2iv(program.at("uTables"), tables);
+      gl.uniform1i(program.at("uLobe"), lobe);
+      gl.uniform3fv(program.at("uEye"), placeOf(camera));
+      this.saySky(program, numbers);
+      for (const rectangle of rectanglesOf(first, end)) {
+        gl.scissor(...rectangle);
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+      }
+    });
+    gl.disable(gl.SCISSOR_TEST);
   }
 
-  private drawVertices(): void {
+  private bindVectors(program: Program, name: string, material: number, unit: number): void {
     const { gl } = this;
-    const layers = [0, ...(this.hasGroups ? [1] : []), ...(this.hasGroups || this.hasTextures ? [2] : []), ...(this.hasLobes ? [3] : [])];
-    const made = this.program({ layers }, () => new Program(gl, COVER, vertexShader(layers)));
+    const array = `${name}/${material}`;
+    this.texels.bind(array, unit);
+    gl.uniform1i(program.at(uniform(name)), unit);
+    gl.uniform1f(program.at(name === "vectors" ? "uScale" : "uOthersScale"), this.scales.get(`${array}/scale`)?.[0] ?? 1);
+  }
+
+  private drawSlots(): void {
+    const { gl, layers } = this;
+    const made = this.program({ slots: layers }, () => new Program(gl, COVER, slotShader(layers)));
     const program = this.use(made, ["points", "weights"]);
     this.bindValues(program, this.ofPoints, 2);
-    gl.uniform1i(program.at("uNumVertices"), this.texels.count("normals"));
-    this.cover(this.ofVertices.buffer, WIDTH, this.ofVertices.rows);
+    this.ofSlots.begin(layers);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   private drawPixels(camera: Camera, numbers: Tables, images: Images): void {
     const { gl } = this;
-    const { width, height } = images;
+    const { width, height, hides } = images;
     const [half, direct] = [Math.tan(camera.yfov / 2), this.samples === 0];
     const [across, up] = [(half * width) / height, direct ? -half : half]; // words have their top row first
     const [right, above, back] = [0, 1, 2].map((k) => [0, 1, 2].map((row) => camera.to_world[4 * row + k] as number)) as [number[], number[], number[]];
     const scaled = (axis: number[], by: number) => axis.map((value) => value * by);
+    const features: PictureFeatures = { map: isMap(numbers), hides, direct };
 
-    const features = { groups: this.hasGroups, textures: this.hasTextures, lobes: this.hasLobes, catchers: this.texels.count("unhidden") > 0, direct };
-    const made = this.program(features, () => new Program(gl, CORNERS, surfaceShader(this.surface, features)));
-    const program = this.use(made, ["corners", "lattice", "facing", "nodes", "normals", "points", "weights", "unhidden", "materials", "lobes", "sky", "levels", "texels", "uvs", "background", "positions"]);
-    this.bindValues(program, this.ofVertices, 17);
-    this.sayBehind(program, numbers);
-    const [near, far] = [NEAREST * this.size, FARTHEST * this.size];
-    gl.uniform4f(program.at("uFrustum"), 1 / across, 1 / up, (far + near) / (near - far), (2 * far * near) / (near - far));
-    gl.uniformMatrix3fv(program.at("uRotation"), false, [...right, ...above, ...back]);
-    gl.uniform3fv(program.at("uEye"), placeOf(camera));
-    gl.uniform1f(program.at("uPixelAngle"), camera.yfov / height);
-    gl.uniform3fv(program.at("uGain"), numbers.gain);
-    this.saySky(program, numbers);
     gl.bindFramebuffer(gl.FRAMEBUFFER, images.drawn);
     gl.viewport(0, 0, width, height);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.clear(gl.DEPTH_BUFFER_BIT);
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * this.texels.count("corners"));
+    const [near, far] = [NEAREST * this.size, FARTHEST * this.size];
+    for (const faces of this.faces) {
+      const program = this.useFor(faces, features);
+      this.sayBehind(program, numbers);
+      gl.uniform4f(program.at("uFrustum"), 1 / across, 1 / up, (far + near) / (near - far), (2 * far * near) / (near - far));
+      gl.uniformMatrix3fv(program.at("uRotation"), false, [...right, ...above, ...back]);
+      gl.uniform3fv(program.at("uEye"), placeOf(camera));
+      gl.uniform1f(program.at("uPixelAngle"), camera.yfov / height);
+      gl.uniform3fv(program.at("uGain"), numbers.gain);
+      this.saySky(program, numbers);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, faces.buffer);
+      gl.drawElements(gl.TRIANGLES, faces.corners.length, gl.UNSIGNED_INT, 0);
+    }
 
-    const background = this.use(this.programs.background, ["background"]);
+    const background = this.use(this.program({ background: features }, () => new Program(gl, COVER, backgroundShader(features))), ["background"]);
     this.sayBehind(background, numbers);
     gl.uniformMatrix3fv(background.at("uRays"), false, [...scaled(right, across), ...scaled(above, up), ...scaled(back, -1)]);
     gl.uniform2f(background.at("uSize"), width, height);
-    this.cover(images.drawn, width, height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.DEPTH_TEST);
+  }
+
+  /** The program that draws faces of a kind. */
+  private useFor({ shows }: FaceClass, picture: PictureFeatures): Program {
+    const { gl, surface } = this;
+    const features = { ...shows, ...picture };
+    const made = this.program({ features }, () => new Program(gl, cornerShader(shows), surfaceShader(surface, features)));
+    const program = this.use(made, ["corners", "sides", "facing", "normals", "points", "weights", "unhidden", "materials", "lobes", "sky", "levels", "texels", "uvs", "background", "positions"]);
+    this.bindValues(program, this.ofSlots, 15);
+    return program;
   }
 
   private drawWords(images: Images, radiance: WebGLTexture): void {
     const { gl } = this;
-    const { words } = this.programs;
+    const words = this.program({ words: images.hides }, () => new Program(gl, COVER, wordsShader(images.hides)));
     images.resolve();
     gl.useProgram(words.handle);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, radiance);
     gl.uniform1i(words.at("uImage"), 0);
-    this.cover(images.words, images.width, images.height);
-  }
-
-  private get hasLobes(): boolean {
-    return this.texels.count("lobes") > 0;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, images.words);
+    gl.viewport(0, 0, images.width, images.height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   /** A variant of a program, compiled when it is first needed. */
@@ -257,17 +317,10 @@ export class Evaluator {
 
   private sayBehind(program: Program, numbers: Tables): void {
     const { gl } = this;
-    gl.uniform3fv(program.at("uBackgroundGain"), isMap(numbers) ? numbers.background_gain : [0, 0, 0]);
+    gl.uniform3fv(program.at("uBackgroundGain"), numbers.background_gain);
     gl.uniform3fv(program.at("uBackgroundColor"), numbers.background === "color" ? numbers.background_color : [0, 0, 0]);
     gl.uniform1f(program.at("uTurn"), numbers.sky_turn);
     gl.uniform1f(program.at("uFree"), numbers.is_direct ? 1 : 0);
-  }
-
-  private cover(buffer: WebGLFramebuffer, width: number, height: number): void {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-    gl.viewport(0, 0, width, height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 }
 
@@ -275,13 +328,7 @@ const isMap = ({ background }: Tables): boolean => background === "map" || backg
 
 const placeOf = ({ to_world }: Camera): [number, number, number] => [to_world[3] as number, to_world[7] as number, to_world[11] as number];
 
-/** Whether any material sends anything by another group than the first. */
-function sendsByGroups(rows: Int32Array): boolean {
-  for (let k = 0; k < rows.length; k += 4 * MATERIAL) {
-    for (let group = 1; group < GROUPS; group++) if ((rows[k + 4 * group + 2] as number) > 0) return true;
-  }
-  return false;
-}
+const wordsOf = (bytes: Uint8Array): Uint32Array => new Uint32Array(bytes.slice().buffer);
 
 /** The diagonal of the box about all corners. */
 function sizeOf(positions: Uint8Array): number {

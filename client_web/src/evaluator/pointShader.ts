@@ -1,8 +1,9 @@
 /** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, its looks along lobes
- * (`glints`), less the sky in these (`between_points`), and where their light comes from (`bumps`), written from the ladder. Sixteen numbers of each point:
- * radiance of three groups, the direction of the light, the share of the sky along the lobe, radiance beside it. */
+ * (`glints`), less the sky in these (`between_points`), and where their light comes from (`bumps`), written from the
+ * ladder. Sixteen numbers of each point: radiance of three groups, the direction of the light, the share of the sky along
+ * the lobe, radiance beside it. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
+import { albedoOf, GROUPS, HEAD, LOBES, PLACE, rowOf, SKY, WIDTH } from "./common";
 
 const CHANNELS = [0, 1, 2];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -14,11 +15,19 @@ const part = (texels: string, k: number) => `${texels}${k >> 2}.${FOUR[k & 3]}`;
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
 const named = (texels: string, count: number) => `vec4 ${range(count).map((k) => `${texels}${k}`).join(", ")};`;
 
-/** What a look makes use of: the rest is not compiled in. */
+/** What a material makes use of: the rest is not compiled in. Software takes both ways of every branch. */
 export interface PointFeatures {
-  uneven: boolean;
-  lobes: boolean;
-  maps: boolean;
+  /** How many functions its light vectors have; 0 where nothing asks for them. */
+  functions: number;
+  /** Which groups have a table of each kind. */
+  even: readonly boolean[];
+  uneven: readonly boolean[];
+  /** Its lobe: none, one that the in-basis tells, or one that is too narrow for that. */
+  lobe: "none" | "told" | "narrow";
+  /** How many functions the light vectors beside the sky have, which narrow lobes look at. */
+  others: number;
+  /** A normal map asks where light comes from. */
+  map: boolean;
 }
 
 /** cos mφ and sin mφ of all orders, from those of φ. */
@@ -30,15 +39,24 @@ function turns(orders: number): string {
   return lines.join("\n");
 }
 
+/** Rungs of the ladder whose functions a material's light vectors have. */
+const rungsBelow = ({ ladder }: SurfaceBody, functions: number) =>
+  range(ladder.order.length).filter((rung) => (ladder.cosine[rung] as number) < functions);
+
+/** One number of a light vector: they come channel by channel. */
+const light = ({ functions }: PointFeatures, channel: number, k: number) =>
+  k < functions ? part("t", channel * functions + k) : "0.0";
+
 /** Light vectors turned to the eye's φ, rung by rung. */
-function turned({ ladder, functions }: SurfaceBody): string {
-  const rungs = ladder.order.length;
+function turned(surface: SurfaceBody, features: PointFeatures): string {
+  const { ladder } = surface;
   const lines = CHANNELS.flatMap((channel) =>
-    ladder.order.map((m, rung) => {
-      const cosine = part("t", channel * functions + (ladder.cosine[rung] as number));
-      const sine = part("t", channel * functions + (ladder.sine[rung] as number));
+    rungsBelow(surface, features.functions).map((rung) => {
+      const m = ladder.order[rung] as number;
+      const cosine = light(features, channel, ladder.cosine[rung] as number);
+      const sine = light(features, channel, ladder.sine[rung] as number);
       const value = m === 0 ? cosine : `c${m} * ${cosine} + s${m} * ${sine}`;
-      return `${part("turned", channel * rungs + rung)} = ${value};`;
+      return `${part("turned", channel * ladder.order.length + rung)} = ${value};`;
     }),
   );
   return lines.join("\n");
@@ -62,12 +80,12 @@ function functionsAt({ ladder }: SurfaceBody): string {
 }
 
 /** Σ of the light, of its luminance, with an expansion. */
-function expanded({ expansions, functions }: SurfaceBody): string {
+function expanded({ expansions }: SurfaceBody, features: PointFeatures): string {
   const sums = expansions.map((row) => {
     const parts = row.flatMap((value, k) =>
       Math.abs(value) < 1e-7
         ? []
-        : [`${float(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${part("t", c * functions + k)}`).join(" + ")})`],
+        : [`${float(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${light(features, c, k)}`).join(" + ")})`],
     );
     return parts.join(" + ") || "0.0";
   });
@@ -75,18 +93,22 @@ function expanded({ expansions, functions }: SurfaceBody): string {
 }
 
 /** Radiance by a table over θo alone. */
-function even({ rows, ladder }: SurfaceBody): string {
-  const rungs = ladder.order.length / 4;
-  // texels of rungs that hold functions of high degrees alone are left out where few texels of light vectors are needed
-  const lines = range(rungs).map((q) => {
-    const least = Math.min(...range(4).map((k) => ladder.cosine[4 * q + k] as number)) >> 2;
-    const sums = CHANNELS.map((channel) => channel * rungs + q).map(
-      (k) => `dot(mix(texelFetch(uEven, at(near + ${k}), 0), texelFetch(uEven, at(far + ${k}), 0), share), turned${k})`,
-    );
-    return `if (needed > ${least}) sum += vec3(${sums.join(",\n    ")});`;
+function even(surface: SurfaceBody, { functions }: PointFeatures): string {
+  const rungs = surface.ladder.order.length / 4;
+  const used = new Set(rungsBelow(surface, functions));
+  // texels of rungs that hold functions of high degrees alone are left out
+  const lines = range(rungs).flatMap((q) => {
+    const here = FOUR.split("").filter((_, k) => used.has(4 * q + k)).join("");
+    if (here === "") return [];
+    const sums = CHANNELS.map((channel) => channel * rungs + q).map((k) => {
+      const table = ["near", "far"].map((row) => `texelFetch(uEven, at(${row} + ${k}), 0).${here}`).join(", ");
+      const factors = [`mix(${table}, share)`, `turned${k}.${here}`].join(here.length > 1 ? ", " : " * ");
+      return here.length > 1 ? `dot(${factors})` : factors;
+    });
+    return `sum += vec3(${sums.join(",\n    ")});`;
   });
-  return `vec3 even(int table, int row, float share, int needed) {
-  int near = (table * ${rows} + row) * ${3 * rungs}, far = near + ${3 * rungs};
+  return `vec3 even(int table, int row, float share) {
+  int near = (table * ${surface.rows} + row) * ${3 * rungs}, far = near + ${3 * rungs};
   vec3 sum = vec3(0.0);
   ${lines.join("\n  ")}
   return sum;
@@ -94,15 +116,15 @@ function even({ rows, ladder }: SurfaceBody): string {
 }
 
 /** Radiance by a table over θo and φo. */
-function uneven({ rows, columns, functions }: SurfaceBody): string {
+function uneven({ rows, columns, functions }: SurfaceBody, features: PointFeatures): string {
   const texels = functions / 4;
   const place = (row: string, column: string, k: number) => `texelFetch(uUneven, at((${row} + ${column}) * ${3 * texels} + ${k}), 0)`;
   const sums = CHANNELS.map((channel) =>
-    range(texels)
-      .map((q) => channel * texels + q)
-      .map((k) => {
+    range(Math.ceil(features.functions / 4))
+      .map((q) => {
+        const k = channel * texels + q;
         const [near, far] = ["near", "far"].map((row) => `mix(${place(row, "column", k)}, ${place(row, "beside", k)}, part)`);
-        return `dot(mix(${near}, ${far}, share), t${k})`;
+        return `dot(mix(${near}, ${far}, share), vec4(${range(4).map((n) => light(features, channel, 4 * q + n)).join(", ")}))`;
       })
       .join(" +\n    "),
   );
@@ -115,111 +137,92 @@ function uneven({ rows, columns, functions }: SurfaceBody): string {
 }`;
 }
 
+/** Loads so many numbers of a point from an array of whole texels. */
+const loaded = (into: string, array: string, scale: string, numbers: number) =>
+  range(Math.ceil(numbers / 4))
+    .map((q) => `${into}${q} = ${scale} * texelFetch(${array}, at((p - uFirst) * ${Math.ceil(numbers / 4)} + ${q}), 0);`)
+    .join(" ");
+
 /** A look along the lobe. */
-function glance(surface: SurfaceBody): string {
+function glance(surface: SurfaceBody, { lobe, others }: PointFeatures): string {
   const texels = surface.functions / 4;
-  const others = (channel: number, q: number) =>
-    `dot(h${q}, ${q} < uOthersStride ? texelFetch(uOthers, at((p * 3 + ${channel}) * uOthersStride + ${q}), 0) : vec4(0.0))`;
-  const sums = CHANNELS.map((channel) => range(texels).map((q) => others(channel, q)).join(" + "));
-  return `int lobe = texelFetch(uMaterials, at(material + ${GROUPS}), 0).x;
-  if (lobe >= 0) {
-    int of = (lobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
+  const seen = (channel: number) =>
+    range(others).map((k) => `${part("h", k)} * ${part("o", channel * others + k)}`).join(" + ") || "0.0";
+  const told = `vec3 light = glance.x * uSkyGain * skyAbout(r, shape.y);
+    ${range(GROUPS).map((group) => `sent${group} -= light * ${albedoOf(`of - ${GROUPS - group}`)};`).join("\n    ")}`;
+  const narrow = `${named("o", Math.max(1, Math.ceil((3 * others) / 4)))}
+    ${loaded("o", "uOthers", "uOthersScale", 3 * others)}
+    glance.yzw = max(vec3(${CHANNELS.map(seen).join(",\n      ")}), 0.0);`;
+  return `int of = (uLobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
     vec3 shape, r = alongLobe(of, share, n, -wo, shape);
     vec2 w = vec2(dot(tangent, r), dot(bitangent, r));
     ${named("h", texels)}
     ${functionsAt(surface)}
     float open = ${range(texels).map((q) => `dot(h${q}, texelFetch(uSkyShare, at(p * ${texels} + ${q}), 0))`).join(" + ")};
     glance.x = clamp(open, 0.0, 1.0);
-    if (shape.z > 0.0) {
-      vec3 light = glance.x * uSkyGain * skyAbout(r, shape.y);
-      ${range(GROUPS).map((group) => `sent${group} -= light * ${albedoOf(`of - ${GROUPS - group}`)};`).join("\n      ")}
-    } else glance.yzw = max(uOthersScale * vec3(${sums.join(",\n      ")}), 0.0);
-  }`;
+    ${lobe === "told" ? told : narrow}`;
 }
 
-export function pointShader(surface: SurfaceBody, features: PointFeatures): string {
-  const { functions, rows, ladder } = surface;
-  const [vectors, rungs] = [functions / 4, ladder.order.length / 4]; // texels of each
-  const texel = (channel: number, q: number) =>
-    `t${channel * vectors + q} = uScale * texelFetch(uVectors, at((p * 3 + ${channel}) * uStride + ${q}), 0);`;
-  const load = (q: number) => `if (${q} < texels) { ${CHANNELS.map((channel) => texel(channel, q)).join(" ")} }`;
-  const sent = (group: number) => `vec3 sent${group} = vec3(0.0);
-  tables = texelFetch(uMaterials, at(material + ${group}), 0);
-  if (tables.x >= 0) sent${group} += even(tables.x, row, share, needed);
-  ${features.uneven ? `if (tables.y >= 0) sent${group} += uneven(tables.y, row, share, cp, sp);` : ""}`;
-  return `${HEAD}${rowOf(rows)}${features.lobes ? `${PLACE}${SKY}${LOBES}` : ""}
+const UNIFORMS = `
 uniform sampler2D uVectors, uOthers, uSkyShare, uPlaces, uPointNormals, uTangents, uEven, uUneven;
-uniform isampler2D uMaterials;
-uniform int uNumPoints, uStride, uOthersStride;
+uniform int uFirst, uLobe;
+uniform ivec2 uTables[${GROUPS}];
 uniform float uScale, uOthersScale;
 uniform vec3 uEye;
-layout(location = 0) out vec4 out0;
-layout(location = 1) out vec4 out1;
-layout(location = 2) out vec4 out2;
-layout(location = 3) out vec4 out3;
-${named("t", 3 * vectors)}
-${named("turned", 3 * rungs)}
-${even(surface)}
-${features.uneven ? uneven(surface) : ""}
+`;
 
+/** Four numbers each, for which there is a layer. */
+export const outputs = (layers: readonly number[]) => layers.map((layer, k) => `layout(location = ${k}) out vec4 out${layer};`).join("\n");
+
+export function pointShader(surface: SurfaceBody, features: PointFeatures, layers: readonly number[]): string {
+  const { functions, lobe, map } = features;
+  const [isEven, isUneven] = [features.even.includes(true), features.uneven.includes(true)];
+  const sent = (group: number) => `vec3 sent${group} = vec3(0.0);
+  ${features.even[group] ? `sent${group} += even(uTables[${group}].x, row, share);` : ""}
+  ${features.uneven[group] ? `sent${group} += uneven(uTables[${group}].y, row, share, cp, sp);` : ""}`;
+  const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
+  return `${HEAD}${rowOf(surface.rows)}${lobe === "none" ? "" : `${PLACE}${SKY}${LOBES}`}${UNIFORMS}
+${outputs(layers)}
+${functions > 0 ? named("t", Math.ceil((3 * functions) / 4)) : ""}
+${isEven ? `${named("turned", 3 * (surface.ladder.order.length / 4))}\n${even(surface, features)}` : ""}
+${isUneven ? uneven(surface, features) : ""}
 void main() {
-  int p = int(gl_FragCoord.y) * 2048 + int(gl_FragCoord.x);
-  if (p >= uNumPoints) discard;
-  vec4 place = texelFetch(uPlaces, at(p), 0);
-  int material = int(place.w) * ${MATERIAL};
+  int p = int(gl_FragCoord.y) * ${WIDTH} + int(gl_FragCoord.x);
   vec3 n = texelFetch(uPointNormals, at(p), 0).xyz, tangent = texelFetch(uTangents, at(p), 0).xyz;
-  vec3 bitangent = cross(n, tangent), wo = uEye - place.xyz;
+  vec3 bitangent = cross(n, tangent), wo = uEye - texelFetch(uPlaces, at(p), 0).xyz;
   wo *= inversesqrt(max(dot(wo, wo), 1e-20));
   float across = dot(tangent, wo), along = dot(bitangent, wo), cosine = clamp(dot(n, wo), 0.01, 1.0), share;
   float flatness = sqrt(across * across + along * along);
   float cp = flatness < 1e-6 ? 1.0 : across / flatness, sp = flatness < 1e-6 ? 0.0 : along / flatness;
   int row = rowOf(cosine, share);
 
-  int needed = texelFetch(uMaterials, at(material + ${GROUPS}), 0).w, texels = min(uStride, needed);
-  ${range(3 * vectors).map((k) => `t${k}`).join(" = ")} = vec4(0.0);
-  ${range(vectors).map(load).join("\n  ")}
-  turned0.x = t0.x; turned${rungs}.x = t${vectors}.x; turned${2 * rungs}.x = t${2 * vectors}.x;
-  if (needed > 1) {
-    ${turns(Math.max(...ladder.order) + 1)}
-    ${turned(surface)}
-  }
-
-  ivec4 tables;
+  ${loaded("t", "uVectors", "uScale", 3 * functions)}
+  ${isEven ? `${turns(Math.max(...rungsBelow(surface, functions).map((rung) => surface.ladder.order[rung] as number)) + 1)}\n${turned(surface, features)}` : ""}
   ${range(GROUPS).map(sent).join("\n  ")}
 
   vec3 towards = vec3(0.0);
-  ${features.maps ? `${expanded(surface)}\n  towards = local.x * tangent + local.y * bitangent + local.z * n;` : ""}
+  ${map ? `${expanded(surface, features)}\n  towards = local.x * tangent + local.y * bitangent + local.z * n;` : ""}
   vec4 glance = vec4(0.0);
-  ${features.lobes ? glance(surface) : ""}
-  out0 = vec4(sent0, sent1.r);
-  out1 = vec4(sent1.gb, sent2.rg);
-  out2 = vec4(sent2.b, towards);
-  out3 = glance;
+  ${lobe === "none" ? "" : glance(surface, features)}
+  ${layers.map((layer) => `out${layer} = ${values[layer]};`).join("\n  ")}
 }
 `;
 }
 
-/** What vertices take from the points about them; layers that nothing of a look is in are left at nothing. */
-export function vertexShader(layers: readonly number[]): string {
-  const take = (k: string) => `if (weights.${k} > 0.0) {
-    ivec2 p = at(int(points.${k}));
-    ${layers.map((layer) => `out${layer} += weights.${k} * texelFetch(uValues, ivec3(p, ${layer}), 0);`).join("\n    ")}
-  }`;
+/** What slots take from the points about them. */
+export function slotShader(layers: readonly number[]): string {
+  const take = (k: string) => `p = at(int(points.${k}));
+  ${layers.map((layer) => `out${layer} += weights.${k} * texelFetch(uValues, ivec3(p, ${layer}), 0);`).join("\n  ")}`;
   return `${HEAD}
 uniform usampler2D uPoints;
 uniform sampler2D uWeights;
 uniform sampler2DArray uValues;
-uniform int uNumVertices;
-layout(location = 0) out vec4 out0;
-layout(location = 1) out vec4 out1;
-layout(location = 2) out vec4 out2;
-layout(location = 3) out vec4 out3;
+${outputs(layers)}
 void main() {
-  int v = int(gl_FragCoord.y) * 2048 + int(gl_FragCoord.x);
-  if (v >= uNumVertices) discard;
-  uvec4 points = texelFetch(uPoints, at(v), 0);
-  vec4 weights = texelFetch(uWeights, at(v), 0);
-  out0 = out1 = out2 = out3 = vec4(0.0);
+  ivec2 here = ivec2(gl_FragCoord.xy), p;
+  uvec4 points = texelFetch(uPoints, here, 0);
+  vec4 weights = texelFetch(uWeights, here, 0);
+  ${layers.map((layer) => `out${layer} = vec4(0.0);`).join(" ")}
   ${["x", "y", "z", "w"].map(take).join("\n  ")}
 }
 `;

@@ -1,69 +1,82 @@
 /** Surfaces as an eye sees them: the places of `relume.moving.look_up`, the sum of `relume.moving.pixels`, catchers of
- * `relume.moving.behind`. Triangles are drawn as they are; what vertices of the lattice send is found in each pixel. */
+ * `relume.moving.behind`. Triangles are drawn as they are; what slots of the lattice send is found in each pixel. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, BEHIND, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
+import { albedoOf, behindBy, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
+import type { Shows } from "./materials";
 
-/** What pixels of a triangle have in common: corners and material, its lattice, normal and scale of textures, lobe,
- * normal map and whether it catches, what it emits. */
-const FLAT = `
-flat in uvec4 vCorners;
-flat in uvec3 vLattice;
-flat in vec4 vFacing;
-flat in ivec3 vKind;
-flat in vec3 vEmission;`;
+/** What a picture makes use of: the rest is not compiled in. */
+export interface PictureFeatures {
+  /** What lies behind is a map. */
+  map: boolean;
+  /** How much a pixel hides is asked for. */
+  hides: boolean;
+  /** One sample a pixel, written as words. */
+  direct: boolean;
+}
+export type SurfaceFeatures = Shows & PictureFeatures;
+
+/** Whether pixels ask where they are, beside what is sent there. */
+const isWhole = ({ lobes, textures, catches }: Shows) => lobes || textures || catches;
+
+/** What pixels of a triangle have in common: slots or the first of them, and the number of rows; what it emits; where
+ * more is asked, its corners and material, its normal and scale of textures, its lobe and normal map. */
+const flats = (shows: Shows) => `
+flat in uvec4 vSide;
+flat in vec3 vEmission;
+${isWhole(shows) ? "flat in uvec4 vCorners; flat in vec4 vFacing; flat in ivec2 vKind;" : ""}`;
 
 /** No attributes: the number of a corner says all. \`uRotation\` has the eye's axes as its columns. */
-export const CORNERS = `${HEAD}
-uniform usampler2D uCorners;
-uniform sampler2D uPositions;
+export const cornerShader = (shows: Shows) => `${HEAD}
+uniform usampler2D uCorners, uSides;
+uniform sampler2D uPositions, uFacing;
+uniform isampler2D uMaterials;
 uniform vec3 uEye;
 uniform mat3 uRotation;
 uniform vec4 uFrustum;
-uniform usampler2D uLattice;
-uniform sampler2D uFacing;
-uniform isampler2D uMaterials;
-${FLAT.replaceAll("in ", "out ")}
+${flats(shows).replaceAll("in ", "out ")}
 centroid out vec2 vBary;
-centroid out vec3 vAway;
+${isWhole(shows) ? "centroid out vec3 vAway;" : "vec3 vAway;"}
 void main() {
-  ivec2 face = at(gl_VertexID / 3);
-  int corner = gl_VertexID % 3;
-  vCorners = texelFetch(uCorners, face, 0);
-  vLattice = texelFetch(uLattice, face, 0).xyz;
-  vFacing = texelFetch(uFacing, face, 0);
-  int material = int(vCorners.w) * ${MATERIAL};
-  vKind = texelFetch(uMaterials, at(material + ${GROUPS}), 0).xyz;
-  vEmission = intBitsToFloat(texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0)).rgb;
-  int position = int(corner == 0 ? vCorners.x : corner == 1 ? vCorners.y : vCorners.z);
-  vBary = vec2(corner == 1, corner == 2);
+  int number = gl_VertexID / 3, corner = gl_VertexID % 3;
+  ivec2 face = at(number);
+  uvec4 corners = texelFetch(uCorners, face, 0);
+  vec4 facing = texelFetch(uFacing, face, 0);
+  int material = int(corners.w) * ${MATERIAL};
+  int position = int(corner == 0 ? corners.x : corner == 1 ? corners.y : corners.z);
   vAway = texelFetch(uPositions, at(position), 0).xyz - uEye;
+  vBary = vec2(corner == 1, corner == 2);
+  vSide = texelFetch(uSides, at(2 * number + int(dot(facing.xyz, vAway) > 0.0)), 0);
+  vEmission = intBitsToFloat(texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0)).rgb;
+  ${isWhole(shows) ? `vCorners = corners; vFacing = facing; vKind = texelFetch(uMaterials, at(material + ${GROUPS}), 0).xy;` : ""}
   vec3 seen = vAway * uRotation;
   gl_Position = vec4(seen.xy * uFrustum.xy, uFrustum.z * seen.z + uFrustum.w, -seen.z);
 }
 `;
 
 /** Pixels as words of RGB9_E5, and how much each hides of display values (sRGB), as other frames have it. */
-const DIRECT = `
+const words = (hides: boolean) => `
 layout(location = 0) out vec4 outWord;
-layout(location = 1) out vec4 outHides;
+${hides ? "layout(location = 1) out vec4 outHides;" : ""}
 float powerOfTwo(int power) { return intBitsToFloat((power + 127) << 23); }
 float encoded(float x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055; }
 void finish(vec4 pixel) {
   vec3 color = clamp(pixel.rgb, 0.0, 65408.0);
   float largest = max(max(color.r, color.g), color.b);
   int exponent = max(-16, int((floatBitsToUint(largest) >> 23) & 255u) - 127) + 16;
-  if (floor(largest * powerOfTwo(24 - exponent) + 0.5) == 512.0) exponent += 1;
-  uvec3 m = uvec3(floor(color * powerOfTwo(24 - exponent) + 0.5));
-  uint word = m.r | (m.g << 9) | (m.b << 18) | (uint(exponent) << 27);
+  float scale = powerOfTwo(24 - exponent);
+  bool isNext = floor(largest * scale + 0.5) == 512.0;
+  uvec3 m = uvec3(color * (isNext ? 0.5 * scale : scale) + 0.5);
+  uint word = m.r | (m.g << 9) | (m.b << 18) | (uint(exponent + int(isNext)) << 27);
   outWord = vec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 255u) / 255.0;
-  outHides = vec4(1.0 - encoded(1.0 - min(pixel.a, 1.0)));
+  ${hides ? "outHides = vec4(1.0 - encoded(1.0 - min(pixel.a, 1.0)));" : ""}
 }
 `;
 /** Linear radiance, of which a pixel takes the mean of its samples. */
-const SAMPLED = `
+const SAMPLES = `
 out vec4 outColor;
 void finish(vec4 pixel) { outColor = vec4(min(pixel.rgb, 65000.0), pixel.a); }
 `;
+const finished = ({ direct, hides }: PictureFeatures) => (direct ? words(hides) : SAMPLES);
 
 /** Trilinear, as \`relume.moving.points.texels\`. */
 const TEXTURES = `
@@ -97,8 +110,6 @@ vec3 textureAt(int number, vec2 place, float footprint) {
 }
 `;
 
-const NO_TEXTURES = "vec3 textureAt(int number, vec2 place, float footprint) { return vec3(1.0); }";
-
 /** A normal map's lean, and how the light of what is broad changes by it; as \`relume.moving.bumps\`. */
 const LEAN = `
 vec3 leaning(int map, vec2 place, float footprint, vec3 n, vec4 tangent, vec3 outward) {
@@ -116,61 +127,55 @@ vec3 leaning(int map, vec2 place, float footprint, vec3 n, vec4 tangent, vec3 ou
 /** No loops: software rasterisers index vectors through memory. */
 const blended = (value: (k: string) => string) => ["x", "y", "z"].map((k) => `weights.${k} * ${value(k)}`).join(" + ");
 const fetched = (name: string, layer: number) =>
-  `vec4 ${name} = ${blended((k) => `texelFetch(uValues, ivec3(at(vertices.${k}), ${layer}), 0)`)};`;
+  `vec4 ${name} = ${blended((k) => `texelFetch(uValues, ivec3(at(slots.${k}), ${layer}), 0)`)};`;
 
 /** Adds what a group of terms sends. */
-function group(number: number, sent: string, { lobes, textures }: SurfaceFeatures, rows: number): string {
-  const albedo = albedoOf(`(kind.x * ${rows} + row) * ${GROUPS + 1} + ${number}`);
+function group(number: number, sent: string, { lobes, textures }: Shows, rows: number): string {
+  if (!lobes && !textures) return `color += max(${sent}, 0.0);`;
+  const albedo = albedoOf(`(vKind.x * ${rows} + row) * ${GROUPS + 1} + ${number}`);
   return `{
     ivec4 of = texelFetch(uMaterials, at(material + ${number}), 0);
     if (of.z > 0) {
       vec3 total = ratio * ${sent};
-      ${lobes ? `if (kind.x >= 0) total += light * ${albedo};` : ""}
+      ${lobes ? `total += light * ${albedo};` : ""}
       ${textures ? "if (of.w >= 0) total *= textureAt(of.w, place, footprint);" : ""}
       color += max(total, 0.0);
     }
   }`;
 }
 
-const CAUGHT = `if (kind.z == 1) {
-    bvec3 isLit;
-    vec3 arrives = uGain * unhidden(vertices, weights, isLit);
-    vec3 shown = vec3(uFree);
-    for (int channel = 0; channel < 3; channel++) {
-      if (isLit[channel] && uGain[channel] > 0.0) shown[channel] = min(color[channel] / arrives[channel], 8.0);
-    }
-    color = shown * behind(d);
-    hides -= dot(vec3(0.2126, 0.7152, 0.0722), min(shown, 1.0));
-  }`;
+const CAUGHT = `bvec3 isLit;
+  vec3 arrives = uGain * unhidden(slots, weights, isLit);
+  vec3 shown = vec3(uFree);
+  for (int channel = 0; channel < 3; channel++) {
+    if (isLit[channel] && uGain[channel] > 0.0) shown[channel] = min(color[channel] / arrives[channel], 8.0);
+  }
+  color = shown * behind(d);
+  hides -= dot(vec3(0.2126, 0.7152, 0.0722), min(shown, 1.0));`;
 
-/** What a look makes use of: the rest is not compiled in. */
-export interface SurfaceFeatures {
-  /** Terms that textures multiply. */
-  groups: boolean;
-  textures: boolean;
-  lobes: boolean;
-  catchers: boolean;
-  /** One sample a pixel, written as words. */
-  direct: boolean;
+/** What catchers would receive if nothing were in the way. */
+const UNHIDDEN = `
+uniform usampler2D uPoints;
+uniform sampler2D uWeights, uUnhidden;
+uniform float uFree;
+vec3 unhidden(ivec3 slots, vec3 weights, out bvec3 isLit) {
+  vec3 sum = vec3(0.0);
+  isLit = bvec3(true);
+  for (int k = 0; k < 3; k++) {
+    uvec4 points = texelFetch(uPoints, at(slots[k]), 0);
+    vec4 shares = texelFetch(uWeights, at(slots[k]), 0);
+    vec3 here = vec3(0.0);
+    for (int q = 0; q < 4; q++) if (shares[q] > 0.0) here += shares[q] * texelFetch(uUnhidden, at(int(points[q])), 0).rgb;
+    sum += weights[k] * here;
+    isLit = bvec3(isLit.x && here.x > 0.0, isLit.y && here.y > 0.0, isLit.z && here.z > 0.0);
+  }
+  return sum;
 }
-
-export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures): string {
-  const { groups, textures: hasTextures, lobes, catchers } = features;
-  return `${HEAD}${rowOf(rows)}${PLACE}${SKY}${LOBES}${catchers ? BEHIND : ""}${features.direct ? DIRECT : SAMPLED}${hasTextures ? TEXTURES : NO_TEXTURES}${LEAN}
-uniform usampler2D uNodes, uPoints;
-uniform sampler2D uNormals, uWeights, uUnhidden;
-uniform sampler2DArray uValues;
-uniform isampler2D uMaterials;
-uniform float uPixelAngle, uFree;
-uniform vec3 uGain;
-${FLAT}
-centroid in vec2 vBary;
-centroid in vec3 vAway;
-int nodeOf(int rows, int i, int j) { return i * (rows + 1) - i * (i - 1) / 2 + j; }
-
-float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
+`;
 
 /** The light that a lobe sees, and where its albedo lies in tables. */
+const mirrored = (rows: number) => `
+float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
 vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, out float share) {
   row = rowOf(clamp(-dot(n, d), 0.01, 1.0), share);
   int of = (lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS};
@@ -179,98 +184,77 @@ vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, 
   float above = min(shareAbove(away / shape.y) / shareAbove(abs(along) / shape.y), 1.0);
   return above * (glance.x * uSkyGain * skyAbout(r, shape.y) + glance.yzw);
 }
+`;
 
-/** What catchers would receive if nothing were in the way. */
-vec3 unhidden(ivec3 vertices, vec3 weights, out bvec3 isLit) {
-  vec3 sum = vec3(0.0);
-  isLit = bvec3(true);
-  for (int k = 0; k < 3; k++) {
-    uvec4 points = texelFetch(uPoints, at(vertices[k]), 0);
-    vec4 shares = texelFetch(uWeights, at(vertices[k]), 0);
-    vec3 here = vec3(0.0);
-    for (int q = 0; q < 4; q++) if (shares[q] > 0.0) here += shares[q] * texelFetch(uUnhidden, at(int(points[q])), 0).rgb;
-    sum += weights[k] * here;
-    isLit = bvec3(isLit.x && here.x > 0.0, isLit.y && here.y > 0.0, isLit.z && here.z > 0.0);
-  }
-  return sum;
-}
-
-void main() {
-  vec3 d = normalize(vAway);
-  uvec4 corners = vCorners;
-  vec4 facing = vFacing;
-  float along = dot(facing.xyz, d);
-  int material = int(corners.w) * ${MATERIAL};
-  ivec3 kind = vKind;
-  vec3 color = vEmission;
-  uvec3 lattice = vLattice;
-  int front = int(lattice.z & 255u), behindIt = int(lattice.z >> 8);
-  bool isBehind = along > 0.0 ? behindIt > 0 : front == 0;
-  int rows = isBehind ? behindIt : front;
-  vec2 bary = clamp(vBary, 0.0, 1.0);
-  ivec3 vertices = ivec3(0);
-  vec3 weights = vec3(0.0);
-  if (rows > 0) {
-    vec2 where = bary * float(rows);
-    int i = clamp(int(where.x), 0, rows - 1), j = clamp(int(where.y), 0, rows - 1 - i);
-    vec2 f = where - vec2(i, j);
-    bool isFirst = f.x + f.y <= 1.0 || i + j == rows - 1;
-    int first = int(isBehind ? lattice.y : lattice.x);
-    int a = first + (isFirst ? nodeOf(rows, i, j) : nodeOf(rows, i + 1, j + 1));
-    int b = first + nodeOf(rows, i + 1, j), c = first + nodeOf(rows, i, j + 1);
-    weights = isFirst ? vec3(1.0 - f.x - f.y, f) : vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x);
-    vertices = ivec3(texelFetch(uNodes, at(a), 0).r, texelFetch(uNodes, at(b), 0).r, texelFetch(uNodes, at(c), 0).r);
-  }
-  ${fetched("v0", 0)}
-  ${groups ? fetched("v1", 1) : "vec4 v1 = vec4(0.0);"}
-  ${groups || hasTextures ? fetched("v2", 2) : "vec4 v2 = vec4(0.0);"}
-  ${lobes ? `vec4 glance = vec4(0.0);\n  if (kind.x >= 0) { ${fetched("found", 3)} glance = found; }` : ""}
-  vec3 n = vec3(0.0);
-  ${lobes || hasTextures ? `if (kind.x >= 0 || kind.y >= 0) n = ${blended((k) => `texelFetch(uNormals, at(vertices.${k}), 0).xyz`)};` : ""}
-  n *= inversesqrt(max(dot(n, n), 1e-12));
-
-  vec2 place = vec2(0.0);
-  float footprint = length(vAway) * uPixelAngle * facing.w * inversesqrt(max(abs(along), 0.05)), ratio = 1.0;
-  ${
-    hasTextures
-      ? `vec3 w = vec3(1.0 - bary.x - bary.y, bary);
-  vec4 tangent = vec4(0.0);
-  place = w.x * texelFetch(uUvs, at(2 * int(corners.x)), 0).xy + w.y * texelFetch(uUvs, at(2 * int(corners.y)), 0).xy +
-    w.z * texelFetch(uUvs, at(2 * int(corners.z)), 0).xy;
-  if (kind.y >= 0) {
-    tangent.w = texelFetch(uUvs, at(2 * int(corners.x)), 0).z;
-    tangent.xyz = w.x * texelFetch(uUvs, at(2 * int(corners.x) + 1), 0).xyz +
-      w.y * texelFetch(uUvs, at(2 * int(corners.y) + 1), 0).xyz + w.z * texelFetch(uUvs, at(2 * int(corners.z) + 1), 0).xyz;
-    vec3 leant = leaning(kind.y, place, footprint, n, tangent, along > 0.0 ? -facing.xyz : facing.xyz);
+/** Where a pixel's texture is, how its normal map leans, and the image of what it shines. */
+const TEXTURED = `vec3 w = vec3(1.0 - bary.x - bary.y, bary);
+  ivec3 corner = 2 * ivec3(vCorners.xyz);
+  vec2 place = w.x * texelFetch(uUvs, at(corner.x), 0).xy + w.y * texelFetch(uUvs, at(corner.y), 0).xy +
+    w.z * texelFetch(uUvs, at(corner.z), 0).xy;
+  float footprint = length(vAway) * uPixelAngle * vFacing.w * inversesqrt(max(abs(along), 0.05));
+  if (vKind.y >= 0) {
+    vec4 tangent = vec4(0.0, 0.0, 0.0, texelFetch(uUvs, at(corner.x), 0).z);
+    tangent.xyz = w.x * texelFetch(uUvs, at(corner.x + 1), 0).xyz + w.y * texelFetch(uUvs, at(corner.y + 1), 0).xyz +
+      w.z * texelFetch(uUvs, at(corner.z + 1), 0).xyz;
+    vec3 leant = leaning(vKind.y, place, footprint, n, tangent, along > 0.0 ? -vFacing.xyz : vFacing.xyz);
     ratio = min(max(dot(v2.yzw, leant), 0.0) / max(dot(v2.yzw, n), 1e-12), 4.0);
     n = leant;
-  }`
-      : ""
   }
-  ${
-    hasTextures
-      ? `int shining = texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0).w;
-  if (shining >= 0) color *= textureAt(shining, place, footprint);`
-      : ""
-  }
-  int row = 0;
-  float share = 0.0;
-  vec3 light = vec3(0.0);
-  ${lobes ? "if (kind.x >= 0) light = mirrored(kind.x, n, d, facing.xyz, glance, row, share);" : ""}
+  int shining = texelFetch(uMaterials, at(material + ${GROUPS + 1}), 0).w;
+  if (shining >= 0) color *= textureAt(shining, place, footprint);`;
 
+/** The slots about a pixel, and their weights: those of its face where that has one row. */
+const SLOTS = `vec2 bary = clamp(vBary, 0.0, 1.0);
+  int rows = int(vSide.w), most = max(rows, 1) - 1;
+  vec2 where = bary * float(rows);
+  int i = clamp(int(where.x), 0, most), j = clamp(int(where.y), 0, most - i);
+  vec2 f = where - vec2(i, j);
+  bool isFirst = f.x + f.y <= 1.0 || i + j == most;
+  int here = int(vSide.x) + i * (rows + 1) - ((i * (i - 1)) >> 1) + j, beside = here + rows + 1 - i;
+  ivec3 slots = rows > 1 ? ivec3(isFirst ? here : beside + 1, beside, here + 1) : ivec3(vSide.xyz);
+  vec3 weights = isFirst ? vec3(1.0 - f.x - f.y, f) : vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x);
+  if (rows == 0) weights = vec3(0.0);`;
+
+export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures): string {
+  const { groups, textures, lobes, catches } = features;
+  const parts = [
+    lobes && `${rowOf(rows)}${SKY}${LOBES}${mirrored(rows)}`,
+    textures && `${TEXTURES}${LEAN}uniform float uPixelAngle;`,
+    catches && `${behindBy(features.map)}${UNHIDDEN}`,
+    isWhole(features) && "uniform sampler2D uNormals;\nuniform isampler2D uMaterials;\ncentroid in vec3 vAway;",
+  ];
+  const whole = `vec3 d = normalize(vAway);
+  float along = dot(vFacing.xyz, d), ratio = 1.0;
+  int material = int(vCorners.w) * ${MATERIAL};
+  ${lobes ? fetched("glance", 3) : ""}
+  ${lobes || textures ? `vec3 n = ${blended((k) => `texelFetch(uNormals, at(slots.${k}), 0).xyz`)};\n  n *= inversesqrt(max(dot(n, n), 1e-12));` : ""}
+  ${textures ? TEXTURED : ""}
+  ${lobes ? "int row;\n  float share;\n  vec3 light = mirrored(vKind.x, n, d, vFacing.xyz, glance, row, share);" : ""}`;
+  return `${HEAD}${PLACE}${parts.filter(Boolean).join("\n")}${finished(features)}
+uniform sampler2DArray uValues;
+uniform vec3 uGain;
+${flats(features)}
+centroid in vec2 vBary;
+void main() {
+  ${SLOTS}
+  vec3 color = vEmission;
+  ${fetched("v0", 0)}
+  ${groups ? fetched("v1", 1) : ""}
+  ${groups || textures ? fetched("v2", 2) : ""}
+  ${isWhole(features) ? whole : ""}
   ${group(0, "v0.rgb", features, rows)}
   ${groups ? group(1, "vec3(v0.a, v1.rg)", features, rows) : ""}
   ${groups ? group(2, "vec3(v1.ba, v2.r)", features, rows) : ""}
   color *= uGain;
   float hides = 1.0;
-  ${catchers ? CAUGHT : ""}
+  ${catches ? CAUGHT : ""}
   finish(vec4(color, hides));
 }
 `;
 }
 
 /** The background, where no surface is. `uRays` takes a place in the picture, −1…1, to a direction. */
-export const backgroundShader = (direct: boolean) => `${HEAD}${PLACE}${BEHIND}${direct ? DIRECT : SAMPLED}
+export const backgroundShader = (features: PictureFeatures) => `${HEAD}${PLACE}${behindBy(features.map)}${finished(features)}
 uniform mat3 uRays;
 uniform vec2 uSize;
 uniform float uFree;
@@ -281,7 +265,7 @@ void main() {
 `;
 
 /** The finished picture, of several samples a pixel, as words: top row first. */
-export const WORDS = `${HEAD}${DIRECT}
+export const wordsShader = (hides: boolean) => `${HEAD}${words(hides)}
 uniform sampler2D uImage;
 void main() {
   ivec2 here = ivec2(gl_FragCoord.xy);

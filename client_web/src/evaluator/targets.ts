@@ -9,19 +9,28 @@ function attach(gl: Gl, make: () => number[]): WebGLFramebuffer {
   const buffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
   gl.drawBuffers(make());
-  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) {
-    throw new Error("this browser cannot draw into floating-point images");
-  }
+  check(gl);
   return buffer;
 }
 
-/** Sixteen numbers for each of many points or vertices: four layers of texels. */
+function check(gl: Gl): void {
+  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) {
+    throw new Error("this browser cannot draw into floating-point images");
+  }
+}
+
+/** Sixteen numbers for each of many points or slots: four layers of texels. */
 export class Values {
   readonly texture: WebGLTexture;
-  readonly buffer: WebGLFramebuffer;
   readonly rows: number;
 
-  constructor(gl: Gl, count: number) {
+  private readonly buffer: WebGLFramebuffer;
+  private begun = "";
+
+  constructor(
+    private readonly gl: Gl,
+    count: number,
+  ) {
     this.rows = Math.max(1, Math.ceil(count / WIDTH));
     this.texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture);
@@ -29,12 +38,22 @@ export class Values {
     for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
       gl.texParameteri(gl.TEXTURE_2D_ARRAY, filter, gl.NEAREST);
     }
-    this.buffer = attach(gl, () =>
-      Array.from({ length: LAYERS }, (_, layer) => {
-        gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + layer, this.texture, 0, layer);
-        return gl.COLOR_ATTACHMENT0 + layer;
-      }),
-    );
+    this.buffer = gl.createFramebuffer();
+  }
+
+  /** Draw into these layers from now on; outputs are numbered through them. */
+  begin(layers: readonly number[]): void {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
+    gl.viewport(0, 0, WIDTH, this.rows);
+    if (layers.join() === this.begun) return;
+    this.begun = layers.join();
+    for (let k = 0; k < LAYERS; k++) {
+      const texture = k < layers.length ? this.texture : null;
+      gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + k, texture, 0, layers[k] ?? 0);
+    }
+    gl.drawBuffers(layers.map((_, k) => gl.COLOR_ATTACHMENT0 + k));
+    check(gl);
   }
 }
 
@@ -61,8 +80,10 @@ export class Images {
     readonly width: number,
     readonly height: number,
     private readonly samples: number,
+    /** How much each pixel hides is drawn too. */
+    readonly hides: boolean,
   ) {
-    const words = () => this.textures(image(gl, gl.RGBA8, width, height), image(gl, gl.RGBA8, width, height));
+    const words = () => this.textures(...Array.from({ length: hides ? 2 : 1 }, () => image(gl, gl.RGBA8, width, height)));
     if (samples === 0) {
       this.drawn = this.words = attach(gl, () => {
         this.renderbuffer(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24);

@@ -6,7 +6,7 @@ import { Evaluator } from "../evaluator/evaluator";
 import { isSoftware } from "../evaluator/software";
 import { getJson, request } from "../net/api";
 import type { Frame } from "../net/binaryFrame";
-import { MAX_EYE_PIXELS, type FrameHeader, type SurfaceBody } from "../protocol";
+import { MAX_EYE_PIXELS, SURFACE_LAYOUT, type FrameHeader, type SurfaceBody } from "../protocol";
 import { noteDrawnHere } from "../state/latency";
 import { hasTexels } from "../state/look";
 import { views } from "../state/views";
@@ -19,6 +19,10 @@ export type Draws = "auto" | "browser" | "server";
 const KEY = "relume.drawnBy";
 const SLOW_MS = 80;
 const TRIALS = 8;
+/** Of a bake; a browser that loses more of them is left alone. */
+const MOST_LOST_CONTEXTS = 3;
+/** What lobes alone ask for; it is as much as everything else. */
+const OF_LOBES = "sky_share";
 
 /** Who draws moving views, as the user wants it. */
 export const drawnBy = signal<Draws>(readChoice());
@@ -30,12 +34,16 @@ interface Here {
   evaluator: Evaluator;
   /** The last tables of each view. */
   headers: Map<string, FrameHeader>;
+  /** Resolves when what lobes ask for is there. */
+  ofLobes: Promise<void> | null;
 }
 
 let here: Here | null = null;
 let loading: BakeConnection | null = null;
 /** Bakes that this browser has failed to draw. */
 const refused = new WeakSet<BakeConnection>();
+/** How many graphics contexts were lost while they were drawn. */
+const lost = new WeakMap<BakeConnection, number>();
 /** Whether the server draws: it was chosen, or the choice is left to us and it shows what this browser cannot. */
 const isServers = computed(() => drawnBy.value === "server" || (drawnBy.value === "auto" && hasTexels.value));
 const eyes = new Map<string, number>();
@@ -109,7 +117,18 @@ async function takeTables(from: BakeConnection, frame: Frame): Promise<void> {
   if (here?.of !== from || header.tables === null) return;
   here.evaluator.take(header.tables, payload);
   here.headers.set(header.view, header);
+  if (here.evaluator.lacksSkyShare) {
+    try {
+      await (here.ofLobes ??= loadOfLobes(here));
+    } catch (error) {
+      return giveUp(`${(error as Error).message}; the server draws instead.`);
+    }
+  }
   return redraw(header.view);
+}
+
+async function loadOfLobes({ of, evaluator }: Here): Promise<void> {
+  evaluator.keep(OF_LOBES, await loadArray(of, OF_LOBES));
 }
 
 /** One picture at a time, each from the newest eye; resolves when none is left to be drawn. */
@@ -129,7 +148,8 @@ async function drawAll(): Promise<void> {
       const frame = await drawn(here, view);
       if (frame !== null && here?.of === of && !overtaken.has(view)) await takeFrame(of, frame);
     } catch (error) {
-      return giveUp(`${(error as Error).message}; the server draws instead.`);
+      if (here?.of !== of) return;
+      return here.evaluator.isLost ? loseContext() : giveUp(`${(error as Error).message}; the server draws instead.`);
     }
     judge(performance.now() - start);
   }
@@ -154,11 +174,27 @@ function judge(ms: number): void {
   if (drawnBy.peek() === "auto" && durations.length === TRIALS && (middle ?? 0) > SLOW_MS) giveUp(null);
 }
 
+/** The server draws until all is loaded anew, which its next picture begins. */
+function loseContext(): void {
+  if (here === null) return;
+  const { of } = here;
+  const times = 1 + (lost.get(of) ?? 0);
+  lost.set(of, times);
+  if (times > MOST_LOST_CONTEXTS) return giveUp("This browser keeps losing its graphics context; the server draws instead.");
+  handOver();
+}
+
 /** The server draws from now on, until somebody wishes otherwise. */
 function giveUp(reason: string | null): void {
   if (here === null) return;
+  refused.add(here.of);
+  handOver();
+  if (reason !== null) note(reason);
+}
+
+function handOver(): void {
+  if (here === null) return;
   const { of, evaluator } = here;
-  refused.add(of);
   here = null;
   drawsHere.value = false;
   dirty.clear();
@@ -166,7 +202,6 @@ function giveUp(reason: string | null): void {
   evaluator.release();
   of.session.send({ type: "evaluate", by: "server" });
   of.toldEvaluator = false;
-  if (reason !== null) note(reason);
 }
 
 /** A picture of a view is shown: from now on this browser may draw it. */
@@ -208,22 +243,24 @@ async function load(of: BakeConnection): Promise<Here | null> {
     refused.add(of);
     return null;
   }
-  const path = `/api/bakes/${encodeURIComponent(of.bake)}/surface`;
-  const surface = await getJson<SurfaceBody>(path);
+  const surface = await getJson<SurfaceBody>(pathOf(of));
   if (surface.has_holes) throw new Error("This browser cannot draw glass or surfaces with holes");
-  const arrays = await Promise.all(
-    surface.arrays.map(async (name) => {
-      const bytes = new Uint8Array(await (await request(`${path}/${encodeURIComponent(name)}`)).arrayBuffer());
-      return [name, bytes] as const;
-    }),
-  );
-  return { of, evaluator: new Evaluator(gl, surface, new Map(arrays)), headers: new Map() };
+  const names = surface.arrays.filter((name) => name !== OF_LOBES);
+  const arrays = await Promise.all(names.map(async (name) => [name, await loadArray(of, name)] as const));
+  return { of, evaluator: new Evaluator(gl, surface, new Map(arrays)), headers: new Map(), ofLobes: null };
 }
+
+async function loadArray(of: BakeConnection, name: string): Promise<Uint8Array> {
+  return new Uint8Array(await (await request(pathOf(of, `/${encodeURIComponent(name)}`))).arrayBuffer());
+}
+
+const pathOf = ({ bake }: BakeConnection, array = ""): string =>
+  `/api/bakes/${encodeURIComponent(bake)}/surface${array}?layout=${SURFACE_LAYOUT}`;
 
 effect(() => {
   const choice = drawnBy.value;
   const { shown } = connections;
-  if (isServers.value) giveUp(null);
+  if (isServers.value || (choice === "auto" && here?.evaluator.isSoftware === true)) giveUp(null);
   if (shown === null) return;
   if (choice !== "server") refused.delete(shown);
   for (const view of shown.hello?.views ?? []) if (shown.arrivals.isShown(view.name)) void offer(shown, view.name);

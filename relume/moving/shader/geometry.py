@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS
 from relume.moving.bumps import expansions
+from relume.moving.points.lattice import Lattice, num_nodes
 from relume.moving.points.surface import Surface, Textures
 from relume.moving.transfer import MovingTransfer
 
@@ -22,11 +23,19 @@ MOST_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, fines
 def constants(transfer: MovingTransfer) -> dict[str, Any]:
     """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables.
 
-    `has_holes` says that surfaces have some, which shaders do not know of.
+    `first_points` are those of the materials, and one more at the end. `has_holes` says that surfaces have some, which
+    shaders do not know of.
     """
     rungs = {name: field.tolist() for name, field in ladder()._asdict().items()}
     sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
-    return {**sizes, "ladder": rungs, "expansions": expansions().tolist(), "has_holes": transfer.has_holes}
+    first = first_points(transfer).tolist()
+    texts = {"ladder": rungs, "expansions": expansions().tolist(), "first_points": first}
+    return {**sizes, **texts, "has_holes": transfer.has_holes}
+
+
+def first_points(transfer: MovingTransfer) -> NDArray[np.int64]:
+    """Find where the points of each material begin, which come one after another. (materials + 1,)"""
+    return np.searchsorted(transfer.surface.material, np.arange(len(transfer.material_names) + 1))
 
 
 def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
@@ -34,32 +43,67 @@ def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
 
     Returns:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
-        corners: of faces, three and the material. lattice: of faces, where the nodes of both sides begin, both numbers
-        of rows (the second times 256), 0. facing: normals of faces, `uv_scale`. positions: of corners. nodes: vertices
-        of the lattice. normals, points, weights: of vertices. places, point_normals, tangents: of points, the first
-        with their materials. sky_share: K numbers of each point in texels of four.
+        corners: of faces, three and the material. sides: two of each face, see `slots_of`. facing: normals of faces,
+        `uv_scale`. positions: of corners. normals, points, weights: of slots. places, point_normals, tangents: of
+        points. sky_share: K numbers of each point in texels of four, which lobes alone need.
         Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
         then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
         and its tangent.
     """
     surface, points = transfer.surface, transfer.surface.points
+    slots = slots_of(surface.lattice)
+    vertices = surface.vertices
     found: dict[str, Callable[[], Texels]] = {
         "corners": lambda: np.column_stack([surface.faces, surface.face_material]).astype(np.uint32),
-        "lattice": lambda: _lattice(surface),
+        "sides": lambda: slots.sides.reshape(-1, 4),
         "facing": lambda: _four(surface.face_normal, surface.uv_scale),
         "positions": lambda: _four(transfer.positions, 0),
-        "nodes": lambda: surface.lattice.node.astype(np.uint32)[:, None],
-        "normals": lambda: _four(surface.vertices.normal, 0),
-        "points": lambda: surface.vertices.point.astype(np.uint32),
-        "weights": lambda: surface.vertices.weight.astype(np.float32),
-        "places": lambda: _four(points.position, surface.material),
-        "point_normals": lambda: _four(points.normal, 0),
-        "tangents": lambda: _four(points.tangent, 0),
+        "normals": lambda: _four(vertices.normal[slots.vertex], 0).astype(np.float16),
+        "points": lambda: vertices.point[slots.vertex].astype(np.uint32),
+        "weights": lambda: vertices.weight[slots.vertex].astype(np.float16),
+        "places": lambda: _four(points.position, 0),
+        "point_normals": lambda: _four(points.normal, 0).astype(np.float16),
+        "tangents": lambda: _four(points.tangent, 0).astype(np.float16),
         "sky_share": lambda: transfer.sky_share.astype(np.float16).reshape(-1, 4),
     }
     if len(surface.textures.wraps):
         found |= _of_textures(surface, surface.textures)
     return found
+
+
+class Slots(NamedTuple):
+    """Where a shader keeps what vertices send.
+
+    Nodes of a grid have a slot each, one after another, so that they are found without being looked up. Faces with one
+    row, which are many where a mesh is fine, share those of their corners.
+
+    Attributes:
+        sides: of each side of a face, the numbers of its rows last. Of one row: the slots of its corners. Of more: its
+            first slot, 0, 0. A side without any has what the other has. (faces, 2, 4) uint32
+        vertex: that each slot is. (slots,) uint32
+    """
+
+    sides: NDArray[np.uint32]
+    vertex: NDArray[np.uint32]
+
+
+def slots_of(lattice: Lattice) -> Slots:
+    """Number the slots of a lattice."""
+    rows, first = lattice.num_rows.ravel().astype(np.int64), lattice.first.ravel().astype(np.int64)
+    counts = num_nodes(rows)
+    is_wide = rows > 1
+    of_wide = np.repeat(is_wide, counts)  # nodes are in the order of sides
+    narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i towards the second corner, j towards the third
+    corners, which = np.unique(lattice.node[narrow], return_inverse=True)
+    num_wide = int(of_wide.sum())
+    sides = np.zeros((len(rows), 4), np.uint32)
+    sides[:, 3] = rows
+    sides[is_wide, 0] = (np.cumsum(counts * is_wide) - counts)[is_wide]
+    sides[rows == 1, :3] = num_wide + which.reshape(narrow.shape)
+    sides = sides.reshape(-1, 2, 4)
+    has_none = sides[..., 3] == 0
+    sides = np.where(has_none[..., None], sides[:, ::-1], sides)
+    return Slots(sides, np.concatenate([lattice.node[of_wide], corners]).astype(np.uint32))
 
 
 def _of_textures(surface: Surface, textures: Textures) -> dict[str, Callable[[], Texels]]:
@@ -98,11 +142,6 @@ def _kept_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.int6
             break
         widest.pop(0)
     return np.concatenate(ranges).astype(np.int64), np.cumsum([0, *map(len, ranges)])
-
-
-def _lattice(surface: Surface) -> Texels:
-    first, rows = surface.lattice.first.astype(np.uint32), surface.lattice.num_rows.astype(np.uint32)
-    return np.column_stack([first, rows[:, 0] + 256 * rows[:, 1], np.zeros(len(rows), np.uint32)])
 
 
 def _four(three: NDArray[Any], more: Any) -> Texels:

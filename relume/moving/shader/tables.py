@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 
 from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.brdf.albedo import TEXTURES
-from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.frame import Materials, Wanted
 from relume.moving.points.surface import EMISSION, NORMAL_MAP
+from relume.moving.shader.geometry import first_points
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import emission_of
@@ -22,7 +23,8 @@ from relume.views.resolve import encode_pixels
 F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
-_ROUGH = -(-num_functions(QUICK_DEGREE) // 4)  # texels of four functions that are not nothing in what is found quickly
+_ROUGH = num_functions(QUICK_DEGREE)  # that are not nothing in what is found quickly
+_KEPT = np.array([1, _ROUGH, NUM_FUNCTIONS])  # how many are sent: a shader is written for each number
 _MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
@@ -60,18 +62,20 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
     """
     look, light = wanted.look, wanted.light
     lobes, background = wanted.materials.lobes, look.background
-    has_lobes, has_narrow = bool(len(lobes.is_told)), not lobes.is_told.all()
     catchers = tuple(k for k, name in enumerate(transfer.material_names) if look.materials[name].catcher)
     parts = {
         "materials": Part(
             (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, wanted)
         ),
-        "light": Part(
-            (versions[1], has_narrow),
-            lambda: _light(wanted.arriving, has_narrow=has_narrow, is_rough=wanted.is_rough),
-        ),
     }
-    if has_lobes or background.kind == "map":
+    needs = needed_functions(wanted.materials, transfer.surface.textures.of_material[:, NORMAL_MAP] >= 0)
+    of_all, first = (wanted.arriving.total, wanted.arriving.others), first_points(transfer)
+    for name, vectors, needed in zip(("vectors", "others"), of_all, needs, strict=True):
+        most = np.minimum(needed, _ROUGH) if wanted.is_rough else needed
+        for k in np.flatnonzero(most * np.diff(first)):
+            of_points, key = vectors[first[k] : first[k + 1]], f"{name}/{k}"
+            parts[key] = Part((versions[1], most[k]), partial(_light, key, of_points, int(most[k])))
+    if len(lobes.is_told) or background.kind == "map":
         parts["sky"] = Part(
             light.environment.map, lambda: {"sky": _words(transfer.sky_in(light.environment.map).texels)}
         )
@@ -126,8 +130,8 @@ def _lobes(lobes: Lobes) -> F32:
 
 def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDArray[np.int32]:
     """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
-    lobe, its normal map, whether it is a catcher, how many texels of its light vectors it needs; then the bits of its
-    emission, and the image of that. (materials · (groups + 2), 4) int32, −1 for none"""
+    lobe, its normal map, whether it is a catcher, −1; then the bits of its emission, and the image of that.
+    (materials · (groups + 2), 4) int32, −1 for none"""
     tables, lobes, sends = materials.tables, materials.lobes, materials.sends
     of_material = transfer.surface.textures.of_material
     out = np.full((len(sends), NUM_GROUPS + 2, 4), -1, np.int32)
@@ -137,16 +141,33 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
     out[:, NUM_GROUPS, 0] = lobes.of
     out[:, NUM_GROUPS, 1] = of_material[:, NORMAL_MAP]
     out[:, NUM_GROUPS, 2] = [wanted.look.materials[name].catcher for name in transfer.material_names]
-    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
-    of_even, of_uneven = _degrees(tables.even, of_function[ladder().cosine]), _degrees(tables.uneven, of_function)
-    for k, (of, normal_map) in enumerate(zip(tables.of, of_material[:, NORMAL_MAP], strict=True)):
-        degrees = [*of_even[of[:, 0][of[:, 0] >= 0]], *of_uneven[of[:, 1][of[:, 1] >= 0]]]
-        degree = DEGREE if normal_map >= 0 else max(degrees, default=0)
-        out[k, NUM_GROUPS, 3] = -(-num_functions(int(degree)) // 4)
     emission = [(*emission_of(wanted.light, name), 0) for name in transfer.material_names]
     out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
     out[:, NUM_GROUPS + 1, 3] = of_material[:, EMISSION]
     return out.reshape(-1, 4)
+
+
+def needed_functions(materials: Materials, has_map: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find how many functions of light vectors materials get: at least up to the degree that their tables know, all
+    where a normal map asks where light comes from.
+
+    Args:
+        materials: what they send. has_map: whether each has a normal map. (materials,)
+    Returns:
+        Of vectors of all light, and of those of others than the sky, where narrow lobes look. (materials,) each
+    """
+    tables, lobes = materials.tables, materials.lobes
+    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
+    of_even, of_uneven = _degrees(tables.even, of_function[ladder().cosine]), _degrees(tables.uneven, of_function)
+    total = np.zeros(len(tables.of), np.int64)
+    for k, of in enumerate(tables.of):
+        degrees = [*of_even[of[:, 0][of[:, 0] >= 0]], *of_uneven[of[:, 1][of[:, 1] >= 0]]]
+        total[k] = _KEPT[np.searchsorted(_KEPT, num_functions(max(degrees)))] if degrees else 0
+    total[has_map] = NUM_FUNCTIONS
+    others = np.zeros(len(total), np.int64)
+    with_lobe = lobes.of >= 0
+    others[with_lobe] = np.where(lobes.is_told[lobes.of[with_lobe]], 0, NUM_FUNCTIONS)
+    return total, others
 
 
 def _degrees(tables: F32, degree_of: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -158,17 +179,14 @@ def _degrees(tables: F32, degree_of: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(matters.sum(axis=1) - 1, np.int64).clip(0)
 
 
-def _light(arriving: Arriving, *, has_narrow: bool, is_rough: bool) -> dict[str, Texels]:
-    """Light vectors in half precision, channel by channel, and by how much they were divided."""
-    kept = (_ROUGH if is_rough else NUM_FUNCTIONS // 4) * 4
-    vectors = {"vectors": arriving.total} | ({"others": arriving.others} if has_narrow else {})
-    out: dict[str, Texels] = {}
-    for name, values in vectors.items():
-        largest = float(max(values.max(), -values.min(), 1e-30))
-        scale = 2.0 ** np.ceil(np.log2(largest / _LARGEST))
-        out[name] = np.multiply(values[:, :, :kept], np.float32(1 / scale)).astype(np.float16).reshape(-1, 4)
-        out[f"{name}_scale"] = np.array([[scale, kept // 4]], np.float32)
-    return out
+def _light(name: str, vectors: F32, num: int) -> dict[str, Texels]:
+    """So many functions of light vectors of points in half precision, channel by channel, each point in whole texels;
+    and by how much they were divided, and how many functions there are."""
+    largest = float(max(vectors.max(initial=0), -vectors.min(initial=0), 1e-30))
+    scale = 2.0 ** np.ceil(np.log2(largest / _LARGEST))
+    out = np.zeros((len(vectors), -(-3 * num // 4) * 4), np.float16)
+    out[:, : 3 * num] = np.multiply(vectors[:, :, :num], np.float32(1 / scale)).reshape(len(vectors), -1)
+    return {name: out.reshape(-1, 4), f"{name}/scale": np.array([[scale, num]], np.float32)}
 
 
 def _unhidden(transfer: MovingTransfer, wanted: Wanted, catchers: Sequence[int]) -> F32:

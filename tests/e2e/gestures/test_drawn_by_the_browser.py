@@ -18,6 +18,15 @@ from scipy.ndimage import maximum_filter, minimum_filter
 DRAWN_MS = 60_000
 BAR_PX, WINDOW_PX, SPAN = 60, 25, 16
 Pixels = NDArray[np.int16]
+KEEP_CONTEXTS = """
+  window.contexts = [];
+  const make = OffscreenCanvas.prototype.getContext;
+  OffscreenCanvas.prototype.getContext = function (...args) {
+    const made = make.apply(this, args);
+    window.contexts.push(made);
+    return made;
+  };
+"""
 
 
 def never_at_rest(page: Page, sizes: list[int]) -> None:
@@ -43,6 +52,7 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tupl
     with opened_page(browser) as page:
         sizes: list[int] = []
         never_at_rest(page, sizes)
+        page.add_init_script(KEEP_CONTEXTS)
         page.goto(f"{server.url}/?scene={moving_scene}")
         wait_until_drawn(page)
         editor = Editor(page)
@@ -125,6 +135,30 @@ def test_an_eye_costs_no_pictures_on_the_network_twice(moving: tuple[Editor, lis
         assert max(sizes, default=0) < 2000
         assert changed(before, after) > 0.05
         before = after
+
+
+def test_a_context_that_is_lost_in_a_drag_is_made_anew_twice(moving: tuple[Editor, list[int]]) -> None:
+    editor, _ = moving
+    page, box = editor.page, editor.canvas.bounding_box()
+    assert box is not None
+    draw_here(page)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(2):
+        page.mouse.move(x + 20 + 40 * k, y)
+        drawn = num_drawn(page)
+        page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
+        before = page.evaluate("window.contexts.length")
+        page.evaluate("window.contexts.at(-1).getExtension('WEBGL_lose_context').loseContext()")
+        page.mouse.move(x + 40 + 40 * k, y)
+        page.wait_for_function("n => window.contexts.length > n", arg=before, timeout=DRAWN_MS)
+        drawn = num_drawn(page)
+        page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
+    page.mouse.up()
+    here = settled(editor)
+    choose(page, "server")
+    assert np.abs(here - settled(editor)).mean() < 1
 
 
 def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> None:
