@@ -96,11 +96,11 @@ def slots_of(lattice: Lattice) -> Slots:
     narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i towards the second corner, j towards the third
     corners, which = np.unique(lattice.node[narrow], return_inverse=True)
     num_wide = int(of_wide.sum())
-    sides = np.zeros((len(rows), 4), np.uint32)
-    sides[:, 3] = rows
-    sides[is_wide, 0] = (np.cumsum(counts * is_wide) - counts)[is_wide]
-    sides[rows == 1, :3] = num_wide + which.reshape(narrow.shape)
-    sides = sides.reshape(-1, 2, 4)
+    of_each = np.zeros((len(rows), 4), np.uint32)
+    of_each[:, 3] = rows
+    of_each[is_wide, 0] = (np.cumsum(counts * is_wide) - counts)[is_wide]
+    of_each[rows == 1, :3] = num_wide + which.reshape(narrow.shape)
+    sides = of_each.reshape(-1, 2, 4)
     has_none = sides[..., 3] == 0
     sides = np.where(has_none[..., None], sides[:, ::-1], sides)
     return Slots(sides, np.concatenate([lattice.node[of_wide], corners]).astype(np.uint32))

@@ -80,8 +80,8 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
             light.environment.map, lambda: {"sky": _words(transfer.sky_in(light.environment.map).texels)}
         )
     if background.kind == "blurred":
-        key = light.environment.map, background.blur
-        parts["background"] = Part(key, lambda: {"background": _words(transfer.map_of(*key).reshape(-1, 3))})
+        blurred = light.environment.map, background.blur
+        parts["background"] = Part(blurred, lambda: {"background": _words(transfer.map_of(*blurred).reshape(-1, 3))})
     if catchers:
         parts["unhidden"] = Part(
             (light, catchers, wanted.is_rough), lambda: {"unhidden": _unhidden(transfer, wanted, catchers)}
