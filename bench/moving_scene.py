@@ -37,13 +37,15 @@ class MovingScene:
 
     Args:
         name: of the scene. folder: for its stores. size: of pictures. tiny: whether it is a trial.
+        num_points: about how many; None: 50,000.
     """
 
-    def __init__(self, name: str, folder: Path, size: tuple[int, int], tiny: bool) -> None:
+    def __init__(
+        self, name: str, folder: Path, size: tuple[int, int], tiny: bool, num_points: int | None = None
+    ) -> None:
+        asked = num_points or (2000 if tiny else 50_000)
         self.name, self.folder, self.size, self._scene = name, folder, size, built_in(name)
-        self.recipe = Recipe(
-            "surface", (self._scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=2000 if tiny else 50_000
-        )
+        self.recipe = Recipe("surface", (self._scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=asked)
         bake_here(METHODS["surface"], self._scene, replace(self.recipe, num_points=500), folder / f"{name}-warm.zarr")
         began, path = time.perf_counter(), folder / f"{name}.zarr"
         bake_here(METHODS["surface"], self._scene, self.recipe, path)
@@ -89,19 +91,37 @@ class MovingScene:
         return self._timed(picture, frames, move)
 
     def edits_s(
-        self, frames: int, change: Callable[[dict[str, Any], float], None], *, is_watched: bool = False
+        self,
+        frames: int,
+        change: Callable[[dict[str, Any], float], None],
+        *,
+        is_watched: bool = False,
+        beside: Callable[[MovingPicture, int], None] = lambda picture, k: None,
     ) -> list[float]:
         """Seconds from a look to its encoded frame, each once.
 
         Args:
             frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
+            beside: what else happens to the picture in each frame.
         """
         looks = [
             self.look(lambda document, k=k: change(document, k / frames))  # type: ignore[misc]
             for k in range(frames + 1)
         ]
         picture = self.picture(looks[-1], is_watched=is_watched)
-        return self._timed(picture, frames, lambda k: picture.set_look(looks[k]))
+
+        def begin(k: int) -> None:
+            picture.set_look(looks[k])
+            beside(picture, k)
+
+        return self._timed(picture, frames, begin)
+
+    def share_of(self, material: str) -> float:
+        """Share of the first view's pixels that show a material."""
+        face = look_around(self.moving.surface, self.moving.embree, self._scene.cameras[0], self.size).hits.face
+        face = face[: self.size[0] * self.size[1]]
+        seen = self.moving.surface.face_material[face[face >= 0]]
+        return float(np.sum(seen == list(self.moving.material_names).index(material)) / len(face))
 
     def _timed(self, picture: MovingPicture, frames: int, begin: Callable[[int], None]) -> list[float]:
         found = []

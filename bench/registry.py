@@ -119,6 +119,7 @@ GROUPS = (
             "surface.points_rmse",
         ),
     ),
+    Group("bench.surface_edits", ("surface.brdf_vs_sun",)),
     Group("bench.gather_rooms", ("gather.interior_bake_s", "gather.interior_store_mb")),
     Group("bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
     Group("bench.gather_follow", ("gather.follow_error",)),

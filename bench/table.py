@@ -44,6 +44,7 @@ TARGETS = {
     "surface.bake_s": "≤ 60 s",
     "surface.bytes_per_point": "≤ 1000",
     "surface.view_fps": "≥ 15",
+    "surface.brdf_vs_sun": "≥ 10",
     "surface.canvas_fps": "≥ 15",
     "btf.compression_error": "≤ 2 %",
     "btf.compression_s": "≤ 300 s",

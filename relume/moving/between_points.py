@@ -69,6 +69,6 @@ def take_off_lobes(
         is_needed: points that are asked. (points,) uint8
         sent: by them, written. (points, groups, 3) float32
     """
-    rows = np.flatnonzero(is_needed)
+    rows = np.flatnonzero(is_needed.view(np.bool_))
     args = (surface.points, surface.material, lobes, light, np.ascontiguousarray(eye, np.float32), glances, rows)
     for_shares(lambda start, stop: _take_off(*args, start, stop, sent), len(rows))

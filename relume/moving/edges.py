@@ -44,9 +44,11 @@ def _differ(material, normals, faces, distance, directions, p, q):  # type: igno
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _mark(material, normals, faces, distance, directions, width, height, start, stop, is_edge):  # type: ignore[no-untyped-def]
     """Mark pixels [start, stop) and those to the right and below that differ from them; shares may mark one twice."""
+    column = start % width
     for p in range(start, stop):
-        if p % width < width - 1 and _differ(material, normals, faces, distance, directions, p, p + 1):
+        if column < width - 1 and _differ(material, normals, faces, distance, directions, p, p + 1):
             is_edge[p] = is_edge[p + 1] = True
+        column = column + 1 if column < width - 1 else 0
         if p < width * (height - 1) and _differ(material, normals, faces, distance, directions, p, p + width):
             is_edge[p] = is_edge[p + width] = True
 

@@ -162,7 +162,7 @@ def send(
         Radiance, by groups of terms as in `Tables`. (points, groups, 3) float32
     """
     found = np.zeros((len(vectors), NUM_GROUPS, 3), np.float32) if out is None else out
-    rows = np.flatnonzero(is_needed)
+    rows = np.flatnonzero(is_needed.view(np.bool_))
     args = (
         ladder(),
         surface.points,

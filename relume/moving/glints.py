@@ -111,7 +111,7 @@ def glance(
         The share of the sky that is seen there, and the radiance of what hides it. (points, 4) float32
     """
     found = np.zeros((len(sky), 4), np.float32) if out is None else out
-    rows = np.flatnonzero(is_needed)
+    rows = np.flatnonzero(is_needed.view(np.bool_))
     args = (
         ladder(),
         surface.points,

@@ -56,15 +56,17 @@ class Seen(NamedTuple):
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _aim(rotation, half_width, half_height, width, height, pixels, places, start, stop, out):  # type: ignore[no-untyped-def]
-    """Direct rays [start, stop), several in a row through places in one of the pixels."""
-    for r in range(start, stop):
-        pixel, place = pixels[r // places.shape[0]], r % places.shape[0]
-        y, x = pixel // width, pixel % width
-        a = (np.float32(2) * (x + places[place, 0]) / width - np.float32(1)) * half_width
-        b = (np.float32(1) - np.float32(2) * (y + places[place, 1]) / height) * half_height
-        scale = np.float32(1) / math.sqrt(a * a + b * b + np.float32(1))
-        for axis in range(3):
-            out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
+    """Direct rays through places in pixels [start, stop), those of one pixel in a row."""
+    for i in range(start, stop):
+        y = pixels[i] // width
+        x = pixels[i] - y * width
+        for place in range(places.shape[0]):
+            r = i * places.shape[0] + place
+            a = (np.float32(2) * (x + places[place, 0]) / width - np.float32(1)) * half_width
+            b = (np.float32(1) - np.float32(2) * (y + places[place, 1]) / height) * half_height
+            scale = np.float32(1) / math.sqrt(a * a + b * b + np.float32(1))
+            for axis in range(3):
+                out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -150,7 +152,7 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
     rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
     directions = np.empty((len(pixels) * len(places), 3), np.float32)
     aim = (rotation, np.float32(half_height * width / height), half_height, width, height, pixels, places)
-    for_shares(lambda start, stop: _aim(*aim, start, stop, directions), len(directions))
+    for_shares(lambda start, stop: _aim(*aim, start, stop, directions), len(pixels))
     return directions
 
 
@@ -187,6 +189,6 @@ def at_vertices(surface: Surface, is_seen: NDArray[np.uint8], values: F32, out: 
     """
     flat = values.reshape(len(values), -1)
     found = np.zeros((len(is_seen), *values.shape[1:]), np.float32) if out is None else out
-    rows, flat_found = np.flatnonzero(is_seen), found.reshape(len(found), -1)
+    rows, flat_found = np.flatnonzero(is_seen.view(np.bool_)), found.reshape(len(found), -1)
     for_shares(lambda start, stop: _spread(surface.vertices, rows, flat, start, stop, flat_found), len(rows))
     return found

@@ -22,6 +22,7 @@ from relume.parallel import for_shares
 F32 = NDArray[np.float32]
 
 _LEAST_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
+_SHARES = 4  # for each thread: a ray that sees a highlight costs five times as much as others
 _ALL_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
 
 
@@ -169,7 +170,8 @@ def _combine(  # type: ignore[no-untyped-def]
             n = leant
         if lobe >= 0:
             row, share = _mirror(mirrored, about, shares, d, outward, lobe, n, light)
-        texture_value[:] = 1
+        # by element: assigning a slice is a call
+        texture_value[0] = texture_value[1] = texture_value[2] = 1
         if textures.of_material[material, EMISSION] >= 0:
             image = textures.of_material[material, EMISSION]
             sample_texture(textures, image, place[0], place[1], footprint, texture_value)
@@ -178,7 +180,7 @@ def _combine(  # type: ignore[no-untyped-def]
         for group in range(NUM_GROUPS):
             if not sends[material, group]:
                 continue
-            texture_value[:] = 1
+            texture_value[0] = texture_value[1] = texture_value[2] = 1
             texture = textures.of_material[material, group - 1] if group else -1
             if texture >= 0:
                 sample_texture(textures, texture, place[0], place[1], footprint, texture_value)
@@ -229,7 +231,7 @@ def combine(
     Returns:
         (rays, 3) float32
     """
-    found = np.zeros((len(seen.directions), 3), np.float32) if out is None else out
+    found = np.empty((len(seen.directions), 3), np.float32) if out is None else out
     asked = np.arange(len(found), dtype=np.int32) if rows is None else rows
     hits = (seen.hits.face, seen.hits.uv, seen.hits.distance)
     of_surface = (
@@ -240,5 +242,5 @@ def combine(
         of_surface, np.float32(pixel_angle), hits, seen.directions, seen.vertex, seen.weight,
         *sent, emission, mirrored, asked,
     )  # fmt: skip
-    for_shares(lambda start, stop: _combine(*args, start, stop, found), len(asked))
+    for_shares(lambda start, stop: _combine(*args, start, stop, found), len(asked), _SHARES)
     return found

@@ -98,7 +98,7 @@ def sky_about(sky, turn, dx, dy, dz, sigma, out):  # type: ignore[no-untyped-def
     place: Any = min(max(step + 1, 0.0), sky.levels.shape[0] - 1.0)
     lower = np.int64(place)
     share = place - lower
-    out[:] = 0
+    out[0] = out[1] = out[2] = 0
     u, v = _place(turn, dx, dy, dz)
     _add_level(sky, lower, u, v, np.float32(1 - share), out)
     _add_level(sky, min(lower + 1, sky.levels.shape[0] - 1), u, v, np.float32(share), out)

@@ -10,14 +10,14 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges
+from relume.parallel import for_ranges, num_threads
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene, intersect16, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
 
 F32 = NDArray[np.float32]
 
-_RAYS_A_RANGE = 8192
+_RAYS_A_RANGE, _RANGES_A_THREAD = 8192, 4  # at least; at most: to hand a range out takes as long as 700 rays
 _BY_DIRECTION = np.float32(0)  # the chance of rays that are given none
 
 
@@ -50,13 +50,15 @@ def _trace(intersect, scene, arguments, origins, directions, chance, start, stop
     """Trace rays [start, stop). origins, chance: of n rays, or one of all."""
     last_origin, last_chance = origins.shape[0] - 1, chance.shape[0] - 1
     packet = new_packet(scene, arguments)
+    for k in range(LANES):  # Embree leaves origins as they are
+        set_origin(packet, k, origins[0, 0], origins[0, 1], origins[0, 2])
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         ask_first(packet, width)
         for k in range(LANES):
             r = first + min(k, width - 1)
-            o = min(r, last_origin)
-            set_origin(packet, k, origins[o, 0], origins[o, 1], origins[o, 2])
+            if last_origin > 0:
+                set_origin(packet, k, origins[r, 0], origins[r, 1], origins[r, 2])
             aim(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
             take_chance(packet, k, chance[min(r, last_chance)])
         trace_hits(intersect, packet)
@@ -84,7 +86,7 @@ def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | n
             hits.face, hits.uv, hits.distance,
         ),
         n,
-        _RAYS_A_RANGE,
+        max(_RAYS_A_RANGE, n // (_RANGES_A_THREAD * num_threads())),
     )  # fmt: skip
     return hits
 

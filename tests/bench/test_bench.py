@@ -29,7 +29,7 @@ LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
     "bench.gather_error", "bench.gather_full", "bench.gather_scenes", "bench.peer_gather", "bench.lights",
     "bench.memory", "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather",
-    "bench.gather_follow", "bench.glass", "bench.rough", "bench.mirror", "bench.surface",
+    "bench.gather_follow", "bench.glass", "bench.rough", "bench.mirror", "bench.surface", "bench.surface_edits",
     "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.load", "bench.refusal",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error

@@ -48,7 +48,7 @@ def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-
     level: Any = min(math.log2(max(np.float32(footprint * size), np.float32(1))), np.float32(last))
     lower = np.int64(level)
     share = np.float32(level - lower)
-    out[:] = 0
+    out[0] = out[1] = out[2] = 0  # assigning a slice is a call
     _add_level(textures, texture, lower, u, v, np.float32(1) - share, out)
     if share > 0:
         _add_level(textures, texture, lower + 1, u, v, share, out)

@@ -1,0 +1,58 @@
+"""surface.brdf_vs_sun: how many times as soon as with Sun 2007 the picture of an edited material is there.
+
+    ratio = (1 / frames a second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
+
+The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has points here.
+The exponent of the floor's highlight moves, its light between surfaces followed as `surface.brdf_ms` says; `widest` is
+the same of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine of
+2007, in scenes and at frame sizes of its own. `moved_eye` is the ratio where our eye moves in each frame, too.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bench.figure import Figure
+from bench.moving_scene import MovingScene
+from bench.surface import exponent_of
+from bench.timing import percentiles
+from relume.parallel import num_threads
+
+_SUN_FPS = {"tweety": (13_000, 28.73), "indoor": (35_700, 12.57), "watch": (62_100, 7.23)}
+_FLOOR, _WALLS = "Floor", "Walls"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake the box with as many points as each of Sun's scenes has vertices, and edit it."""
+    frames, size = (3, (60, 60)) if tiny else (60, (400, 400))
+    context: dict[str, Any] = {"threads": num_threads(), "size": "×".join(map(str, size))}
+    ratios = []
+    for name, (num_points, fps) in _SUN_FPS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            box = MovingScene("cornell_box", Path(folder), size, tiny, num_points=2000 if tiny else num_points)
+            of_sun_ms = 1e3 / fps
+            ms, worst_ms = (1e3 * s for s in percentiles(box.edits_s(frames, exponent_of(_FLOOR), is_watched=True)))
+            widest_ms = 1e3 * percentiles(box.edits_s(frames, exponent_of(_WALLS), is_watched=True))[0]
+            moved_ms = 1e3 * percentiles(_with_eye(box, frames))[0]
+        ratios.append(of_sun_ms / ms)
+        context |= {"floor": box.share_of(_FLOOR), "walls": box.share_of(_WALLS)}
+        context[name] = {
+            "points": box.num_points, "sun_ms": of_sun_ms, "ms": ms, "p95_ms": worst_ms, "ratio": ratios[-1],
+            "widest": of_sun_ms / widest_ms, "moved_eye": of_sun_ms / moved_ms,
+        }  # fmt: skip
+    return [Figure("surface.brdf_vs_sun", min(ratios), "×", context)]
+
+
+def _with_eye(box: MovingScene, frames: int) -> list[float]:
+    """Seconds of frames in which the eye moves and the floor is edited."""
+    camera, change = box.scene.cameras[0], exponent_of(_FLOOR)
+
+    def move(picture: Any, k: int) -> None:
+        to_world = camera.to_world.copy()
+        to_world[:3, 3] += 0.01 * (k + 1) * to_world[:3, 0]
+        picture.set_eye(replace(camera, to_world=to_world), box.size)
+
+    return box.edits_s(max(2, frames // 3), change, is_watched=True, beside=move)
