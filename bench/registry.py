@@ -90,7 +90,7 @@ GROUPS = (
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group("bench.surface_truth", ("surface.rmse_diffuse", "surface.rmse_glossy_0.5", "surface.rmse_glossy_0.3")),
-    Group("bench.resting", ("surface.rest_s",)),
+    Group("bench.resting", ("surface.rest_s", "surface.rest_first_s")),
     Group("bench.canvas_moving", ("surface.canvas_fps",)),
     Group(
         "bench.btf",

@@ -1,10 +1,13 @@
-"""surface.rest_s: what somebody waits for the exact picture who has moved the eye and lets it rest.
+"""surface.rest_s, surface.rest_first_s: what somebody waits who has moved the eye and lets it rest.
 
 The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
 From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
 begins. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
 under a look without reflected light, for which no gather rays are traced. `moving_error` is how far the moving
 picture was from the exact one that replaces it, edges included, which only the exact one antialiases.
+
+`surface.rest_first_s` ends with the moving picture that a few exact samples have corrected; `first_error` is how far
+that was from the exact one, `its_…` are of the Cornell box.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.figure import Figure
 from relume.bake import Recipe
@@ -25,7 +29,8 @@ from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
-from relume.moving.resting import TRACING, RestingPicture
+from relume.moving.resting import RestingPicture
+from relume.moving.still_jobs import TRACING, SparseJob, StillJob
 from relume.parallel import num_threads
 from relume.scene.built_in import built_in
 from relume.scene.model import Scene
@@ -35,21 +40,32 @@ _MEMORY = 4 << 30
 
 
 class _Rested(NamedTuple):
-    """Seconds until the exact picture, of them until all was traced, and the relative RMSE of the one before."""
+    """Seconds until the exact picture, those in which it was traced, and until the first corrected one; errors.
+
+    `error` and `first_error` are the relative RMSE of the moving picture, and of the corrected one.
+    """
 
     rest_s: float
     tracing_s: float
     error: float
+    first_s: float
+    first_error: float
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake both scenes, move the eye, wait."""
     still = _rested("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
     box = still if tiny else _rested("cornell_box", (400, 400), tiny)
-    (rest_s, tracing_s, error), (direct_s, _, _) = still
-    context = {"size": "640×480", "tracing_s": tracing_s, "direct_s": direct_s, "moving_error": error}
+    whole, direct = still
+    context = {"size": "640×480", "tracing_s": whole.tracing_s, "direct_s": direct.rest_s, "moving_error": whole.error}
     of_box = {"cornell_box_400": box[0].rest_s, "its_tracing_s": box[0].tracing_s, "its_direct_s": box[1].rest_s}
-    return [Figure("surface.rest_s", rest_s, "s", {**context, **of_box, "threads": num_threads()})]
+    errors = {"size": "640×480", "moving_error": whole.error, "first_error": whole.first_error}
+    errors |= {"its_moving_error": box[0].error, "its_first_error": box[0].first_error}
+    threads = {"threads": num_threads()}
+    return [
+        Figure("surface.rest_s", whole.rest_s, "s", {**context, **of_box, **threads}),
+        Figure("surface.rest_first_s", whole.first_s, "s", {**errors, "cornell_box_400": box[0].first_s, **threads}),
+    ]
 
 
 def _rested(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Rested, _Rested]:
@@ -86,16 +102,25 @@ def _rest(scene: Scene, picture: RestingPicture, step: int, size: tuple[int, int
     to_world[:3, 3] += 0.01 * (step + 1) * to_world[:3, 0]
     picture.set_eye(replace(camera, to_world=to_world), size)
     picture.advance(None)
-    before, began, traced = picture.image().copy(), time.perf_counter(), [0.0]
-
-    def tell(share: float) -> None:
-        if share <= TRACING:
-            traced[0] = time.perf_counter() - began
-
+    before, began, first, first_s, tracing_s = picture.image().copy(), time.perf_counter(), None, 0.0, 0.0
     while (job := picture.next_job()) is not None:
+        job_began = time.perf_counter()
+
+        def tell(share: float, job: object = job, job_began: float = job_began) -> None:
+            nonlocal tracing_s
+            if share <= TRACING and isinstance(job, StillJob):
+                tracing_s = time.perf_counter() - job_began
+
         picture.install(job, job.make(tell, lambda: False))
         picture.advance(None)
+        if isinstance(job, SparseJob):
+            picture.encode(picture.all_tiles(), "rgb9e5")
+            first, first_s = picture.image().copy(), time.perf_counter() - began
     picture.encode(picture.all_tiles(), "rgb9e5")
     rest_s, exact = time.perf_counter() - began, picture.image()
-    error = float(np.sqrt(np.mean((before - exact) ** 2) / np.mean(exact**2)))
-    return _Rested(rest_s, traced[0], error)
+    first_error = _error(before if first is None else first, exact)
+    return _Rested(rest_s, tracing_s, _error(before, exact), first_s, first_error)
+
+
+def _error(image: NDArray[np.float32], exact: NDArray[np.float32]) -> float:
+    return float(np.sqrt(np.mean((image - exact) ** 2) / np.mean(exact**2)))

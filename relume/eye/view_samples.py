@@ -104,7 +104,13 @@ def _levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshol
 
 
 def sample_view(
-    scene: Scene, geometry: Geometry, view: str, size: tuple[int, int], *, follows_mirrors: bool = True
+    scene: Scene,
+    geometry: Geometry,
+    view: str,
+    size: tuple[int, int],
+    *,
+    follows_mirrors: bool = True,
+    smooths_edges: bool = True,
 ) -> ViewSamples:
     """Find the view samples of one camera.
 
@@ -112,6 +118,7 @@ def sample_view(
         scene: what is seen. geometry: its triangles.
         view: name of the camera. size: width and height in pixels.
         follows_mirrors: whether what is seen in mirrors has samples.
+        smooths_edges: whether pixels across edges have several; else each shows what is seen through its middle.
     """
     width, height = size
     camera = next(camera for camera in scene.cameras if camera.name == view)
@@ -125,13 +132,9 @@ def sample_view(
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     coarse = layers(directions, EVERYWHERE)
-    is_edge = np.any([edges_of(geometry, layer, size) for layer in coarse], axis=0)
-    for layer in coarse:
-        if layer.chain is not None:
-            is_edge |= bright_edges_of(layer, scene.environment.radiance, size)
-    if geometry.embree.holes is not None and geometry.embree.holes.blends:
-        is_edge |= is_partly_there(geometry, origin, directions)
-
+    is_edge = np.zeros(width * height, np.bool_)
+    if smooths_edges:
+        is_edge = _edges(scene, geometry, coarse, origin, directions, size)
     edge_pixel = np.nonzero(is_edge)[0]
     more_x = (x[edge_pixel, None] + POSITIONS[:, 0]).astype(np.float32).ravel()
     more_y = (y[edge_pixel, None] + POSITIONS[:, 1]).astype(np.float32).ravel()
@@ -140,6 +143,23 @@ def sample_view(
     chosen = joined([part for of_rays in parts for part in of_rays], MOST_MIRRORS)
     num_rays = sum(len(layer.ray) for layer in (*coarse, *fine))
     return _sorted_samples(scene, geometry, chosen, width, pixel_angle, num_rays)
+
+
+def _edges(
+    scene: Scene, geometry: Geometry, layers: list[Layer], origin: F32, directions: F32, size: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Find the pixels that want more rays than the one through their middle. (pixels,)
+
+    Args:
+        layers: of those rays. origin: of them. (3,) directions: of them. (pixels, 3). size: of the picture, pixels.
+    """
+    is_edge = np.any([edges_of(geometry, layer, size) for layer in layers], axis=0)
+    for layer in layers:
+        if layer.chain is not None:
+            is_edge |= bright_edges_of(layer, scene.environment.radiance, size)
+    if geometry.embree.holes is not None and geometry.embree.holes.blends:
+        is_edge |= is_partly_there(geometry, origin, directions)
+    return np.asarray(is_edge)
 
 
 def _sorted_samples(

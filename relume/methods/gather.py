@@ -52,13 +52,14 @@ class GatherMethod:
 
     Args:
         rays: of a view sample. glossy: of those, where its material has a highlight.
+        smooths_edges: whether pixels across edges have several samples.
     """
 
     name = "gather"
     stages = (*SampledViews.stages, "gather cells", "gather rays")
 
-    def __init__(self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS) -> None:
-        self._views, self._rays, self._glossy = SampledViews(), rays, glossy
+    def __init__(self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS, *, smooths_edges: bool = True) -> None:
+        self._views, self._rays, self._glossy = SampledViews(smooths_edges=smooths_edges), rays, glossy
         self._tree_of = LastRead(read_tree)
 
     def prepare(self, scene: Scene) -> None:

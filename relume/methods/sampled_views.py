@@ -65,17 +65,22 @@ class Sampled(NamedTuple):
 
 
 class SampledViews:
-    """The two stages as a part of a method; a `relume.bake.BakeMethod` but for its name."""
+    """The two stages as a part of a method; a `relume.bake.BakeMethod` but for its name.
+
+    Args:
+        smooths_edges: whether pixels across edges have several samples; see `sample_view`.
+    """
 
     stages: tuple[str, ...] = ("samples", "visibility")
 
-    def __init__(self) -> None:
+    def __init__(self, *, smooths_edges: bool = True) -> None:
+        self._smooths_edges = smooths_edges
         self._lock = threading.Lock()
         self._geometry: tuple[str, Geometry] | None = None
         self.sampled_of = LastRead(_read_sampled)
 
-    def __reduce__(self) -> tuple[type[SampledViews], tuple[()]]:
-        return type(self), ()  # travels to workers without what it keeps
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _sampled_views, (self._smooths_edges,)  # travels to workers without what it keeps
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
@@ -160,7 +165,8 @@ class SampledViews:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
             return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene), scene)}, 0, 0.0)
-        samples = sample_view(scene, self.geometry_of(scene), task.view, recipe.size)
+        geometry = self.geometry_of(scene)
+        samples = sample_view(scene, geometry, task.view, recipe.size, smooths_edges=self._smooths_edges)
         points = samples.surface.points
         arrays: dict[str, NDArray[Any]] = {
             "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
@@ -194,6 +200,10 @@ class SampledViews:
             if self._geometry is None or self._geometry[0] != scene.id:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
+
+
+def _sampled_views(smooths_edges: bool) -> SampledViews:
+    return SampledViews(smooths_edges=smooths_edges)
 
 
 def _read_sampled(store: StoreReader) -> Sampled:

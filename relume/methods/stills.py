@@ -160,34 +160,44 @@ class Stills:
     """
 
     def __init__(self, lit: BouncedViews, scene: Scene) -> None:
-        self._lit, self._scene, self._method = lit, scene, GatherMethod(_RAYS, _GLOSSY_RAYS)
+        self._lit, self._scene = lit, scene
+        self._smooth = GatherMethod(_RAYS, _GLOSSY_RAYS)
+        self._sparse = GatherMethod(_RAYS, _GLOSSY_RAYS, smooths_edges=False)
 
     def make(
-        self, camera: Camera, size: tuple[int, int], reflects: bool, progress: Progress, cancelled: Cancelled
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        reflects: bool,
+        progress: Progress,
+        cancelled: Cancelled,
+        *,
+        smooths_edges: bool = True,
     ) -> Still:
         """Trace what an eye sees, as far as it is not remembered.
 
         Args:
             camera: the eye. size: width and height, pixels. reflects: with light from other surfaces.
             progress: called with the share done. cancelled: asked now and then.
+            smooths_edges: whether pixels across edges have several samples; else each shows what is at its middle.
         Raises:
             CancelledError: `cancelled` said so.
             MemoryBudgetError: what is traced is larger than the memory may be.
         """
-        memory, name = self._lit.memory.passing, _name_of(camera, size)
+        memory, name = self._lit.memory.passing, _name_of(camera, size, smooths_edges)
         key = self._lit.key, "still", name
         tracing = memory.find(key, Tracing)
         if tracing is None:
-            begun = self._begin(replace(camera, name=name), size)
+            begun = self._begin(self._smooth if smooths_edges else self._sparse, replace(camera, name=name), size)
             tracing = memory.get(key, Tracing, begun.num_bytes, lambda: begun)
         tracing.finish(reflects, progress, cancelled)
         return Still.of(self._lit, tracing.store, reflects)
 
-    def _begin(self, camera: Camera, size: tuple[int, int]) -> Tracing:
-        recipe = Recipe(self._method.name, (camera.name,), size, self._lit.num_lights)
+    def _begin(self, method: GatherMethod, camera: Camera, size: tuple[int, int]) -> Tracing:
+        recipe = Recipe(method.name, (camera.name,), size, self._lit.num_lights)
         scene = with_cameras(self._scene, [camera])
-        store = StoreWithView(self._lit.store, self._method.attributes(scene, recipe))
-        return Tracing(self._method, scene, recipe, store)
+        store = StoreWithView(self._lit.store, method.attributes(scene, recipe))
+        return Tracing(method, scene, recipe, store)
 
 
 def _shortened(tasks: Iterable[Task]) -> Iterator[Task]:
@@ -198,7 +208,7 @@ def _shortened(tasks: Iterable[Task]) -> Iterator[Task]:
                 yield replace(task, start=start, stop=min(start + _ROWS_A_TASK, task.stop))
 
 
-def _name_of(camera: Camera, size: tuple[int, int]) -> str:
+def _name_of(camera: Camera, size: tuple[int, int], smooths_edges: bool) -> str:
     """A name that no other eye's still has: by it the memory tells their images apart."""
-    where = hashlib.sha256(camera.to_world.tobytes() + repr((camera.yfov, size)).encode()).hexdigest()[:16]
-    return f"{camera.name} {where}"
+    what = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges)).encode()
+    return f"{camera.name} {hashlib.sha256(what).hexdigest()[:16]}"

@@ -46,6 +46,14 @@ class Seen(NamedTuple):
     is_seen: NDArray[np.uint8]
     is_needed: NDArray[np.uint8]
 
+    def middles(self, num_pixels: int) -> Seen:
+        """Those through the middles of pixels alone, of what is behind glass. num_pixels: of the picture"""
+        rows = slice(0, num_pixels)
+        return self._replace(
+            hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
+            vertex=self.vertex[rows], weight=self.weight[rows], panes=Panes(np.empty(0, np.int64), _NOTHING),
+        )  # fmt: skip
+
     def first_row(self, pixel: int) -> int:
         """Which row tells what is met first through the middle of a pixel, glass included."""
         panes = self.panes.ray

@@ -15,8 +15,10 @@ from relume.look import Look
 from relume.moving.again import Shown, shown_of
 from relume.moving.arriving import Arriving, LightJob, roughly, wholly
 from relume.moving.behind import alpha_of
+from relume.moving.correction import corrected
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
+from relume.moving.points.surface import Surface
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
@@ -73,6 +75,8 @@ class MovingPicture:
         self._vectors: tuple[Light, Arriving] | None = None
         self._quick: tuple[NDArray[np.uint8], Light, Arriving] | None = None  # found quickly, at points that are needed
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
+        self._by: F32 | None = None  # what is added to the frame
+        self._is_corrected = False  # what is shown has it
         self.draws = True
         self._told: tuple[Light, Arriving, bool] | None = None
         self._num_told = self._num_materials = 0
@@ -95,6 +99,7 @@ class MovingPicture:
         light = light_of(look, self._transfer.material_names, has_bounces=True, solo=solo)
         self._transfer.map_of(light.environment.map)  # what cannot be had is said now
         self._look, self._light, self._solo = look, light, solo
+        self._by = None
 
     def set_eye(self, camera: Camera, size: tuple[int, int]) -> None:
         """See from elsewhere, in a picture of another size; nothing is computed yet.
@@ -104,6 +109,20 @@ class MovingPicture:
         """
         self._camera, self._size = camera, size
         self._num_eyes += 1
+        self._by = None
+
+    def correct(self, by: F32 | None) -> None:
+        """Add what it is off by, see `relume.moving.correction`, until another look or eye is given.
+
+        Args:
+            by: of each pixel, (height, width, 3) float32; None: nothing.
+        """
+        self._by = by
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether something is added that only this picture knows, no shader elsewhere."""
+        return self._by is not None
 
     @property
     def eye(self) -> tuple[Camera, tuple[int, int]]:
@@ -147,10 +166,13 @@ class MovingPicture:
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
         wanted = (self._look, self._solo, self._num_eyes)
-        if self._look is None or (wanted == self._shown and self._is_rough == self._has_to_be_rough()):
+        is_drawn = wanted == self._shown and self._is_rough == self._has_to_be_rough()
+        if self._look is None or (is_drawn and self._is_corrected == self.is_corrected):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)
-        self._is_rough = self._has_to_be_rough()
-        self._is_stale, self._shown = True, wanted
+        self._is_corrected = self.is_corrected
+        if not is_drawn:
+            self._is_rough = self._has_to_be_rough()
+            self._is_stale, self._shown = True, wanted
         if self.draws:
             self._draw()
         return Advance(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
@@ -209,6 +231,30 @@ class MovingPicture:
         versions = self._num_materials, self._num_told
         return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
 
+    @property
+    def seen(self) -> Seen:
+        """What its rays see."""
+        return self._look_around()
+
+    def along_middles(self, size: tuple[int, int]) -> tuple[F32, Seen]:
+        """What it shows along the rays through the middles of the pixels of a picture of another size.
+
+        Args:
+            size: width and height in pixels.
+        Returns:
+            Linear radiance (height, width, 3) float32, and what the rays see.
+        """
+        assert self._look is not None
+        transfer = self._transfer
+        seen = look(transfer.surface, transfer.embree, self._camera, size).middles(size[0] * size[1])
+        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
+        return frame_of(transfer, wanted, seen, self._camera, size).image, seen
+
+    @property
+    def surface(self) -> Surface:
+        """What is seen."""
+        return self._transfer.surface
+
     def _now(self) -> Light:
         assert self._light is not None
         return self._light
@@ -248,7 +294,7 @@ class MovingPicture:
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame: the tiles one after another, row-major."""
         drawn = self._draw()
-        if drawn is not None and form == "rgb9e5" and list(tiles) == self.all_tiles():
+        if drawn is not None and self._by is None and form == "rgb9e5" and list(tiles) == self.all_tiles():
             return _words_of(drawn).tobytes()
         image = self._image()
         parts = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
@@ -271,7 +317,9 @@ class MovingPicture:
 
     def _image(self) -> F32:
         drawn = self._draw()
-        return np.zeros((*self._size[::-1], 3), np.float32) if drawn is None else drawn.frame.image
+        if drawn is None:
+            return np.zeros((*self._size[::-1], 3), np.float32)
+        return drawn.frame.image if self._by is None else corrected(drawn.frame.image, self._by)
 
     def probe(self, x: int, y: int) -> dict[str, Any]:
         """What a pixel shows, and where its surface is.

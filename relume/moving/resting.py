@@ -1,98 +1,33 @@
-"""A moving picture that becomes exact when its eye rests: a still of that place replaces it, until the eye moves on."""
+"""A moving picture that becomes exact when its eye rests: a still of that place replaces it, until the eye moves on.
+
+Until the still is there the moving picture is corrected by a few exact samples, which are there at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import CancelledError, ParameterError, RelumeError
+from relume.errors import ParameterError
 from relume.look import Look
 from relume.memory import Memory
 from relume.moving.arriving import LightJob
 from relume.moving.picture import MovingPicture
 from relume.moving.shader.tables import Numbers, Part
-from relume.picture.finish import finish
-from relume.picture.jobs import Cancelled, Progress
+from relume.moving.still_jobs import ExactView, Eye, MakeStill, SparseJob, StillJob
 from relume.picture.light import Solo
 from relume.picture.picture import Advance, Picture
-from relume.picture.transfer import Transfer
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
-Eye = tuple[Camera, tuple[int, int]]
-MakeStill = Callable[[Camera, tuple[int, int], bool, Progress, Cancelled], Transfer]
-"""Finds what an eye sees, in a picture of this size: an opened bake of this one fixed view, with light between surfaces
-where that is wanted."""
-
-TRACING = 0.5  # of what a still tells to be done; the rest is shading
-
-
-def exact_picture(
-    make_still: MakeStill, eye: Eye, look: Look, solo: Solo, memory: Memory, progress: Progress, cancelled: Cancelled
-) -> Picture:
-    """Trace and shade what an eye sees.
-
-    Args:
-        make_still: finds what it sees. eye: camera, and size of its picture. look, solo: that it is shown in.
-        memory: of what is made for the picture. progress: called with about the share done.
-        cancelled: asked now and then.
-    Raises:
-        CancelledError: `cancelled` said so.
-    """
-    transfer = make_still(*eye, _reflects(look), lambda share: progress(TRACING * share), cancelled)
-    picture = Picture(transfer, next(iter(transfer.views)), memory)
-    picture.set_look(look, solo=solo)
-    finish(picture, look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
-    return picture
-
-
-@dataclass(frozen=True)
-class StillJob:
-    """The exact picture of where an eye rests, made beside the frames; a `relume.picture.jobs.Job`.
-
-    Attributes:
-        number: of the eye, among those that the picture was given. num_looks: that it was given, too.
-        look, solo: that the picture is made in; others that came meanwhile are followed from there.
-        take: gets the number of the eye, whether light between surfaces can be shown, and the picture when it is there;
-            None where it cannot be had.
-    """
-
-    make_still: MakeStill
-    memory: Memory
-    eye: Eye
-    number: int
-    num_looks: int
-    look: Look
-    solo: Solo
-    take: Callable[[int, bool, Picture | None], None]
-
-    what = "the exact picture from here"
-    state: ClassVar[Literal["shading"]] = "shading"
-    refines = True
-
-    @property
-    def key(self) -> tuple[Hashable, ...]:
-        """Jobs of one eye and look are one: while hands edit, nothing takes a core from them."""
-        return "still", self.number, self.num_looks
-
-    def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
-        """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
-        try:
-            return exact_picture(self.make_still, self.eye, self.look, self.solo, self.memory, progress, cancelled)
-        except CancelledError:
-            raise
-        except RelumeError:  # the scene is gone, or it needs more memory than there is: the moving picture stays
-            return None
-
-    def install(self, made: Picture | None) -> None:
-        """Hand it over."""
-        self.take(self.number, _reflects(self.look), made)
 
 
 class RestingPicture:
@@ -106,6 +41,7 @@ class RestingPicture:
     def __init__(self, moving: MovingPicture, make_still: MakeStill, memory: Memory) -> None:
         self._moving, self._make_still, self._memory = moving, make_still, memory
         self._number, self._num_looks, self._rests = 0, 0, True
+        self._compared: tuple[int, int] | None = None  # numbers of eye and look that a few exact samples were found for
         self._still: Picture | None = None
         self._has_reflections = False  # the still, if a look wants them
         self._is_still = False  # the still is what is shown
@@ -166,8 +102,9 @@ class RestingPicture:
         self._moving.draws = draws
 
     def parts(self) -> tuple[dict[str, Part], Numbers] | None:
-        """What a shader needs to draw the moving picture; None while the still is shown."""
-        return None if self._shown is self._still else self._moving.parts()
+        """What a shader needs to draw the moving picture; None while it is corrected, or the still is shown."""
+        is_drawn_here = self._shown is self._still or self._moving.is_corrected
+        return None if is_drawn_here else self._moving.parts()
 
     def touch(self, pointer: str) -> None:
         """Prepare what a hand takes hold of; see `Picture.touch`."""
@@ -181,8 +118,16 @@ class RestingPicture:
         job = self._moving.next_job()
         if job is not None or not self._rests or self._look is None:
             return job
-        wanted = self._number, self._num_looks, self._look, self._solo
-        return StillJob(self._make_still, self._memory, self._moving.eye, *wanted, self._take)
+        wanted = ExactView(self._make_still, self._memory, self._moving.eye, self._look, self._solo)
+        asked = self._number, self._num_looks
+        if self._compared != asked and SparseJob.is_worth(wanted):
+            return SparseJob(wanted, copy(self._moving), ("sparse", *asked), partial(self._correct, asked))
+        return StillJob(wanted, ("still", *asked), partial(self._take, self._number))
+
+    def _correct(self, asked: tuple[int, int], by: F32 | None) -> None:
+        if asked == (self._number, self._num_looks):  # else the hand has moved on
+            self._compared = asked
+            self._moving.correct(by)
 
     def _take(self, number: int, has_reflections: bool, still: Picture | None) -> None:
         if number != self._number or self._look is None:
@@ -200,7 +145,7 @@ class RestingPicture:
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
-        if isinstance(job, StillJob):
+        if isinstance(job, StillJob | SparseJob):
             job.install(made)
         elif isinstance(job, LightJob):
             self._moving.install(job, made)
@@ -228,6 +173,7 @@ class RestingPicture:
 
     def _was_off(self, still: Picture) -> float | None:
         """How far the moving picture is from a still, relative RMS; None where it has not caught up, or all is dark."""
+        self._moving.correct(None)
         if self._moving.advance(None).fidelity != "approximate":
             return None
         exact = still.image()

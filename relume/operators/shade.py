@@ -24,7 +24,7 @@ from relume.project.texels import texel_rows
 
 F32 = NDArray[np.float32]
 
-_SAMPLES_A_STEP = 512
+_FEWEST_A_STEP, _MOST_A_STEP, _STEPS = 128, 2048, 8
 
 
 @dataclass(frozen=True)
@@ -84,5 +84,6 @@ def shade(
         else:
             rows[start:stop] = project_levels(term, contractions, lights, receivers, start, stop, Shader)[:, 0]
 
-    for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "shading")
+    grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
+    for_steps(step, num_samples, grain, progress, cancelled, "shading")
     return Shaded.of(rows)

@@ -11,78 +11,9 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import angles_into
-from relume.light.gather_rays import local_ray, shift_of, small_shifts_of, weight_of
+from relume.light.gather_rays import shift_of
 from relume.light.local import light_sample
-from relume.project.sent import square_of
-from relume.trace.cell_tree import NO_CELL
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _in_frame(n, t, o):  # type: ignore[no-untyped-def]
-    """Find the bitangent n × t of a shading frame, and direction o in the frame."""
-    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-    ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
-    oy = bx * o[0] + by * o[1] + bz * o[2]
-    oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
-    return (bx, by, bz), (ox, oy, oz)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def list_gathered(  # type: ignore[no-untyped-def]
-    points, wo, links, pattern, sent, start, stop, first, wi, out, irradiance
-):
-    """List the rays of points [start, stop) that hit a cell, in the points' local frames.
-
-    Args:
-        points: `Points`. wo: towards the viewer. (n, 3) float32
-        links: cell that each ray hits. (n, rays) uint16. pattern: the rays' directions.
-        sent: by cells, a `Sent`.
-        start, stop: the points.
-        first: written, where the rays of each point begin. (points + 1,) int64
-        wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
-        irradiance: written, w · L of each ray. (3, K) float32
-    Returns:
-        K, the number of rays.
-    """
-    _, normal, tangent, seed = points
-    has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
-    rows, rays, weights = np.empty(most, np.int32), np.empty(most, np.int64), np.empty(most, np.float32)
-    end = 0
-    for p in range(start, stop):
-        begin, first[p - start] = end, end
-        n, t = normal[p], tangent[p]
-        (bx, by, bz), (ox, oy, oz) = _in_frame(n, t, wo[p])
-        shifts = small_shifts_of(pattern, seed[p])
-        for ray in range(most):
-            cell = links[p, ray]
-            if cell == NO_CELL:
-                continue
-            x, y, z = local_ray(pattern, ray, shifts, ox, oy, oz)
-            weight = weight_of(pattern, x, y, z, ox, oy, oz)
-            wi[0, end], wi[1, end], wi[2, end] = x, y, z
-            out[0, end], out[1, end], out[2, end] = ox, oy, oz
-            for channel in range(3):
-                irradiance[channel, end] = weight * sent.even[cell, channel]
-            weights[end - begin] = weight
-            end += 1
-        if not has_lobes:
-            continue
-        num = k = 0
-        for ray in range(most):  # those that hit a lobe, without a branch that nobody could foretell
-            cell = links[p, ray]
-            rows[num], rays[num] = sent.lobe[cell], k
-            num += rows[num] >= 0
-            k += cell != NO_CELL
-        for which in range(num):
-            k, row = rays[which], rows[which]
-            x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
-            dx, dy, dz = t[0] * x + bx * y + n[0] * z, t[1] * x + by * y + n[1] * z, t[2] * x + bz * y + n[2] * z
-            square = square_of(sent.frame, row, -dx, -dy, -dz)
-            for channel in range(3):
-                value = sent.scale[row, channel] * sent.table[row, square, channel]
-                irradiance[channel, begin + k] += weights[k] * value
-    first[stop - start] = end
-    return end
+from relume.project.gathered_kernel import in_frame
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -95,7 +26,8 @@ def list_local(  # type: ignore[no-untyped-def]
         points: `Points`. wo: towards the viewer. (n, 3) float32
         light, pattern, gain, visible: as in `LocalRays`.
         start, stop: the points.
-        first, wi, out, irradiance: written, as by `list_gathered`; the irradiance of a ray is w · cos θi · gain.
+        first, wi, out, irradiance: written, as by `relume.project.gathered_kernel.list_gathered`; the irradiance of a
+            ray is w · cos θi · gain.
     Returns:
         K, the number of rays.
     """
@@ -104,7 +36,7 @@ def list_local(  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         first[p - start] = end
         n, t = normal[p], tangent[p]
-        (bx, by, bz), (ox, oy, oz) = _in_frame(n, t, wo[p])
+        (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
         shift_u, shift_v = shift_of(pattern, seed[p])
         for sample in range(pattern.uv.shape[0]):
             if not (visible[p, sample >> 3] >> (sample & 7)) & 1:

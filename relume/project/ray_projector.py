@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
 from relume.project.contraction import Contraction
@@ -26,28 +27,33 @@ class RayProjector:
 
     def __init__(self, term: Term, contraction: Contraction, points: Receivers, capacity: int) -> None:
         self._term, self._contraction, self._points, self._capacity = term, contraction, points, capacity
-        self._rays = [rays.times(contraction.constant) for rays in points.rays]
         most = capacity * max((rays.rays_a_point for rays in points.rays), default=0)
         self._listed = Listed(np.empty(capacity + 1, np.int64), *np.empty((3, 3, most), np.float32))
 
     def add(self, start: int, stop: int, out: F32) -> None:
         """Add points [start, stop) to `out`, laid out as `project_rays` has it."""
-        for rays in self._rays:
+        arrived = np.zeros_like(out)
+        for rays in self._points.rays:
             if isinstance(rays, GatherRays) and rays.sharing is not None:
-                self._add_shared(rays, start, stop, out)
+                self._add_shared(rays, start, stop, arrived)
             else:
-                self._add(rays, self._points, start, stop, out)
+                self._add(rays, self._points, start, stop, arrived)
+        out += self._contraction.constant[:, None] * arrived
 
     def _add_shared(self, rays: GatherRays, start: int, stop: int, out: F32) -> None:
         """Add what points have of their own rays and of their neighbours'."""
         weights = rays.sharing[start:stop]
-        among = np.unique(weights.indices)
+        among, place = np.unique(weights.indices, return_inverse=True)
         arrived = np.zeros((len(among), *out.shape[1:]), np.float32)
         self._add(rays.alone(among), self._points.places(among), 0, len(among), arrived)
-        out += (weights[:, among] @ arrived.reshape(len(among), -1)).reshape(out.shape)
+        within = csr_array((weights.data, place, weights.indptr), shape=(stop - start, len(among)))
+        out += (within @ arrived.reshape(len(among), -1)).reshape(out.shape)
 
     def _add(self, rays: Rays, points: Receivers, start: int, stop: int, out: F32) -> None:
         c = self._contraction
+        if c.kinds.size == 0 and self._term.is_lambertian and isinstance(rays, GatherRays):
+            out[:, :, 0] += self._uprights(points, start, stop)[:, None] * rays.sum(points, start, stop)
+            return
         for first in range(start, stop, self._capacity):
             last = min(first + self._capacity, stop)
             shading, some = self._list(rays, points, first, last), out[first - start : last - start]
@@ -59,10 +65,16 @@ class RayProjector:
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.active, some,
             )  # fmt: skip
 
+    def _uprights(self, points: Receivers, start: int, stop: int) -> F32:
+        """The quotients of a Lambertian term, which know of no direction but above and below. (stop - start,)"""
+        cos_theta_o = np.einsum("nc,nc->n", points.normal[start:stop], points.wo[start:stop])
+        nothing = np.zeros_like(cos_theta_o)
+        return np.asarray(self._term.quotients(nothing, nothing, nothing + 1, nothing, nothing, cos_theta_o)[0])
+
     def weigh(self, start: int, stop: int) -> F32:
         """Weigh what each ray of points [start, stop) brings, all curves contracted. (3, rays) float32"""
         c, found = self._contraction, []
-        for rays in self._rays:
+        for rays in self._points.rays:
             shading = self._list(rays, self._points, start, stop)
             found.append(np.empty((3, shading.shape[1]), np.float32))
             listed = self._listed
@@ -70,7 +82,7 @@ class RayProjector:
                 listed.first[: stop - start + 1], listed.wi, listed.wo, listed.irradiance, shading,
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.setting_of, found[-1],
             )  # fmt: skip
-        return np.concatenate(found, axis=1)
+        return np.concatenate(found, axis=1) * c.constant[:, None]
 
     def _list(self, rays: Rays, points: Receivers, start: int, stop: int) -> F32:
         """List rays of points; returns the term's quotients. (1 or 3, rays)"""

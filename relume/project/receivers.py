@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from relume.light.gather_rays import Pattern
 from relume.light.local import LocalLight
 from relume.points import Points
-from relume.project.ray_kernel import list_gathered, list_local
+from relume.project.gathered_kernel import list_gathered, sum_gathered
+from relume.project.ray_kernel import list_local
 from relume.project.sent import Sent
 
 F32 = NDArray[np.float32]
@@ -33,10 +34,6 @@ class Rays(Protocol):
     @property
     def rays_a_point(self) -> int:
         """The most rays that any point has."""
-        ...
-
-    def times(self, factor: F32) -> Rays:
-        """Multiply their light in every channel. factor: (3,) float32"""
         ...
 
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
@@ -69,10 +66,6 @@ class GatherRays:
         """The most rays that any point has."""
         return int(self.links.shape[1])
 
-    def times(self, factor: F32) -> GatherRays:
-        """Multiply their light in every channel; see `Rays`."""
-        return replace(self, sent=self.sent.times(factor))
-
     def alone(self, chosen: NDArray[np.integer]) -> GatherRays:
         """Choose those of some points, which do not share them."""
         return replace(self, links=self.links[chosen], sharing=None)
@@ -81,6 +74,12 @@ class GatherRays:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
         arriving = self.links, self.pattern, self.sent
         return int(list_gathered(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+
+    def sum(self, receivers: Receivers, start: int, stop: int) -> F32:
+        """Sum the light of the rays of `receivers` [start, stop), wherever it comes from. (stop - start, 3)"""
+        found = np.empty((stop - start, 3), np.float32)
+        sum_gathered(receivers.points, receivers.wo, self.links, self.pattern, self.sent, start, stop, found)
+        return found
 
 
 @dataclass(frozen=True)
@@ -102,10 +101,6 @@ class LocalRays:
     def rays_a_point(self) -> int:
         """The most rays that any point has."""
         return len(self.pattern.uv)
-
-    def times(self, factor: F32) -> LocalRays:
-        """Multiply their light in every channel; see `Rays`."""
-        return replace(self, gain=self.gain * factor)
 
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""

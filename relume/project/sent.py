@@ -51,10 +51,6 @@ class Sent(NamedTuple):
     scale: F32
     table: NDArray[np.int16]
 
-    def times(self, factor: F32) -> Sent:
-        """Multiply every channel. factor: (3,) float32"""
-        return self._replace(even=self.even * factor, scale=self.scale * factor)
-
 
 def evenly(radiance: F32) -> Sent:
     """Send the same in every direction. radiance: black in row `NO_CELL`. (NO_CELL + 1, 3) float32"""

@@ -12,7 +12,7 @@ from relume.look import Look
 from relume.methods.moving_views import MovingViews
 from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
-from relume.moving.resting import exact_picture
+from relume.moving.still_jobs import ExactView
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.picture import Picture
@@ -54,7 +54,8 @@ def render_image(
         if stills is None:
             return _pixels(_moving(transfer, view_name, look, eye), for_display)
         memory = transfer.memory.passing
-        return _pixels(exact_picture(stills.make, eye, look, None, memory, progress, cancelled), for_display)
+        exact = ExactView(stills.make, memory, eye, look, None).picture(progress, cancelled)
+        return _pixels(exact, for_display)
     if size is not None and tuple(size) != (view.width, view.height):
         raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
     picture = Picture(cast("Transfer", transfer), view_name, transfer.memory.passing)

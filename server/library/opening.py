@@ -48,8 +48,8 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         if transfer.eyes is not Eyes.FREE:
             return Picture(transfer, view, memory, is_watched=True)
 
-        def still(*of_eye: Any) -> Any:
-            return stills_of(transfer).make(*of_eye)  # in the job's thread: reading a scene takes its time
+        def still(*of_eye: Any, **how: Any) -> Any:
+            return stills_of(transfer).make(*of_eye, **how)  # in the job's thread: reading a scene takes its time
 
         return RestingPicture(MovingPicture(transfer, view, is_watched=True), still, memory)
 

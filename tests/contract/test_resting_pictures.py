@@ -11,8 +11,10 @@ from relume.errors import CancelledError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.methods.stills import Stills, Tracing
+from relume.moving.frame import frame_of
 from relume.moving.picture import MovingPicture
-from relume.moving.resting import RestingPicture, StillJob
+from relume.moving.resting import RestingPicture
+from relume.moving.still_jobs import SparseJob, StillJob
 from relume.render.image import render_image
 from relume.scene.placed_camera import with_cameras
 from relume.store import bake_here
@@ -159,6 +161,70 @@ def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
     make_next(picture)
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
+
+
+@pytest.fixture
+def few_at_once(picture, aside, monkeypatch):
+    """The same, darker than it should be, with exact samples at every fourth pixel: found, shaded, and shown."""
+
+    def darkened(transfer, wanted, seen, camera, size):
+        frame = frame_of(transfer, wanted, seen, camera, size)
+        is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
+        return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
+
+    monkeypatch.setattr("relume.moving.picture.frame_of", darkened)
+    monkeypatch.setattr("relume.moving.still_jobs.STEP", 4)
+    picture.set_eye(aside, (160, 100))
+    picture.advance(None)
+    before, job = picture.image().copy(), picture.next_job()
+    assert isinstance(job, SparseJob)
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    return picture, before
+
+
+def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there(few_at_once):
+    picture, before = few_at_once
+    step = picture.advance(None)
+    assert (step.exact, step.fidelity, step.was_off, step.changed) == (False, "approximate", None, True)
+    assert picture.parts() is None  # no shader elsewhere knows of it
+    first = picture.image().copy()
+    assert isinstance(picture.next_job(), StillJob)
+    step = rested(picture)
+    assert step.exact
+    assert step.was_off == pytest.approx(relative_rmse(before, picture.image()), rel=1e-3)
+    assert step.was_off > 0.1
+    assert relative_rmse(first, picture.image()) < 0.4 * step.was_off
+
+
+def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, aside, monkeypatch):
+    monkeypatch.setattr("relume.moving.still_jobs.STEP", 4)
+    picture.set_eye(aside, (160, 100))
+    picture.advance(None)
+    before = picture.image().copy()
+    make_next(picture)
+    first = picture.image().copy()
+    rested(picture)
+    assert relative_rmse(first, picture.image()) < 1.01 * relative_rmse(before, picture.image())
+
+
+@pytest.mark.parametrize("is_edit", [True, False], ids=["a curve drawn", "the eye moved"])
+def test_what_a_few_samples_said_is_of_one_look_and_one_eye(few_at_once, moving, is_edit):
+    picture, _ = few_at_once
+    assert picture.advance(None).changed
+    alone = MovingPicture(moving, "front")
+    look, eye = look_of(moving, lit(drawn)), (moving.views["front"].camera, (160, 100))
+    if is_edit:
+        picture.set_look(look, hand=LOBE)
+        alone.set_look(look)
+        alone.set_eye(*picture._moving.eye)
+    else:
+        picture.set_eye(*eye)
+        alone.set_look(look_of(moving, lit()))
+        alone.set_eye(*eye)
+    assert picture.advance(None).changed
+    alone.advance(None)
+    np.testing.assert_array_equal(picture.image(), alone.image())
+    assert isinstance(picture.next_job(), SparseJob)
 
 
 @pytest.fixture

@@ -143,6 +143,17 @@ def image_numpy(model, bands, receivers):
     return out
 
 
+def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
+    """Nothing is listed then; a surface that is seen from behind sends nothing."""
+    bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
+    behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
+    expected = image_numpy("lambert", bands, behind)
+    found = image("lambert", bands, None, lights, behind)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-6 * expected.max())
+    assert expected[3:].min() > 0
+    assert not expected[:3].any()
+
+
 @pytest.mark.parametrize("model", list(ANALYTIC))
 def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
     bands = bands_of(model)

@@ -1,0 +1,116 @@
+"""What a few exact samples say of a whole picture, against loops over pixels and samples that do the same."""
+
+import numpy as np
+import pytest
+
+from relume.moving.correction import Places, corrected, correction
+
+STEP, WIDTH, HEIGHT = 4, 48, 32
+
+
+def places(width, height):
+    """Two materials that meet in the middle, one of them bent, under a strip of sky, seen straight from above."""
+    y, x = np.divmod(np.arange(width * height), width)
+    u, v = (x + 0.5) / width * WIDTH, (y + 0.5) / height * HEIGHT
+    along = np.maximum(u - WIDTH / 2, 0)
+    bend = np.arctan(0.01 * along)
+    position = np.stack([u, v, -0.005 * along**2], axis=1).astype(np.float32)
+    normal = np.stack([np.sin(bend), 0 * u, np.cos(bend)], axis=1).astype(np.float32)
+    material = np.where(v < 4, -1, (u >= WIDTH / 2).astype(int)).astype(np.int32)
+    return Places(position, normal, material, width)
+
+
+def likeness(at, p, samples, q):
+    if at.material[p] < 0 or at.material[p] != samples.material[q]:
+        return 0.0
+    away = at.position[p].astype(np.float64) - samples.position[q]
+    turn = max(float(at.normal[p].astype(np.float64) @ samples.normal[q]), 0)
+    rise = abs(float(at.normal[p].astype(np.float64) @ away))
+    return turn**8 * np.exp(-rise / (0.1 * np.linalg.norm(away) + 1e-9))
+
+
+def mean(weights, off):
+    return sum(w * off[q] for q, w in weights) / (sum(w for _, w in weights) + 0.02) if weights else np.zeros(3)
+
+
+def about(samples, q):
+    """Weights of the samples about one."""
+    y, x = divmod(q, samples.width)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            if (dx, dy) != (0, 0) and 0 <= x + dx < samples.width and 0 <= y + dy < samples.height:
+                other = (y + dy) * samples.width + x + dx
+                yield other, likeness(samples, q, samples, other) * (0.5 if dx and dy else 1)
+
+
+def expected(off, samples, pixels):
+    belief = np.zeros(len(off))
+    for material in (0, 1):
+        rows = [q for q in range(len(off)) if samples.material[q] == material]
+        said = {q: mean([(o, w) for o, w in about(samples, q) if w > 0], off) for q in rows}
+        both, size, whole = sum(np.array([said[q] @ off[q], said[q] @ said[q], off[q] @ off[q]]) for q in rows)
+        explained = max(both, 0) ** 2 / (size * whole)
+        belief[rows] = min(both / size, 1) if explained > 0.2 else 0
+    out = np.zeros((len(pixels.material), 3))
+    for p in range(len(out)):
+        y, x = divmod(p, pixels.width)
+        u, v = (x + 0.5) / STEP - 0.5, (y + 0.5) / STEP - 0.5
+        weights = []
+        for q in range(len(off)):
+            row, column = divmod(q, samples.width)
+            tent = max(1 - abs(u - column), 0) * max(1 - abs(v - row), 0)
+            if tent > 0:
+                weights.append((q, tent * likeness(pixels, p, samples, q)))
+        out[p] = mean(weights, belief[:, None] * off)
+    return out
+
+
+@pytest.fixture(scope="module")
+def both():
+    return places(WIDTH // STEP, HEIGHT // STEP), places(WIDTH, HEIGHT)
+
+
+def image(samples, values):
+    return values.reshape(samples.height, samples.width, 3).astype(np.float32)
+
+
+def test_between_samples_it_is_what_loops_find(both):
+    samples, pixels = both
+    rng = np.random.default_rng(7)
+    smooth = 0.1 * samples.position[:, :1] * [1, 0.5, 0.2]
+    off = np.where(samples.material[:, None] == 0, smooth, rng.normal(size=smooth.shape))
+    off[samples.material < 0] = 0
+    radiance = rng.random(off.shape) + 2
+    by = correction(image(samples, radiance), image(samples, radiance + off), samples, pixels)
+    wanted = image(pixels, expected(off, samples, pixels))
+    np.testing.assert_allclose(by, wanted, atol=2e-6)
+    assert np.abs(by).max() > 0.1
+    assert not by[:4].any()  # the sky is never off
+
+
+def test_what_is_off_smoothly_is_mended_and_noise_is_not_believed(both):
+    samples, pixels = both
+
+    def smooth(at):
+        return np.repeat(0.5 + 0.01 * at.position[:, :1], 3, axis=1) * (at.material >= 0)[:, None]
+
+    zero = np.zeros((len(samples.material), 3))
+    by = correction(image(samples, zero), image(samples, smooth(samples)), samples, pixels)
+    wanted = image(pixels, smooth(pixels))
+    assert np.sqrt(np.mean((by - wanted) ** 2)) < 0.1 * np.sqrt(np.mean(wanted**2))
+    noise = np.random.default_rng(3).normal(size=zero.shape)
+    by = correction(image(samples, zero), image(samples, noise), samples, pixels)
+    assert not by.any()
+
+
+def test_samples_beside_edges_say_nothing(both):
+    samples, _ = both
+    edges = np.array([10 * WIDTH + 21, 11 * WIDTH])  # a sample lies at x = 22, y = 10; the other is far from any
+    left = samples.off_edges(edges, (WIDTH, HEIGHT)).material
+    assert np.flatnonzero(left != samples.material).tolist() == [2 * samples.width + 5]
+    assert left[2 * samples.width + 5] == -1
+
+
+def test_nothing_is_darker_than_black():
+    found = corrected(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
+    np.testing.assert_array_equal(found, np.float32([[[0, 0.5, 1.5], [0.75, 0, 0.25]]]))
