@@ -13,23 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import Recipe
-from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.look import Look, complete, validate
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.moving.arriving import wholly
 from relume.moving.look_up import look as look_around
 from relume.moving.picture import MovingPicture
-from relume.picture.light import light_of
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
 from relume.scene.model import Scene
 from relume.store import bake_here
-from relume.trace.visibility import trace_visibility
 
 _MOVED = 0.01  # of the distance to the target, each frame
 _MEMORY = 4 << 30
+
+
+def rest(picture: MovingPicture) -> None:
+    """What follows when a hand rests: all its light is found."""
+    if (job := picture.next_job()) is not None:
+        picture.install(job, job.make(lambda share: None, lambda: False))
+        picture.advance(None)
 
 
 class MovingScene:
@@ -74,9 +77,7 @@ class MovingScene:
         picture = MovingPicture(self.moving, self.recipe.views[0], is_watched=is_watched)
         picture.set_look(look)
         picture.advance(None)
-        if (job := picture.next_job()) is not None:
-            picture.install(job, job.make(lambda share: None, lambda: False))
-            picture.advance(None)
+        rest(picture)
         return picture
 
     def eye_s(self, frames: int, change: Callable[[dict[str, Any]], None] = lambda document: None) -> list[float]:
@@ -132,29 +133,6 @@ class MovingScene:
             picture.encode(picture.all_tiles(), "rgb9e5")
             found.append(time.perf_counter() - began)
         return found
-
-    def points_rmse(self, num: int) -> float:
-        """Irradiance of some points straight from the sky, against every texel of the map traced."""
-        points = self.moving.surface.points
-        chosen = np.linspace(0, points.num_points - 1, num).astype(np.int64)
-        some = points.rows(chosen)
-        radiance = np.asarray(self._scene.environment.radiance, np.float64)
-        height, width, _ = radiance.shape
-        directions = texel_directions(height, width).reshape(-1, 3).astype(np.float32)
-        light = (radiance * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
-        seen = trace_visibility(self.moving.embree, some.position, some.normal, directions).visible
-        truth = np.empty((num, 3))
-        for k in range(num):
-            free = np.unpackbits(seen[k], count=len(directions), bitorder="little")
-            cosine = np.maximum(directions @ some.normal[k], 0).astype(np.float64)
-            truth[k] = (free * cosine) @ light
-
-        def direct(document: dict[str, Any]) -> None:
-            document["transport"]["show"] = "direct"
-
-        shown = light_of(self.look(direct), self.moving.material_names, has_bounces=True)
-        found = np.sqrt(np.pi) * wholly(self.moving, shown).total[chosen, :, 0].astype(np.float64)
-        return float(np.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)))
 
     def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:
         """The picture of a fixed view from the same place."""

@@ -3,12 +3,11 @@
 Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
 points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the look
 stays. `surface.brdf_ms`: the exponent of the floor's highlight moves, the eye and the lights stay; `edited_share` of
-the picture's pixels show it. What surfaces reflect onto each other is followed roughly, anew each time that it has
-changed by a twentieth, and at rest. `surface.light_ms`: the environment turns, with all bounces, and is followed
+the picture's pixels show it. What surfaces reflect onto each other follows, anew with each step of it that is told
+apart. `surface.light_ms`: the environment turns, with all bounces, and is followed
 roughly; `all_points_ms` is what all of it takes, at rest. `surface.against_fixed_…` is the moving view against the
 picture that replaces it, of a `gather` bake from the same place, pixels at edges of objects left out, which one side
-has antialiased; both spread evenly what highlights send to other surfaces. `surface.points_rmse`, without
-interpolation: irradiance of points straight from the sky against every texel of it traced.
+has antialiased; both spread evenly what highlights send to other surfaces.
 """
 
 from __future__ import annotations
@@ -68,7 +67,6 @@ def measure(tiny: bool) -> list[Figure]:
                 {**context, **exactly, "size": "400×400", "bounces": "all"},
             ),
             *(_error(box if "diffuse" in name else still, name, terms) for name, terms in _MATERIALS.items()),
-            Figure("surface.points_rmse", 100 * box.points_rmse(4 if tiny else 400), "%", context),
         ]
 
 

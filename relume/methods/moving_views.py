@@ -27,6 +27,8 @@ from relume.points import Points
 from relume.project.alike_rays import alike_ray_vectors, weighed_functions
 from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays, Rays
+from relume.project.sent import Sent
+from relume.project.squares import Squares, leaving_squares
 from relume.trace.embree import EmbreeScene
 from relume.trace.visibility import visible_of
 from relume.views.store_io import read_camera
@@ -156,9 +158,26 @@ class MovingViews:
         if lights.num_lights:
             found += self._quick_sky(lights, points, chosen)
         if element.paths.reflect:
-            even = self.lit.reflected.preview_under(element)
-            found += alike_ray_vectors(self._links, chosen, self._functions_of_rays, even)
+            found += self._of_rays(self.lit.reflected.quickly_under(element), chosen)
         return found
+
+    def change_between(self, before: Light, after: Light, chosen: NDArray[np.intp]) -> F32:
+        """How what surfaces send to some points changes, of a low degree, found quickly. (chosen, 3, functions) float32
+
+        Args:
+            before, after: lights of equal sources. chosen: the points.
+        """
+        return self._of_rays(self.lit.reflected.change(before, after), chosen)
+
+    def _of_rays(self, sent: Sent, chosen: NDArray[np.intp]) -> F32:
+        return alike_ray_vectors(self._links, self._squares, chosen, self._functions_of_rays, sent)
+
+    @property
+    def _squares(self) -> Squares:
+        def found() -> Squares:
+            return leaving_squares(self.surface.points, self._links, self._pattern, self.lit.cells.frames)
+
+        return self.memory.keep((self.key, "squares of links"), found)
 
     def _quick_sky(self, lights: TriangleLights, points: Points, chosen: NDArray[np.intp]) -> F32:
         """Light vectors of an environment at some points, by harmonics where the bake has them."""

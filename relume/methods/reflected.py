@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.memory import Memory
-from relume.methods.cells.between import preview_between, sent_between
+from relume.methods.cells.between import Leaving, preview_between, quickly_between, sent_between
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
@@ -43,12 +43,36 @@ class Reflected:
         key = self._key, "reflected light for a preview", between
         return self._memory.passing.keep(key, lambda: self._preview(between))
 
+    def quickly_under(self, light: Light) -> Sent:
+        """What moving pictures follow while a hand moves a light."""
+        return self._quickly(_between_surfaces(light), is_preview=True).sent(self._cells)
+
+    def change(self, before: Light, after: Light) -> Sent:
+        """How what cells send changes, found quickly, where the lights themselves are as before and their light on
+        cells is found exactly; both ends alike, so that what is wrong with both cancels.
+
+        Args:
+            before, after: of equal sources.
+        """
+        here, there = (self._quickly(_between_surfaces(light), is_preview=False) for light in (before, after))
+        return there.less(here).sent(self._cells)
+
+    def _quickly(self, light: Light, *, is_preview: bool) -> Leaving:
+        def found() -> Leaving:
+            reflecting = self._reflecting(light, self._memory.passing)
+            arrived = self._on_cells.arrived(light, reflecting, is_preview=is_preview)
+            return quickly_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+
+        key = self._key, "reflected light, quickly", light, is_preview
+        return self._memory.passing.keep(key, found)
+
     def _sent(self, light: Light) -> Sent:
         if not light.paths.reflect:
             return evenly(np.zeros((NO_CELL + 1, 3), np.float32))
         reflecting = self._reflecting(light, self._memory)
         arrived = self._on_cells.arrived(light, reflecting, is_preview=False)
-        return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+        found = sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+        return found.sent(self._cells)
 
     def _preview(self, light: Light) -> F32:
         if not light.paths.reflect:

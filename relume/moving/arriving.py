@@ -72,6 +72,22 @@ def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp]) ->
     return arriving(transfer, light, found)
 
 
+def followed(
+    transfer: MovingTransfer, before: Light, known: Arriving, light: Light, chosen: NDArray[np.intp]
+) -> Arriving:
+    """Find what arrives at some points where surfaces reflect otherwise than before, quickly: what arrived, changed.
+
+    Args:
+        transfer: of the points. before: a light of the same sources. known: what arrives of it, exactly.
+        light: that arrives. chosen: points that are asked about. (n,)
+    """
+    change, all_of_it = transfer.change_between(before, light, chosen), np.ones(3, np.float32)
+    found = Arriving(known.total.copy(), known.others.copy())
+    for vectors in found:
+        add_scaled(vectors, change, all_of_it, chosen)
+    return found
+
+
 @dataclass(frozen=True)
 class LightJob:
     """What arrives, made beside the frames; a `relume.picture.jobs.Job`.

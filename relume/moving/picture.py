@@ -13,7 +13,7 @@ from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
-from relume.moving.arriving import Arriving, LightJob, roughly, wholly
+from relume.moving.arriving import Arriving, LightJob, followed, roughly, wholly
 from relume.moving.behind import alpha_of
 from relume.moving.correction import corrected
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
@@ -22,7 +22,7 @@ from relume.moving.points.surface import Surface
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
-from relume.picture.light import Light, Solo, gain_of, is_about, light_of, vector_of
+from relume.picture.light import Light, Solo, gain_of, is_same_but_for_surfaces, light_of, vector_of
 from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
@@ -217,7 +217,13 @@ class MovingPicture:
 
     def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
         gain = np.array(gain_of(shown, self._solo), np.float32)
-        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, self._is_rough)
+        is_rough = self._is_rough and not self._follows  # what follows is known up to all functions
+        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough)
+
+    @property
+    def _follows(self) -> bool:
+        """Whether all that somebody would wait for is what surfaces send each other."""
+        return self._vectors is not None and is_same_but_for_surfaces(self._vectors[0], self._now())
 
     def parts(self) -> tuple[dict[str, Part], Numbers]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""
@@ -277,15 +283,18 @@ class MovingPicture:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
         light, transfer = self._now(), self._transfer
         if self._is_rough:
-            if self._vectors is not None and is_about(self._vectors[0], light):
-                return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
             quick = self._quick
-            if quick is None or quick[0] is not is_needed or not is_about(quick[1], light):
-                self._quick = quick = is_needed, light, roughly(transfer, light, np.flatnonzero(is_needed))
+            if quick is None or quick[0] is not is_needed or quick[1] != light:
+                self._quick = quick = is_needed, light, self._quickly(light, np.flatnonzero(is_needed))
             return quick[2]
         if self._vectors is None or self._vectors[0] != light:
             self._vectors = light, wholly(transfer, light)
         return self._vectors[1]
+
+    def _quickly(self, light: Light, chosen: NDArray[np.intp]) -> Arriving:
+        if self._vectors is not None and self._follows:
+            return followed(self._transfer, *self._vectors, light, chosen)
+        return roughly(self._transfer, light, chosen)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""

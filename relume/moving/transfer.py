@@ -54,6 +54,14 @@ class MovingTransfer(Opened, Protocol):
         """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32"""
         ...
 
+    def change_between(self, before: Light, after: Light, chosen: NDArray[np.intp]) -> F32:
+        """How what surfaces send to some points changes, found quickly. (chosen, 3, ≤ K) float32
+
+        Args:
+            before, after: lights of equal sources. chosen: the points.
+        """
+        ...
+
     def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
         """What white points of a material would send if nothing were in the light's way. (points, 3) float32
 

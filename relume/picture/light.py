@@ -7,9 +7,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
-
-from relume.brdf.albedo import Reflectances, reflectances_of, shares_in
+from relume.brdf.albedo import Reflectances, reflectances_of
 from relume.look import EnvironmentKey, LightGeometry, Look, Paths
 from relume.look.model import Rgb
 
@@ -19,7 +17,6 @@ Solo = frozenset[str] | None
 
 _ONE: Rgb = (1.0, 1.0, 1.0)
 _NOTHING: Rgb = (0.0, 0.0, 0.0)
-_LITTLE = 0.05  # of all light that a surface receives
 _MOST_KNOWN = 64  # lights whose vectors are kept: every route asks for those of a frame, for every term
 
 
@@ -171,14 +168,11 @@ def is_same_environment(before: Light, after: Light) -> bool:
     return alike and before.paths.direct == after.paths.direct
 
 
-def is_about(before: Light, after: Light) -> bool:
-    """Whether lights differ in what surfaces reflect onto each other alone, and in its amount by little."""
-    if before._replace(reflectances=after.reflectances) != after:
-        return False
-    pairs = zip(before.reflectances, after.reflectances, strict=True)
-    return all(
-        np.abs(shares_in(one) - shares_in(other))[..., 0].max() <= _LITTLE for one, other in pairs if one != other
-    )
+@lru_cache(maxsize=_MOST_KNOWN)
+def is_same_but_for_surfaces(before: Light, after: Light) -> bool:
+    """Whether lights differ in what surfaces reflect onto each other alone, and both have such light."""
+    alike = before._replace(reflectances=after.reflectances, paths=after.paths) == after
+    return alike and before.paths.direct == after.paths.direct and bool(before.paths.reflect and after.paths.reflect)
 
 
 def light_of(look: Look, material_names: Sequence[str], *, has_bounces: bool, solo: Solo = None) -> Light:

@@ -1,6 +1,6 @@
-"""Light vectors of what cells send evenly to points whose gather rays go alike, quickly.
+"""Light vectors of what cells send to points whose gather rays go alike, quickly.
 
-    t_k(x) = Σ_r w_r h_k(ω_r) L̄(link(x, r))
+    t_k(x) = Σ_r w_r h_k(ω_r) L(link(x, r), −ω_r)
 
 Where all points have one seed, ray r leaves each of them in the same local direction, and weighs the same.
 """
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from relume.basis.zernike import in_basis, num_functions
 from relume.light.gather_rays import Pattern, local_ray, small_shifts_of, weight_of
 from relume.parallel import for_shares
+from relume.project.sent import Sent, light_along
+from relume.project.squares import Squares
 
 F32 = NDArray[np.float32]
 
@@ -44,15 +46,13 @@ def _direct(pattern, seed, wi, weight):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _gather(links, rows, functions, even, start, stop, out):  # type: ignore[no-untyped-def]
+def _gather(links, squares, rows, functions, sent, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the rays of points rows[start:stop]. out: (m, 3, K)"""
     num_functions, num_rays = functions.shape
-    red, green, blue = np.empty(num_rays, np.float32), np.empty(num_rays, np.float32), np.empty(num_rays, np.float32)
+    light = np.empty((3, num_rays), np.float32)
+    red, green, blue = light
     for i in range(start, stop):
-        p = rows[i]
-        for ray in range(num_rays):
-            cell = links[p, ray]
-            red[ray], green[ray], blue[ray] = even[cell, 0], even[cell, 1], even[cell, 2]
+        light_along(sent, links[rows[i]], squares[rows[i]], light)
         for k in range(num_functions):
             r = g = b = np.float32(0)
             for ray in range(num_rays):
@@ -63,16 +63,20 @@ def _gather(links, rows, functions, even, start, stop, out):  # type: ignore[no-
             out[i, 0, k], out[i, 1, k], out[i, 2, k] = r, g, b
 
 
-def alike_ray_vectors(links: NDArray[np.uint16], rows: NDArray[np.intp], functions: F32, even: F32) -> F32:
+def alike_ray_vectors(
+    links: NDArray[np.uint16], squares: Squares, rows: NDArray[np.intp], functions: F32, sent: Sent
+) -> F32:
     """Find what rays bring to some points; `ray_vectors` is its oracle.
 
     Args:
-        links: cell that each ray of all points hits. (n, rays) uint16. rows: the points. (m,)
-        functions: from `weighed_functions`. (K, rays) float32
-        even: radiance of cells, black in row `NO_CELL`. (NO_CELL + 1, 3) float32
+        links: cell that each ray of all points hits. (n, rays) uint16
+        squares: in which light leaves those cells, from `leaving_squares`. (n, rays) uint8
+        rows: the points. (m,). functions: from `weighed_functions`. (K, rays) float32
+        sent: by the cells.
     Returns:
         t. (m, 3, K) float32
     """
     out = np.empty((len(rows), 3, len(functions)), np.float32)
-    for_shares(lambda start, stop: _gather(links, rows, functions, even, start, stop, out), len(rows))
+    args = (links, squares, rows, functions, sent)
+    for_shares(lambda start, stop: _gather(*args, start, stop, out), len(rows))
     return out

@@ -31,7 +31,7 @@ SIDE = 16  # squares across the disc of all places
 _FINER = 8
 _RIM, _LITTLE = 0.999, 1e-9
 _STEPS = 32_767  # of 16-bit radiance
-_ROWS_A_RANGE = 1024
+_ROWS_A_RANGE = 256  # their values stay in the cache
 
 
 class Sent(NamedTuple):
@@ -71,9 +71,12 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32) -> Sent
     scale, table = np.empty((len(rows), 3), np.float32), np.empty((len(rows), SIDE * SIDE, 3), np.int16)
 
     def fill(start: int, stop: int) -> None:
-        values = (vectors[start:stop] @ grid_means()).transpose(0, 2, 1)
-        scale[start:stop] = np.maximum(np.abs(values).max(axis=1), np.float32(1e-30)) / np.float32(_STEPS)
-        table[start:stop] = np.rint(values / scale[start:stop, None])
+        values = vectors[start:stop] @ grid_means()
+        largest = np.maximum(values.max(axis=2), -values.min(axis=2))
+        scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
+        values /= scale[start:stop, :, None]
+        np.rint(values, out=values)
+        table[start:stop] = values.transpose(0, 2, 1)
 
     for_ranges(fill, len(rows), _ROWS_A_RANGE)
     return Sent(even, lobe, frame, scale, table)
@@ -109,3 +112,24 @@ def square_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
     scale = half / (np.float32(1) + np.float32(math.sqrt(max(np.float32(0), np.float32(1) - x * x - y * y))))
     across, along = np.int32(half + scale * x), np.int32(half + scale * y)
     return min(max(across, 0), SIDE - 1) * SIDE + min(max(along, 0), SIDE - 1)  # type: ignore[operator]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def light_along(sent, links, squares, out):  # type: ignore[no-untyped-def]
+    """Look up what cells send along the rays of a point.
+
+    Args:
+        sent: by all cells, a `Sent`. links: cells that the rays hit. (rays,) uint16
+        squares: in which light leaves them. (rays,) uint8
+        out: radiance, written. (3, rays) float32
+    """
+    for ray in range(links.shape[0]):
+        for channel in range(3):
+            out[channel, ray] = sent.even[links[ray], channel]
+    if sent.table.shape[0] == 0:
+        return
+    for ray in range(links.shape[0]):
+        row = sent.lobe[links[ray]]
+        if row >= 0:
+            for channel in range(3):
+                out[channel, ray] += sent.scale[row, channel] * sent.table[row, squares[ray], channel]

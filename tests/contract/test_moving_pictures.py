@@ -2,19 +2,7 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import (
-    EDITS,
-    LOBE,
-    drawn,
-    environment,
-    exponent,
-    light,
-    lit,
-    matt,
-    painted,
-    replaced,
-    transport,
-)
+from looks_of_pictures import EDITS, LOBE, drawn, environment, exponent, light, lit, matt, painted, replaced, transport
 from sessions import look_of, relative_rmse
 
 from relume.errors import CancelledError, ChunkDamagedError, NotFoundError, ParameterError
@@ -154,26 +142,93 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
         read_harmonic_light(Damaged(), read_cells(store))
 
 
-def test_a_hand_on_a_highlight_waits_for_no_light_between_surfaces(moving, monkeypatch):
-    """Light that surfaces send is kept while a highlight changes by little, and made anew at rest."""
-    turned = environment(rotation=137.0)  # nobody else asks for its light
+FOLLOWED = {
+    "a highlight's exponent": (LOBE, exponent(60)),
+    "a curve drawn": (LOBE, drawn),
+    "a diffuse colour": ("/materials/Floor/terms/0/color", painted),
+    "a metal in place of a wall": (None, replaced),
+    "fewer paths": (None, transport(bounces=1)),
+    "all of them": (LOBE, lambda document: [change(document) for change in (drawn, painted, transport(bounces=2))]),
+}
+
+
+@pytest.mark.parametrize("edit", FOLLOWED)
+@pytest.mark.parametrize("solo", [None, frozenset({"Lamp"})])
+def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo, monkeypatch):
+    """Under a light that is known, a frame is what was exact and what surfaces send otherwise; at rest all is exact."""
+    pointer, change = FOLLOWED[edit]
+    other = environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
+
+    def shown(*changes):
+        return look_of(moving, lit(other, *changes))
+
     picture = MovingPicture(moving, "front", is_watched=True)
-    picture.set_look(look_of(moving, lit(turned)))
+    picture.set_look(shown(), solo=solo)
     picture.advance(None)
-    job = picture.next_job()
-    picture.install(job, job.make(lambda share: None, lambda: False))
+    rest(picture)
+    before = picture.image()
+    if pointer is not None:
+        picture.touch(pointer)
+    picture.set_look(shown(change), solo=solo)
+    assert picture.advance(None).fidelity == "preview"
+    seen = picture.image()
+    kept = MovingPicture(moving, "front", is_watched=True)
+    kept.set_look(shown(), solo=solo)
+    kept.advance(None)
+    with monkeypatch.context() as nothing_follows:
+        nothing_follows.setattr("relume.moving.picture.followed", lambda transfer, light, known, now, chosen: known)
+        kept.set_look(shown(change), solo=solo)
+        kept.advance(None)
+        stale = kept.image()
+    rest(picture)
+    exact = picture.image()
+    alone = MovingPicture(moving, "front")
+    alone.set_look(shown(change), solo=solo)
+    alone.advance(None)
+    np.testing.assert_array_equal(exact, alone.image())
+    assert np.linalg.norm(seen - exact) < 0.1 * np.linalg.norm(stale - exact)
+    picture.set_look(shown(), solo=solo)
+    assert picture.advance(None).fidelity == "approximate"  # it is known
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_a_shader_gets_what_follows(moving):
+    def bounces(*changes):
+        return look_of(moving, lit(environment(rotation=171.0), *changes))
+
+    def sent(picture):
+        found = {}
+        for name, part in picture.parts()[0].items():
+            if name.startswith("vectors/"):
+                light = part.make()
+                scale, num = light[f"{name}/scale"][0]
+                numbers = light[name].astype(np.float32).reshape(-1, -(-3 * int(num) // 4) * 4)
+                found[name, int(num)] = scale * numbers[:, : 3 * int(num)]
+        return found
+
+    picture = MovingPicture(moving, "front", is_watched=True)
+    picture.draws = False
+    picture.set_look(bounces())
     picture.advance(None)
-    with monkeypatch.context() as nothing_quick:
-        nothing_quick.setattr("relume.moving.picture.roughly", None)
-        picture.set_look(look_of(moving, lit(turned, exponent(8.0))))
-        assert picture.advance(None).fidelity == "preview"
-    shown = picture.image()
+    rest(picture)
+    picture.set_look(bounces(painted, exponent(8.0)))
+    assert picture.advance(None).fidelity == "preview"
+    followed = sent(picture)
+    rest(picture)
+    exact = sent(picture)
+    assert followed.keys() == exact.keys()
+    assert {num for _, num in exact} == {1, 36}  # a diffuse floor, a wall with a highlight
+    for (name, num), values in exact.items():
+        irradiance = slice(None, None, num)  # the first function of each channel
+        assert 0 < relative_rmse(followed[name, num][:, irradiance], values[:, irradiance]) < 0.01
+
+
+def rest(picture):
+    """As when a hand rests."""
     job = picture.next_job()
-    picture.install(job, job.make(lambda share: None, lambda: False))
+    if job is not None:
+        picture.install(job, job.make(lambda share: None, lambda: False))
     assert picture.advance(None).fidelity == "approximate"
-    exact = seen(moving, turned, exponent(8.0)).image()
-    np.testing.assert_array_equal(picture.image(), exact)
-    assert relative_rmse(shown, exact) < 0.02
 
 
 def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):

@@ -78,7 +78,7 @@ def cells(lights):
 def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
     reflecting = cells.reflecting(reflectances)
     vectors = cells.vectors(reflecting.rows, lights, SENT_DEGREE)
-    return sent_between(cells, reflecting, Arrived(cells.irradiance(lights), vectors), first, last)
+    return sent_between(cells, reflecting, Arrived(cells.irradiance(lights), vectors), first, last).sent(cells)
 
 
 def by_square(sent):

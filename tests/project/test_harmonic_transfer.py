@@ -19,7 +19,8 @@ from relume.project.alike_rays import alike_ray_vectors, weighed_functions
 from relume.project.harmonic_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
 from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays
-from relume.project.sent import evenly
+from relume.project.sent import NUM_SENT, evenly, sent_by
+from relume.project.squares import leaving_squares
 from relume.trace.cell_tree import NO_CELL
 from relume.trace.surface import any_tangent
 from relume.trace.visibility import visible_of
@@ -131,12 +132,17 @@ def test_rays_that_go_alike_bring_what_listed_ones_do():
     points, _ = points_on_a_ball(50)
     pattern, rng = make_pattern(64, 0, 11), np.random.default_rng(7)
     links = rng.integers(0, 30, (50, 64)).astype(np.uint16)
+    links[rng.random(links.shape) < 0.1] = NO_CELL
     even = np.zeros((NO_CELL + 1, 3), np.float32)
     even[:30] = rng.random((30, 3))
-    rows = np.array([1, 4, 30, 49])
-    found = alike_ray_vectors(links, rows, weighed_functions(pattern, 0, DEGREE), even)
-    exact = ray_vectors(points, [GatherRays(links, pattern, evenly(even))], DEGREE)[rows]
-    assert relative_rmse(found, exact) < 1e-5
+    lobed = np.array([2, 7, 8, 29])
+    frame = np.linalg.qr(rng.normal(size=(30, 3, 2)))[0].transpose(0, 2, 1).astype(np.float32)
+    some = sent_by(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_SENT)).astype(np.float32))
+    rows, squares = np.array([1, 4, 30, 49]), leaving_squares(points, links, pattern, frame)
+    for sent in (evenly(even), some):
+        found = alike_ray_vectors(links, squares, rows, weighed_functions(pattern, 0, DEGREE), sent)
+        exact = ray_vectors(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
+        assert relative_rmse(found, exact) < 1e-5
 
 
 def test_glossy_rays_do_not_go_alike():

@@ -9,13 +9,15 @@ everywhere: from then on a cell sends the same to all others, the mean of what t
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.methods.cells.bounces import bounce, bounced, preview_bounced
 from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.quick import arriving_quickly
 from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.project.sent import Sent, sent_by
 from relume.trace.cell_tree import NO_CELL
@@ -25,33 +27,91 @@ F32 = NDArray[np.float32]
 _DIRECTED = 2  # reflections
 
 
-def sent_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> Sent:
+class Leaving(NamedTuple):
+    """What cells send out.
+
+    Attributes:
+        even: the part that is the same everywhere. (C, 3) float32
+        rows: the cells that send more one way than another. (G,) intp. vectors: L_j of each. (G, 3, J) float32
+    """
+
+    even: F32
+    rows: NDArray[np.intp]
+    vectors: F32
+
+    def sent(self, cells: CellLight) -> Sent:
+        """As rays look it up."""
+        return sent_by(_padded(self.even), self.rows, cells.frames[self.rows], self.vectors)
+
+    def less(self, other: Leaving) -> Leaving:
+        """The difference to another, whose rows may be others."""
+        rows = np.union1d(self.rows, other.rows)
+        vectors = np.zeros((len(rows), *self.vectors.shape[1:]), np.float32)
+        vectors[np.searchsorted(rows, self.rows)] += self.vectors
+        vectors[np.searchsorted(rows, other.rows)] -= other.vectors
+        return Leaving(self.even - other.even, rows, vectors)
+
+
+def sent_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> Leaving:
     """What every cell sends out of light that surfaces have reflected `first` to `last` times, its own included.
 
     Args:
         cells: that send it. reflecting: what they make of light.
         arrived: from the lights. first: at least 1. last: not less.
     """
-    rows, frame = reflecting.rows, cells.frames[reflecting.rows]
+    links, rho = cells.links, reflecting.reflectance
+
+    def arriving(now: Leaving) -> Arrived:
+        return cells.arriving(now.sent(cells), now.rows)
+
+    return _between(cells, reflecting, arrived, first, last, arriving, lambda even, num: bounced(links, rho, even, num))
+
+
+def quickly_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> Leaving:
+    """The same for a moving hand: by squares in place of directions, and few rays where light is even.
+
+    Args:
+        cells, reflecting, arrived, first, last: as of `sent_between`.
+    """
+    links, few, rho = cells.links, cells.few_links, reflecting.reflectance
+
+    def arriving(now: Leaving) -> Arrived:
+        return arriving_quickly(cells, now.sent(cells), now.rows)
+
+    return _between(
+        cells, reflecting, arrived, first, last, arriving, lambda even, num: preview_bounced(links, few, rho, even, num)
+    )
+
+
+def _between(
+    cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int,
+    arriving: Callable[[Leaving], Arrived], summed: Callable[[F32, int], F32],
+) -> Leaving:  # fmt: skip
+    """Reflect light between cells.
+
+    Args:
+        arriving: finds what comes to cells out of light that has directions.
+        summed: the sum of even light and what becomes of it in some reflections.
+    """
+    rows = reflecting.rows
     even, vectors = reflecting.sent(arrived)
     number, directed = 1, min(last, _DIRECTED) if len(rows) else 1
     total, total_vectors = (float(first == 1) * array.astype(np.float64) for array in (even, vectors))
     while number < directed:
-        now = sent_by(_padded(even), rows, frame, vectors)
-        (even, vectors), number = reflecting.sent(cells.arriving(now, rows)), number + 1
+        (even, vectors), number = reflecting.sent(arriving(Leaving(even, rows, vectors))), number + 1
         if number >= first:
             total, total_vectors = total + even, total_vectors + vectors
     if number < last:
-        even, links, rho = cells.seen(even, vectors, rows), cells.links, reflecting.reflectance
+        even = cells.seen(even, vectors, rows)
         start = max(first, number + 1)
         for _ in range(start - number):
-            even = bounce(links, rho, even)
-        total += bounced(links, rho, even, last - start)
-    return sent_by(_padded(total), rows, frame, total_vectors.astype(np.float32))
+            even = bounce(cells.links, reflecting.reflectance, even)
+        total += summed(even, last - start)
+    return Leaving(total.astype(np.float32), rows, total_vectors.astype(np.float32))
 
 
 def preview_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> F32:
-    """The same roughly, in a fifth of the time, as others see it in the mean. (NO_CELL + 1, 3) float32
+    """The same roughly, without directions, as others see it in the mean. (NO_CELL + 1, 3) float32
 
     Args:
         cells, reflecting, arrived, first, last: as of `sent_between`.

@@ -19,6 +19,7 @@ from relume.points import Points
 from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays
 from relume.project.sent import NUM_SENT, Sent
+from relume.project.squares import Squares, coming_squares, leaving_squares
 from relume.trace.surface import any_tangent
 from relume.trace.visibility import visible_of
 
@@ -170,4 +171,16 @@ class CellLight:
     @cached_property
     def _seen_from(self) -> F32:
         """The mean of all functions over the directions that others see a cell in. (C, J) float32"""
-        return seen_from(self.points, self._links_of_points, self.pattern, self.frames)
+        return seen_from(self.links, self.leaving, self.num_cells)
+
+    @cached_property
+    def leaving(self) -> Squares:
+        """In which squares light leaves the cells that rays hit. (C, rays) uint8"""
+        found = leaving_squares(self.points, self._links_of_points, self.pattern, self.frames)
+        return found.reshape(self.links.shape)
+
+    @cached_property
+    def coming(self) -> Squares:
+        """In which squares it comes in by them. (C, rays) uint8"""
+        found = coming_squares(self.points, self.points_a_cell, self.pattern, self.frames)
+        return found.reshape(self.links.shape)
