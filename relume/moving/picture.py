@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,13 @@ from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
 from relume.moving.arriving import Arriving, LightJob, roughly, wholly
+from relume.moving.beams.beam import Beam
+from relume.moving.beams.shadows import shares_seen
 from relume.moving.behind import alpha_of
 from relume.moving.correction import corrected
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
+from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
@@ -72,8 +75,9 @@ class MovingPicture:
         self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
-        self._vectors: tuple[Light, Arriving] | None = None
-        self._quick: tuple[NDArray[np.uint8], Light, Arriving] | None = None  # found quickly, at points that are needed
+        self._vectors: tuple[tuple[Light, bool], Arriving] | None = None
+        self._quick: tuple[NDArray[np.uint8], tuple[Light, bool], Arriving] | None = None  # at points that are needed
+        self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
         self._by: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
@@ -152,16 +156,16 @@ class MovingPicture:
     def next_job(self) -> LightJob | None:
         """What makes a rough picture as good as it gets: the light vectors that it lacks."""
         is_waiting = self._is_rough and self._has_to_be_rough()
-        return LightJob(self._transfer, self._now(), self.take) if is_waiting else None
+        return LightJob(self._transfer, *self._asked(), self.take) if is_waiting else None
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
         job.install(made)
 
-    def take(self, light: Light, vectors: Arriving) -> None:
-        """Go on with the light vectors of a light, unless it is another one by now."""
-        if light == self._now():
-            self._vectors = light, vectors
+    def take(self, light: Light, has_beams: bool, vectors: Arriving) -> None:
+        """Go on with the light vectors of a light, unless another one is asked for by now."""
+        if (light, has_beams) == self._asked():
+            self._vectors = self._asked(), vectors
 
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
@@ -183,9 +187,15 @@ class MovingPicture:
 
     def _has_to_be_rough(self) -> bool:
         """Whether somebody would wait for light vectors that nobody has."""
-        light = self._now()
-        has_them = self._vectors is not None and self._vectors[0] == light
-        return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
+        light, has_beams = self._asked()
+        has_them = self._vectors is not None and self._vectors[0] == (light, has_beams)
+        knows = self._transfer.knows
+        return self._is_watched and not has_them and not all(knows(one, has_beams) for one in vector_of(light))
+
+    def _asked(self) -> tuple[Light, bool]:
+        """What arrives, and whether pixels find shadows of beams: not where a shader draws, nor on BTFs."""
+        assert self._look is not None
+        return self._now(), self.draws and not self._materials_of(self._look).covers
 
     def _draw(self) -> _Drawn | None:
         """What is shown, evaluated where that has not been done; None before there is a look."""
@@ -193,13 +203,14 @@ class MovingPicture:
             return self._drawn
         seen, drawn = self._look_around(), self._drawn
         wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-        self._is_stale = False
+        self._is_stale, shares = False, self._shares_of(wanted.arriving.beams, seen)
         if drawn is not None and self._may_change(drawn, wanted, seen):
             shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
-            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn))
+            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn), shares)
             drawn.wanted = wanted
         else:
-            self._drawn = _Drawn(wanted, seen, frame_of(self._transfer, wanted, seen, self._camera, self._size))
+            frame = frame_of(self._transfer, wanted, seen, self._camera, self._size, shares)
+            self._drawn = _Drawn(wanted, seen, frame)
         return self._drawn
 
     @staticmethod
@@ -214,6 +225,14 @@ class MovingPicture:
             num_pixels = self._size[0] * self._size[1]
             self._part = seen, key, shown_of(self._transfer.surface, seen, is_changed, num_pixels)
         return self._part[2]
+
+    def _shares_of(self, beams: Sequence[Beam], seen: Seen) -> list[F32]:
+        """What the rays of the eye see of each beam, found again where the eye or the beam has moved."""
+        known = self._shares[1] if self._shares[0] == self._num_eyes else {}
+        of = self._transfer.solid, seen, self._camera, self._size
+        found = [known[b.key] if b.key in known else shares_seen(*of, b.targets) for b in beams]
+        self._shares = self._num_eyes, {beam.key: share for beam, share in zip(beams, found, strict=True)}
+        return found
 
     def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
         gain = np.array(gain_of(shown, self._solo), np.float32)
@@ -245,10 +264,11 @@ class MovingPicture:
             Linear radiance (height, width, 3) float32, and what the rays see.
         """
         assert self._look is not None
-        transfer = self._transfer
-        seen = look(transfer.surface, transfer.embree, self._camera, size).middles(size[0] * size[1])
+        seen = self._looked(size).middles(size[0] * size[1])
         wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-        return frame_of(transfer, wanted, seen, self._camera, size).image, seen
+        of = self._transfer.solid, seen, self._camera, size
+        shares = [shares_seen(*of, beam.targets) for beam in wanted.arriving.beams]
+        return frame_of(self._transfer, wanted, seen, self._camera, size, shares).image, seen
 
     @property
     def surface(self) -> Surface:
@@ -261,10 +281,13 @@ class MovingPicture:
 
     def _look_around(self) -> Seen:
         if self._seen is None or self._seen[0] != self._num_eyes:
-            transfer = self._transfer
-            found = look(transfer.surface, transfer.embree, self._camera, self._size)
-            self._seen = self._num_eyes, found
+            self._seen = self._num_eyes, self._looked(self._size)
         return self._seen[1]
+
+    def _looked(self, size: tuple[int, int]) -> Seen:
+        found = look(self._transfer.surface, self._transfer.embree, self._camera, size)
+        mend(found, self._transfer.parted, self._transfer.solid)
+        return found
 
     def _materials_of(self, shown: Look) -> Materials:
         terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
@@ -275,17 +298,18 @@ class MovingPicture:
 
     def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
-        light, transfer = self._now(), self._transfer
+        (light, has_beams), transfer, known = self._asked(), self._transfer, self._vectors
         if self._is_rough:
-            if self._vectors is not None and is_about(self._vectors[0], light):
-                return self._vectors[1]  # nearer than what is found quickly, and the hand is on no light
+            if known is not None and _is_about(known[0], (light, has_beams)):
+                return known[1]  # nearer than what is found quickly, and the hand is on no light
             quick = self._quick
-            if quick is None or quick[0] is not is_needed or not is_about(quick[1], light):
-                self._quick = quick = is_needed, light, roughly(transfer, light, np.flatnonzero(is_needed))
+            if quick is None or quick[0] is not is_needed or not _is_about(quick[1], (light, has_beams)):
+                found = roughly(transfer, light, np.flatnonzero(is_needed), has_beams=has_beams)
+                self._quick = quick = is_needed, (light, has_beams), found
             return quick[2]
-        if self._vectors is None or self._vectors[0] != light:
-            self._vectors = light, wholly(transfer, light)
-        return self._vectors[1]
+        if known is None or known[0] != (light, has_beams):
+            self._vectors = known = (light, has_beams), wholly(transfer, light, has_beams=has_beams)
+        return known[1]
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""
@@ -367,3 +391,8 @@ def _words_of(drawn: _Drawn) -> NDArray[np.uint32]:
     if drawn.words is None:
         drawn.words = packed(drawn.frame.image.reshape(-1, 3))
     return drawn.words
+
+
+def _is_about(before: tuple[Light, bool], after: tuple[Light, bool]) -> bool:
+    """Whether what arrives is about the same, beams found by the same; see `is_about`."""
+    return before[1] == after[1] and is_about(before[0], after[0])
