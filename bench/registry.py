@@ -89,7 +89,10 @@ GROUPS = (
     Group("bench.demo", ("demo.bake_s", "demo.first_picture_s")),
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
-    Group("bench.surface_truth", ("surface.rmse_diffuse", "surface.rmse_glossy_0.5", "surface.rmse_glossy_0.3")),
+    Group(
+        "bench.surface_truth",
+        ("surface.rmse_diffuse", "surface.rmse_hard_sun", "surface.rmse_glossy_0.5", "surface.rmse_glossy_0.3"),
+    ),
     Group("bench.resting", ("surface.rest_s", "surface.rest_first_s")),
     Group("bench.canvas_moving", ("surface.canvas_fps",)),
     Group(
@@ -111,6 +114,7 @@ GROUPS = (
             "surface.bake_s",
             "surface.bytes_per_point",
             "surface.view_fps",
+            "surface.sun_fps",
             "surface.brdf_ms",
             "surface.light_ms",
             "surface.against_fixed_diffuse",

@@ -2,12 +2,13 @@
 
 Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
 points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the look
-stays. `surface.brdf_ms`: the exponent of the floor's highlight moves, the eye and the lights stay; `edited_share` of
-the picture's pixels show it. What surfaces reflect onto each other follows, anew with each step of it that is told
-apart. `surface.light_ms`: the environment turns, with all bounces, and is followed
-roughly; `all_points_ms` is what all of it takes, at rest. `surface.against_fixed_…` is the moving view against the
-picture that replaces it, of a `gather` bake from the same place, pixels at edges of objects left out, which one side
-has antialiased; both spread evenly what highlights send to other surfaces.
+stays; `surface.sun_fps`: the same under a clear sky, the shadows of whose sun pixels find. `surface.brdf_ms`: the
+exponent of the floor's highlight moves, the eye and the lights stay; `edited_share` of the picture's pixels show it.
+What surfaces reflect onto each other follows, anew with each step of it that is told apart. `surface.light_ms`: the
+environment turns, with all bounces, and is followed roughly; `all_points_ms` is what all of it takes, at rest.
+`surface.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
+place, pixels at edges of objects left out, which one side has antialiased; both spread evenly what highlights send to
+other surfaces.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ def measure(tiny: bool) -> list[Figure]:
         still = MovingScene("interior" if tiny else "still_life", Path(folder), (64, 48) if tiny else (640, 480), tiny)
         frames = 3 if tiny else 60
         eye = {one.name: one.eye_s(frames) for one in (box, still)}
+        sun = {one.name: one.eye_s(frames, _clear) for one in (box, still)}
         context = {"threads": num_threads(), "points": {one.name: one.num_points for one in (box, still)}}
         brdf, light = (
             box.edits_s(frames, exponent_of(_EDITED), is_watched=True),
@@ -47,6 +49,12 @@ def measure(tiny: bool) -> list[Figure]:
                 1 / float(np.median(eye[still.name])),
                 "frames/s",
                 {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(eye["cornell_box"]))},
+            ),
+            Figure(
+                "surface.sun_fps",
+                1 / float(np.median(sun[still.name])),
+                "frames/s",
+                {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(sun["cornell_box"]))},
             ),
             Figure(
                 "surface.brdf_ms",
@@ -77,6 +85,10 @@ _MATERIALS: dict[str, list[dict[str, Any]]] = {
 }
 _EDITED = "Floor"
 _GLOSSY = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 20.0}}
+
+
+def _clear(document: dict[str, Any]) -> None:
+    document["environment"]["map"] = "clear_sky"
 
 
 def exponent_of(material: str) -> Callable[[dict[str, Any], float], None]:

@@ -1,7 +1,8 @@
 """surface.rmse_*: the whole moving view against Mitsuba's whole path tracer.
 
-The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky; nothing but a
-Blinn–Phong highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
+The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky, or under one as
+bright whose sun is an eighth as wide, 0.5° from its middle to its edge (`hard_sun`); nothing but a Blinn–Phong
+highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
 Mitsuba follows every path, highlights that light other surfaces among them, ours by few functions. Edges and
 background belong to the pictures. Its own noise is taken off: `bench.standard_error.over_passes`.
 """
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +28,18 @@ from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
+from relume.scene.cornell import sunny_sky
 from relume.store import bake_here
 
 _GREY = {"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}
 _KINDS = {
     "diffuse": ("cornell_box", (400, 400)),
+    "hard_sun": ("cornell_box", (400, 400)),
     "glossy_0.5": ("still_life", (640, 480)),
     "glossy_0.3": ("still_life", (640, 480)),
 }
 _GAIN = 0.23  # a highlight reflects up to four times its colour
+_HARD = np.radians(0.5), 512  # radius of a hard sun, rows of its map
 _UNIT = "%"
 
 
@@ -46,7 +51,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _terms_of(kind: str) -> list[dict[str, Any]]:
-    if kind == "diffuse":
+    if kind in ("diffuse", "hard_sun"):
         return [_GREY]
     exponent = 2 / float(kind.partition("_")[2]) ** 4 - 2
     return [{"model": "blinn_phong", "color": [_GAIN] * 3, "params": {"exponent": exponent}, "texture": None}]
@@ -55,6 +60,8 @@ def _terms_of(kind: str) -> list[dict[str, Any]]:
 def _figure(kind: str, tiny: bool) -> Figure:
     name, size = _KINDS[kind]
     terms, scene = _terms_of(kind), built_in("cornell_box" if tiny else name)
+    if kind == "hard_sun":
+        scene = replace(scene, environment=sunny_sky(radius=_HARD[0], rows=_HARD[1]))
     size, spp, num_lights, num_points = ((40, 30), 2, 60, 2000) if tiny else (size, 32, 1000, 50_000)
     recipe = Recipe("surface", (scene.cameras[0].name,), size, num_lights, num_points=num_points)
     with tempfile.TemporaryDirectory() as folder:

@@ -53,6 +53,7 @@ TARGETS = {
     "btf.view_fps": "≥ 24",
     "btf.light_ms": "≤ 80 ms",
     "surface.rmse_diffuse": "≤ 3 %",
+    "surface.rmse_hard_sun": "≤ 8 %",
     "surface.rmse_glossy_0.5": "≤ 6 %",
     "surface.rmse_glossy_0.3": "≤ 12 %",
     "surface.points_rmse": "≤ 1 %",

@@ -111,11 +111,16 @@ class LocalLights:
         light, pattern = self._light(source.geometry), pattern_of(source.geometry, PREVIEW_SAMPLES)
         return LocalRays(light, pattern, np.array(source.gain, np.float32), seen)
 
-    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
-        """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
+    def unhidden_rays(self, geometry: LightGeometry, points: Points) -> LocalRays:
+        """What would come to points from a light of unit emission if nothing were in its way, as rays."""
         pattern = pattern_of(geometry, SAMPLES)
         seen = np.full((points.num_points, -(-len(pattern.uv) // 8)), 255, np.uint8)
-        return arriving(self._light(geometry), pattern, points, seen)
+        return LocalRays(self._light(geometry), pattern, _ONES, seen)
+
+    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
+        """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
+        rays = self.unhidden_rays(geometry, points)
+        return arriving(rays.light, rays.pattern, points, rays.visible)
 
     def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""

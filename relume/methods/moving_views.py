@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -17,11 +17,15 @@ from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
 from relume.memory import Memory
 from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
+from relume.methods.suns_of_skies import SunsOfSkies
 from relume.methods.transfer import BouncedViews, described_light
+from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
+from relume.moving.parted import find_parted
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
 from relume.moving.sky import Sky, sky_of
+from relume.moving.solid import Solid
 from relume.moving.view import FreeView
-from relume.picture.light import Light
+from relume.picture.light import Light, Source
 from relume.picture.transfer import Axis, Eyes
 from relume.points import Points
 from relume.project.alike_rays import alike_ray_vectors, weighed_functions
@@ -120,6 +124,16 @@ class MovingViews:
         return self.lit.local.positions
 
     @cached_property
+    def solid(self) -> Solid:
+        """What rays between places on surfaces meet."""
+        return Solid.of(self.surface, self.positions, self.embree)
+
+    @cached_property
+    def parted(self) -> NDArray[np.uint8]:
+        """Vertices that do not see all of their neighbours, from `relume.moving.parted`. (vertices,) uint8"""
+        return find_parted(self.solid)
+
+    @cached_property
     def _visible(self) -> NDArray[np.uint8]:
         return np.asarray(self.lit.store.read("points/visibility"), np.uint8)
 
@@ -127,26 +141,32 @@ class MovingViews:
     def _links(self) -> NDArray[np.uint16]:
         return np.asarray(self.lit.store.read("points/links"), np.uint16)
 
-    def vectors(self, element: Light) -> F32:
-        """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32"""
-        return self.memory.keep(self._key_of(element), lambda: self._vectors(element))
+    def vectors(self, element: Light, beside_suns: bool = False) -> F32:
+        """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32
 
-    def knows(self, element: Light) -> bool:
+        Args:
+            element: that light. beside_suns: what comes straight from suns of the sky is left out.
+        """
+        key = self._key_of(element, beside_suns)
+        return self.memory.keep(key, lambda: self._vectors(element, beside_suns))
+
+    def knows(self, element: Light, beside_suns: bool = False) -> bool:
         """Whether they have been made."""
-        return self.memory.holds(self._key_of(element))
+        return self.memory.holds(self._key_of(element, beside_suns))
 
-    def _key_of(self, element: Light) -> tuple[str, str, Light]:
-        return self.key, "light vectors", element
+    def _key_of(self, element: Light, beside_suns: bool) -> tuple[Hashable, ...]:
+        return self.key, "light vectors", element, beside_suns and self.suns.are_in(element)
 
-    def _vectors(self, element: Light) -> F32:
+    def _vectors(self, element: Light, beside_suns: bool) -> F32:
         points = self.surface.points
         rays: list[Rays] = list(self.lit.local.all_rays(element, points))
         sent = self.lit.reflected_in(element)
         if sent is not None:
             rays.append(GatherRays(self._links, self._pattern, sent))
-        return light_vectors(points, self._visible, self.lit.lights_of(element), rays)
+        lights = self.suns.lights_beside(element) if beside_suns else self.lit.lights_of(element)
+        return light_vectors(points, self._visible, lights, rays)
 
-    def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
+    def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool = False) -> F32:
         """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32"""
         points, rays = self.surface.points.rows(chosen), list[Rays]()
         if element.paths.direct:
@@ -154,7 +174,8 @@ class MovingViews:
                 seen = self.lit.local.preview(source.geometry, points).visible
                 rays.append(self.lit.local.preview_rays(source, seen))
         found = ray_vectors(points, rays, QUICK_DEGREE)
-        lights = self.lit.preview_lights_of(element)
+        quick = self.suns.preview_lights_beside if beside_suns else self.lit.preview_lights_of
+        lights = quick(element)
         if lights.num_lights:
             found += self._quick_sky(lights, points, chosen)
         if element.paths.reflect:
@@ -178,6 +199,22 @@ class MovingViews:
             return leaving_squares(self.surface.points, self._links, self._pattern, self.lit.cells.frames)
 
         return self.memory.keep((self.key, "squares of links"), found)
+
+    @cached_property
+    def suns(self) -> SunsOfSkies:
+        """Suns of environments, and what there is beside them."""
+        return SunsOfSkies(self.lit)
+
+    def beams(self, light: Light, chosen: NDArray[np.intp] | None) -> tuple[Beam, ...]:
+        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
+        points = self.surface.points if chosen is None else self.surface.points.rows(chosen)
+        found = [*self.suns.beams(light, points), *(self._beam_of(lamp, points) for lamp in lamps_of(light))]
+        return tuple(found) if chosen is None else tuple(beam.spread(chosen, self.vectors_shape) for beam in found)
+
+    def _beam_of(self, lamp: Source, points: Points) -> Beam:
+        rays = self.lit.local.unhidden_rays(lamp.geometry, points)
+        vectors = ray_vectors(points, [rays])
+        return Beam(lamp.geometry, targets_of_lamp(lamp.geometry), vectors, np.array(lamp.gain, np.float32))
 
     def _quick_sky(self, lights: TriangleLights, points: Points, chosen: NDArray[np.intp]) -> F32:
         """Light vectors of an environment at some points, by harmonics where the bake has them."""

@@ -38,7 +38,7 @@ from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
 from relume.views.view import View, open_view
 
-_PREVIEW_WIDTH = 256
+PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
@@ -111,15 +111,15 @@ class BakedViews:
 
     def lights_of(self, light: Light) -> TriangleLights:
         """Those of them by which light comes straight to the picture."""
-        return _shown(self.lights_in(light.environment), light)
+        return shown_of(self.lights_in(light.environment), light)
 
     def preview_lights_of(self, light: Light) -> TriangleLights:
         """The same, found quickly."""
-        return _shown(self.preview_lights_in(light.environment), light)
+        return shown_of(self.preview_lights_in(light.environment), light)
 
     def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
         def weighed() -> TriangleLights:
-            return weigh(self._tiles, self.radiance_of(environment.map), environment.rotation)
+            return weigh(self.tiles, self.radiance_of(environment.map), environment.rotation)
 
         return self.memory.keep((self.key, "lights", environment), weighed)
 
@@ -128,19 +128,20 @@ class BakedViews:
 
         def weighed() -> TriangleLights:
             radiance = self.radiance_of(environment.map)
-            if radiance.shape[1] > _PREVIEW_WIDTH:
-                key = self._owner_of(environment.map), "small environment", environment.map
-                radiance = self.memory.keep(key, lambda: shrunk(radiance, _PREVIEW_WIDTH))
-            return weigh(self._tiles, radiance, environment.rotation)
+            if radiance.shape[1] > PREVIEW_WIDTH:
+                key = self.owner_of(environment.map), "small environment", environment.map
+                radiance = self.memory.keep(key, lambda: shrunk(radiance, PREVIEW_WIDTH))
+            return weigh(self.tiles, radiance, environment.rotation)
 
         return self.memory.passing.keep((self.key, "preview lights", environment), weighed)
 
-    def _owner_of(self, name: str | None) -> str:
+    def owner_of(self, name: str | None) -> str:
         """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
         return self.key if name is None else "environments"
 
     @cached_property
-    def _tiles(self) -> Tiles:
+    def tiles(self) -> Tiles:
+        """Of the sphere, that lights were chosen in."""
         return read_tiles(self.store)
 
     @property
@@ -209,7 +210,7 @@ class BakedViews:
         return self._blurred(name, blur) if blur else self.radiance_of(name)
 
     def _blurred(self, name: str | None, degrees: float) -> F32:
-        owner = self._owner_of(name)
+        owner = self.owner_of(name)
 
         def few() -> F32:
             return reduced(self.radiance_of(name))
@@ -284,7 +285,7 @@ class BouncedViews(BakedViews):
         return replace(few, gathered=view.gather_rays(material, nothing).alone(chosen))
 
 
-def _shown(lights: TriangleLights, light: Light) -> TriangleLights:
+def shown_of(lights: TriangleLights, light: Light) -> TriangleLights:
     """The triangles of an environment by which light comes straight to the picture, beside local lights."""
     if not (light.paths.direct and light.is_environment_lit):
         return lights.none()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import CancelledError
+from relume.moving.beams.beam import Beam
 from relume.moving.transfer import MovingTransfer
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.light import Light, vector_of
@@ -19,10 +20,17 @@ F32 = NDArray[np.float32]
 
 
 class Arriving(NamedTuple):
-    """Light vectors of all light, and of that which is not the sky's own. (points, 3, K) float32 each"""
+    """What arrives at points.
+
+    Attributes:
+        total: light vectors of all light but that of beams. (points, 3, K) float32
+        others: of that which is not the sky's own, lamps that are beams included. (points, 3, K) float32
+        beams: whose shadows pixels find by themselves.
+    """
 
     total: F32
     others: F32
+    beams: tuple[Beam, ...] = ()
 
 
 class Found(NamedTuple):
@@ -36,40 +44,47 @@ class Found(NamedTuple):
     rows: NDArray[np.intp] | None = None
 
 
-def arriving(transfer: MovingTransfer, light: Light, vectors_of: Callable[[Light], Found]) -> Arriving:
+def arriving(
+    transfer: MovingTransfer, light: Light, vectors_of: Callable[[Light], Found], beams: tuple[Beam, ...] = ()
+) -> Arriving:
     """Sum over sources: transport is linear in them.
 
     Args:
         transfer: of the points. light: that arrives.
-        vectors_of: finds those of one source and one kind of way.
+        vectors_of: finds those of one source and one kind of way, suns that are beams left out.
+        beams: of the light.
     """
     total, others = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
+    of_beams = {beam.key for beam in beams}
     for element, gain in vector_of(light).items():
         (part, rows), factor = vectors_of(element), np.array(gain, np.float32)
-        add_scaled(total, part, factor, rows)
+        if not (element.paths.direct and any(lamp in of_beams for lamp, _ in element.local)):
+            add_scaled(total, part, factor, rows)
         if not (element.paths.direct and element.is_environment_lit):
             add_scaled(others, part, factor, rows)
-    return Arriving(total, others)
+    return Arriving(total, others, beams)
 
 
-def wholly(transfer: MovingTransfer, light: Light) -> Arriving:
-    """Find what arrives at all points, where it is not known too."""
-    return arriving(transfer, light, lambda element: Found(transfer.vectors(element)))
+def wholly(transfer: MovingTransfer, light: Light, *, has_beams: bool = False) -> Arriving:
+    """Find what arrives at all points, where it is not known too. has_beams: pixels find the shadows of beams."""
+    beams = transfer.beams(light, None) if has_beams else ()
+    return arriving(transfer, light, lambda element: Found(transfer.vectors(element, has_beams)), beams)
 
 
-def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp]) -> Arriving:
+def roughly(transfer: MovingTransfer, light: Light, chosen: NDArray[np.intp], *, has_beams: bool = False) -> Arriving:
     """Find what arrives at some points quickly, where it is not known.
 
     Args:
         transfer: of the points. light: that arrives. chosen: points that are asked about. (n,)
+        has_beams: pixels find the shadows of beams.
     """
 
     def found(element: Light) -> Found:
-        if transfer.knows(element):
-            return Found(transfer.vectors(element))
-        return Found(transfer.preview_vectors(element, chosen), chosen)
+        if transfer.knows(element, has_beams):
+            return Found(transfer.vectors(element, has_beams))
+        return Found(transfer.preview_vectors(element, chosen, has_beams), chosen)
 
-    return arriving(transfer, light, found)
+    return arriving(transfer, light, found, transfer.beams(light, chosen) if has_beams else ())
 
 
 def followed(
@@ -82,8 +97,8 @@ def followed(
         light: that arrives. chosen: points that are asked about. (n,)
     """
     change, all_of_it = transfer.change_between(before, light, chosen), np.ones(3, np.float32)
-    found = Arriving(known.total.copy(), known.others.copy())
-    for vectors in found:
+    found = known._replace(total=known.total.copy(), others=known.others.copy())
+    for vectors in (found.total, found.others):
         add_scaled(vectors, change, all_of_it, chosen)
     return found
 
@@ -93,12 +108,13 @@ class LightJob:
     """What arrives, made beside the frames; a `relume.picture.jobs.Job`.
 
     Attributes:
-        take: gets it when it is there.
+        has_beams: pixels find the shadows of beams. take: gets it when it is there.
     """
 
     transfer: MovingTransfer
     light: Light
-    take: Callable[[Light, Arriving], None]
+    has_beams: bool
+    take: Callable[[Light, bool, Arriving], None]
 
     what = "light on the points"
     state: ClassVar[Literal["shading"]] = "shading"
@@ -107,7 +123,7 @@ class LightJob:
     @property
     def key(self) -> tuple[Hashable, ...]:
         """Jobs of one light are one."""
-        return self.transfer.key, "light vectors", self.light
+        return self.transfer.key, "light vectors", self.light, self.has_beams
 
     def make(self, progress: Progress, cancelled: Cancelled) -> Arriving:
         """Find it, source by source. Raises CancelledError where `cancelled`, asked before each, said so."""
@@ -117,12 +133,13 @@ class LightJob:
             nonlocal done
             if cancelled():
                 raise CancelledError("light on the points was cancelled")
-            vectors, done = self.transfer.vectors(element), done + 1
+            vectors, done = self.transfer.vectors(element, self.has_beams), done + 1
             progress(done / num)
             return Found(vectors)
 
-        return arriving(self.transfer, self.light, found)
+        beams = self.transfer.beams(self.light, None) if self.has_beams else ()
+        return arriving(self.transfer, self.light, found, beams)
 
     def install(self, made: Arriving) -> None:
         """Hand it over."""
-        self.take(self.light, made)
+        self.take(self.light, self.has_beams, made)

@@ -24,7 +24,7 @@ _DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface 
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
+def differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
     """Tell whether two pixels see different things, or one thing turned or offset."""
     f, g = faces[p], faces[q]
     if f < 0 or g < 0:
@@ -46,10 +46,10 @@ def _mark(material, normals, faces, distance, directions, width, height, start, 
     """Mark pixels [start, stop) and those to the right and below that differ from them; shares may mark one twice."""
     column = start % width
     for p in range(start, stop):
-        if column < width - 1 and _differ(material, normals, faces, distance, directions, p, p + 1):
+        if column < width - 1 and differ(material, normals, faces, distance, directions, p, p + 1):
             is_edge[p] = is_edge[p + 1] = True
         column = column + 1 if column < width - 1 else 0
-        if p < width * (height - 1) and _differ(material, normals, faces, distance, directions, p, p + width):
+        if p < width * (height - 1) and differ(material, normals, faces, distance, directions, p, p + width):
             is_edge[p] = is_edge[p + width] = True
 
 

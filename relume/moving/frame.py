@@ -12,6 +12,7 @@ from relume.look import Look
 from relume.moving.again import Part, Shown, resolve_some
 from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import Lobes, lobes_of
+from relume.moving.beams.show import add_beams
 from relume.moving.behind import Caught, lay_over, seen_behind
 from relume.moving.between_points import SkyLight, take_off_lobes
 from relume.moving.bumps import towards_light
@@ -112,16 +113,25 @@ class Frame(NamedTuple):
     sums: Sums
 
 
-def frame_of(transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, size: tuple[int, int]) -> Frame:
+def frame_of(
+    transfer: MovingTransfer,
+    wanted: Wanted,
+    seen: Seen,
+    camera: Camera,
+    size: tuple[int, int],
+    shares: Sequence[F32] = (),
+) -> Frame:
     """Find what an eye sees.
 
     Args:
         transfer: of the bake. wanted: what is shown.
         seen: by the rays of the camera. size: width and height in pixels.
+        shares: of each beam that arrives, seen by the rays. (rays,) float32 each
     """
     (width, height), surface, light = size, transfer.surface, wanted.light
     sums = _summed(transfer, wanted, seen, Part(seen.is_needed, seen.is_seen, None), camera, height)
     out = sums.radiance
+    _add_beams(transfer, wanted, seen, camera, height, shares, None, out)
     if (wanted.gain != 1).any():
         out *= wanted.gain
     caught = _caught(transfer, wanted, seen)
@@ -157,16 +167,18 @@ def change(
     frame: Frame,
     shown: Shown,
     words: NDArray[np.uint32],
+    shares: Sequence[F32] = (),
 ) -> None:
     """Bring a frame to what materials send now, where `only_materials_differ`.
 
     Args:
-        transfer, seen, camera: as in `frame_of`. wanted: what is shown from now on.
+        transfer, seen, camera, shares: as in `frame_of`. wanted: what is shown from now on.
         frame: changed. words: its pixels, packed; changed too. (pixels,) uint32
         shown: what of it shows those materials.
     """
     height, radiance, rays = len(frame.image), frame.sums.radiance, shown.part.rays
     _summed(transfer, wanted, seen, shown.part, camera, height, frame.sums)
+    _add_beams(transfer, wanted, seen, camera, height, shares, rays, radiance)
     if (wanted.gain != 1).any():
         radiance[rays] *= wanted.gain
     resolve_some(radiance, seen.owner, shown, frame.image.reshape(-1, 3), words)
@@ -196,6 +208,22 @@ def _summed(
     sight = Sight(eye, pixel_angle, seen)
     show_texels(materials.covers, surface, transfer.positions, sight, arriving.total, emission, out)
     return Sums(glances, sent, (broad, along), towards, out)
+
+
+def _add_beams(
+    transfer: MovingTransfer,
+    wanted: Wanted,
+    seen: Seen,
+    camera: Camera,
+    height: int,
+    shares: Sequence[F32],
+    rays: NDArray[np.int32] | None,
+    out: F32,
+) -> None:
+    """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
+    beams, sky = wanted.arriving.beams, _sky_in(transfer, wanted.light)
+    of_eye = seen, camera, camera.yfov / height
+    add_beams(beams, shares, transfer.surface, *of_eye, wanted.materials, sky, rays, out)
 
 
 def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,13 @@ from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
 from relume.moving.arriving import Arriving, LightJob, followed, roughly, wholly
+from relume.moving.beams.beam import Beam
+from relume.moving.beams.shadows import shares_seen
 from relume.moving.behind import alpha_of
 from relume.moving.correction import corrected
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
+from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
@@ -72,8 +75,9 @@ class MovingPicture:
         self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
-        self._vectors: tuple[Light, Arriving] | None = None
-        self._quick: tuple[NDArray[np.uint8], Light, Arriving] | None = None  # found quickly, at points that are needed
+        self._vectors: tuple[tuple[Light, bool], Arriving] | None = None
+        self._quick: tuple[NDArray[np.uint8], tuple[Light, bool], Arriving] | None = None  # at points that are needed
+        self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
         self._by: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
@@ -152,16 +156,16 @@ class MovingPicture:
     def next_job(self) -> LightJob | None:
         """What makes a rough picture as good as it gets: the light vectors that it lacks."""
         is_waiting = self._is_rough and self._has_to_be_rough()
-        return LightJob(self._transfer, self._now(), self.take) if is_waiting else None
+        return LightJob(self._transfer, *self._asked(), self.take) if is_waiting else None
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
         job.install(made)
 
-    def take(self, light: Light, vectors: Arriving) -> None:
-        """Go on with the light vectors of a light, unless it is another one by now."""
-        if light == self._now():
-            self._vectors = light, vectors
+    def take(self, light: Light, has_beams: bool, vectors: Arriving) -> None:
+        """Go on with the light vectors of a light, unless another one is asked for by now."""
+        if (light, has_beams) == self._asked():
+            self._vectors = self._asked(), vectors
 
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
@@ -183,9 +187,15 @@ class MovingPicture:
 
     def _has_to_be_rough(self) -> bool:
         """Whether somebody would wait for light vectors that nobody has."""
-        light = self._now()
-        has_them = self._vectors is not None and self._vectors[0] == light
-        return self._is_watched and not has_them and not all(map(self._transfer.knows, vector_of(light)))
+        light, has_beams = self._asked()
+        has_them = self._vectors is not None and self._vectors[0] == (light, has_beams)
+        knows = self._transfer.knows
+        return self._is_watched and not has_them and not all(knows(one, has_beams) for one in vector_of(light))
+
+    def _asked(self) -> tuple[Light, bool]:
+        """What arrives, and whether pixels find shadows of beams: not where a shader draws, nor on BTFs."""
+        assert self._look is not None
+        return self._now(), self.draws and not self._materials_of(self._look).covers
 
     def _draw(self) -> _Drawn | None:
         """What is shown, evaluated where that has not been done; None before there is a look."""
@@ -193,13 +203,14 @@ class MovingPicture:
             return self._drawn
         seen, drawn = self._look_around(), self._drawn
         wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-        self._is_stale = False
+        self._is_stale, shares = False, self._shares_of(wanted.arriving.beams, seen)
         if drawn is not None and self._may_change(drawn, wanted, seen):
             shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
-            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn))
+            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn), shares)
             drawn.wanted = wanted
         else:
-            self._drawn = _Drawn(wanted, seen, frame_of(self._transfer, wanted, seen, self._camera, self._size))
+            frame = frame_of(self._transfer, wanted, seen, self._camera, self._size, shares)
+            self._drawn = _Drawn(wanted, seen, frame)
         return self._drawn
 
     @staticmethod
@@ -215,6 +226,14 @@ class MovingPicture:
             self._part = seen, key, shown_of(self._transfer.surface, seen, is_changed, num_pixels)
         return self._part[2]
 
+    def _shares_of(self, beams: Sequence[Beam], seen: Seen) -> list[F32]:
+        """What the rays of the eye see of each beam, found again where the eye or the beam has moved."""
+        known = self._shares[1] if self._shares[0] == self._num_eyes else {}
+        of = self._transfer.solid, seen, self._camera, self._size
+        found = [known[b.key] if b.key in known else shares_seen(*of, b.targets) for b in beams]
+        self._shares = self._num_eyes, {beam.key: share for beam, share in zip(beams, found, strict=True)}
+        return found
+
     def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
         gain = np.array(gain_of(shown, self._solo), np.float32)
         is_rough = self._is_rough and not self._follows  # what follows is known up to all functions
@@ -223,7 +242,10 @@ class MovingPicture:
     @property
     def _follows(self) -> bool:
         """Whether all that somebody would wait for is what surfaces send each other."""
-        return self._vectors is not None and is_same_but_for_surfaces(self._vectors[0], self._now())
+        if self._vectors is None:
+            return False
+        (before, had_beams), (light, has_beams) = self._vectors[0], self._asked()
+        return had_beams == has_beams and is_same_but_for_surfaces(before, light)
 
     def parts(self) -> tuple[dict[str, Part], Numbers]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""
@@ -251,10 +273,11 @@ class MovingPicture:
             Linear radiance (height, width, 3) float32, and what the rays see.
         """
         assert self._look is not None
-        transfer = self._transfer
-        seen = look(transfer.surface, transfer.embree, self._camera, size).middles(size[0] * size[1])
+        seen = self._looked(size).middles(size[0] * size[1])
         wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-        return frame_of(transfer, wanted, seen, self._camera, size).image, seen
+        of = self._transfer.solid, seen, self._camera, size
+        shares = [shares_seen(*of, beam.targets) for beam in wanted.arriving.beams]
+        return frame_of(self._transfer, wanted, seen, self._camera, size, shares).image, seen
 
     @property
     def surface(self) -> Surface:
@@ -267,10 +290,13 @@ class MovingPicture:
 
     def _look_around(self) -> Seen:
         if self._seen is None or self._seen[0] != self._num_eyes:
-            transfer = self._transfer
-            found = look(transfer.surface, transfer.embree, self._camera, self._size)
-            self._seen = self._num_eyes, found
+            self._seen = self._num_eyes, self._looked(self._size)
         return self._seen[1]
+
+    def _looked(self, size: tuple[int, int]) -> Seen:
+        found = look(self._transfer.surface, self._transfer.embree, self._camera, size)
+        mend(found, self._transfer.parted, self._transfer.solid)
+        return found
 
     def _materials_of(self, shown: Look) -> Materials:
         terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
@@ -281,20 +307,23 @@ class MovingPicture:
 
     def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
-        light, transfer = self._now(), self._transfer
+        asked, known = self._asked(), self._vectors
         if self._is_rough:
             quick = self._quick
-            if quick is None or quick[0] is not is_needed or quick[1] != light:
-                self._quick = quick = is_needed, light, self._quickly(light, np.flatnonzero(is_needed))
+            if quick is None or quick[0] is not is_needed or quick[1] != asked:
+                self._quick = quick = is_needed, asked, self._quickly(np.flatnonzero(is_needed))
             return quick[2]
-        if self._vectors is None or self._vectors[0] != light:
-            self._vectors = light, wholly(transfer, light)
-        return self._vectors[1]
+        if known is None or known[0] != asked:
+            light, has_beams = asked
+            self._vectors = known = asked, wholly(self._transfer, light, has_beams=has_beams)
+        return known[1]
 
-    def _quickly(self, light: Light, chosen: NDArray[np.intp]) -> Arriving:
+    def _quickly(self, chosen: NDArray[np.intp]) -> Arriving:
+        light, has_beams = self._asked()
         if self._vectors is not None and self._follows:
-            return followed(self._transfer, *self._vectors, light, chosen)
-        return roughly(self._transfer, light, chosen)
+            (before, _), known = self._vectors
+            return followed(self._transfer, before, known, light, chosen)
+        return roughly(self._transfer, light, chosen, has_beams=has_beams)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""

@@ -8,8 +8,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.moving.beams.beam import Beam
 from relume.moving.points.surface import Surface
 from relume.moving.sky import Sky
+from relume.moving.solid import Solid
 from relume.moving.view import FreeView
 from relume.picture.light import Light
 from relume.picture.transfer import Opened
@@ -35,6 +37,16 @@ class MovingTransfer(Opened, Protocol):
         ...
 
     @property
+    def solid(self) -> Solid:
+        """What rays between places on surfaces meet."""
+        ...
+
+    @property
+    def parted(self) -> NDArray[np.uint8]:
+        """Vertices that do not see all of their neighbours, from `relume.moving.parted`. (vertices,) uint8"""
+        ...
+
+    @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
     def sky_share(self) -> F32: ...
@@ -42,15 +54,19 @@ class MovingTransfer(Opened, Protocol):
         """An environment, None for the scene's own, and what it is when it is blurred."""
         ...
 
-    def vectors(self, element: Light) -> F32:
-        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32"""
+    def vectors(self, element: Light, beside_suns: bool) -> F32:
+        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32
+
+        Args:
+            element: that light. beside_suns: what comes straight from suns of the sky is left out.
+        """
         ...
 
-    def knows(self, element: Light) -> bool:
+    def knows(self, element: Light, beside_suns: bool) -> bool:
         """Whether they have been made, and are there at once."""
         ...
 
-    def preview_vectors(self, element: Light, chosen: NDArray[np.intp]) -> F32:
+    def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool) -> F32:
         """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32"""
         ...
 
@@ -60,6 +76,10 @@ class MovingTransfer(Opened, Protocol):
         Args:
             before, after: lights of equal sources. chosen: the points.
         """
+        ...
+
+    def beams(self, light: Light, chosen: NDArray[np.intp] | None) -> tuple[Beam, ...]:
+        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
         ...
 
     def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:

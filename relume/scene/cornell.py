@@ -79,18 +79,20 @@ def _camera() -> Camera:
     return look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
 
 
-def sunny_sky(sun: F64 = SUN, rows: int = 256) -> Environment:
-    """A sun, soft as through haze, in a blue sky; nothing from below.
+def sunny_sky(sun: F64 = SUN, rows: int = 256, radius: float = SUN_RADIUS) -> Environment:
+    """A sun, soft as through haze unless told otherwise, in a blue sky; nothing from below.
 
     Args:
         sun: towards it. (3,). rows: of the map, which is twice as wide.
+        radius: of the sun, radians; the smaller, the brighter.
     """
     towards = texel_directions(rows, 2 * rows).astype(np.float64)
     cosine = towards @ (sun / np.linalg.norm(sun))
-    edge = np.clip((cosine - np.cos(1.2 * SUN_RADIUS)) / (np.cos(0.8 * SUN_RADIUS) - np.cos(1.2 * SUN_RADIUS)), 0, 1)
+    edge = np.clip((cosine - np.cos(1.2 * radius)) / (np.cos(0.8 * radius) - np.cos(1.2 * radius)), 0, 1)
     height = towards[..., 1:2]
     sky = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
-    radiance = sky + (edge**2 * (3 - 2 * edge))[..., None] * np.array([1350.0, 1230.0, 1050.0])
+    disc = np.array([1350.0, 1230.0, 1050.0]) * (SUN_RADIUS / radius) ** 2
+    radiance = sky + (edge**2 * (3 - 2 * edge))[..., None] * disc
     return Environment("sunny sky", radiance.astype(np.float32))
 
 

@@ -19,7 +19,7 @@ F32 = NDArray[np.float32]
 
 _IMAGES = ("diffuse", "specular", "emission")
 _RAYS_A_RANGE = 16_384
-_OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; many times what positions are rounded by
+OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; many times what positions are rounded by
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _surface_at(
     face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     twice_area = np.linalg.norm(face_normal, axis=1)
     b = np.stack([1 - hits.uv.sum(axis=1), hits.uv[:, 0], hits.uv[:, 1]], axis=1)
-    b = _off_edges(b, p, twice_area, _OFF_EDGES * geometry.epsilon)[:, :, None]
+    b = _off_edges(b, p, twice_area, OFF_EDGES * geometry.epsilon)[:, :, None]
     face_normal = _unit(face_normal, -directions)
     face_normal *= -np.sign(np.einsum("nc,nc->n", face_normal, directions) + 1e-30)[:, None].astype(np.float32)
     normal = _unit((geometry.normals[corners] * b).sum(axis=1), face_normal)
@@ -206,10 +206,15 @@ def _off_edges(b: F32, p: F32, twice_area: F32, epsilon: float) -> F32:
         b: barycentric coordinates. (n, 3). p: corners. (n, 3, 3). epsilon: least distance from the edges, metres, but
             that a tenth of a height is enough.
     """
+    moved = np.maximum(b, least_shares(p, twice_area, epsilon))
+    return np.asarray(moved / moved.sum(axis=1, keepdims=True), np.float32)
+
+
+def least_shares(p: F32, twice_area: F32, epsilon: float) -> F32:
+    """Find the least barycentric coordinates of places off the edges of triangles. See `_off_edges`. (n, 3) float32"""
     edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to each corner
     least = np.minimum(epsilon * edges, 0.1 * twice_area[:, None]) / np.maximum(twice_area, 1e-20)[:, None]
-    moved = np.maximum(b, least)
-    return np.asarray(moved / moved.sum(axis=1, keepdims=True), np.float32)
+    return np.asarray(least, np.float32)
 
 
 def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:

@@ -1,0 +1,65 @@
+"""Suns of environments over an opened bake, and the light of its triangles without them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from relume.environments.equirect import shrunk
+from relume.light.suns import Divided, without_suns
+from relume.light.triangles import TriangleLights, weigh
+from relume.look import EnvironmentKey
+from relume.methods.transfer import PREVIEW_WIDTH, BakedViews, shown_of
+from relume.moving.beams.beam import Beam, light_of_sun, targets_of_sun
+from relume.picture.light import Light
+from relume.points import Points
+
+
+@dataclass(frozen=True)
+class SunsOfSkies:
+    """What comes straight from suns, and what comes beside them. lit: whose light it is."""
+
+    lit: BakedViews
+
+    def _divided(self, name: str | None) -> Divided:
+        """An environment without its suns, None for the scene's own."""
+        key = self.lit.owner_of(name), "suns", name
+        return self.lit.memory.keep(key, lambda: without_suns(self.lit.radiance_of(name)))
+
+    def are_in(self, light: Light) -> bool:
+        """Whether light of suns comes straight to a picture."""
+        comes = light.paths.direct and light.is_environment_lit
+        return comes and bool(self._divided(light.environment.map).suns)
+
+    def lights_beside(self, light: Light) -> TriangleLights:
+        """The triangles by which light comes straight, without that of suns."""
+        if not self.are_in(light):
+            return self.lit.lights_of(light)
+        key = self.lit.key, "lights beside suns", light.environment
+        return shown_of(self.lit.memory.keep(key, lambda: self._weighed(light.environment, None)), light)
+
+    def preview_lights_beside(self, light: Light) -> TriangleLights:
+        """The same, found quickly."""
+        if not self.are_in(light):
+            return self.lit.preview_lights_of(light)
+        key = self.lit.key, "preview lights beside suns", light.environment
+        return shown_of(
+            self.lit.memory.passing.keep(key, lambda: self._weighed(light.environment, PREVIEW_WIDTH)), light
+        )
+
+    def _weighed(self, environment: EnvironmentKey, width: int | None) -> TriangleLights:
+        beside = self._divided(environment.map).beside
+        if width is not None:
+            beside = shrunk(beside, width)
+        return weigh(self.lit.tiles, beside, environment.rotation)
+
+    def beams(self, light: Light, points: Points) -> Iterator[Beam]:
+        """Suns whose light comes straight, and what they bring to points if nothing hides them."""
+        if not self.are_in(light):
+            return
+        key, gain = light.environment, np.array(light.environment_gain, np.float32)
+        for k, sun in enumerate(self._divided(key.map).suns):
+            vectors = light_of_sun(sun, key.rotation, points)
+            yield Beam((key, k), targets_of_sun(sun, key.rotation), vectors, gain)

@@ -1,0 +1,1 @@
+"""Beams: light of suns and small lamps, whose shadows pixels find by themselves."""

@@ -1,0 +1,60 @@
+"""Suns are taken out of maps: their light and what is left make up the map, and wide lights stay."""
+
+import numpy as np
+import pytest
+
+from relume.environments.equirect import texel_directions, texel_solid_angles
+from relume.light.suns import LANES, TURNS, without_suns
+
+
+def sky(*suns, size=(128, 256)):
+    """Grey, brighter above; each sun an axis, a radius in degrees, and its radiance."""
+    towards = texel_directions(*size).astype(np.float64)
+    radiance = np.repeat(1 + 0.5 * towards[..., 1:2], 3, axis=2)
+    for axis, radius, light in suns:
+        axis = np.asarray(axis) / np.linalg.norm(axis)
+        radiance[towards @ axis > np.cos(np.radians(radius))] += light
+    return radiance.astype(np.float32)
+
+
+def brought(radiance):
+    """∫ L dω of a map, of each channel."""
+    return (radiance.astype(np.float64) * texel_solid_angles(*radiance.shape[:2])[:, None, None]).sum(axis=(0, 1))
+
+
+HARD = ([0.3, 1, 0.2], 1.5, [9e3, 8e3, 6e3])
+OTHER = ([-1, 0.4, 0.5], 1.5, [3e3, 4e3, 6e3])
+
+
+@pytest.mark.parametrize("suns", [(HARD,), (HARD, OTHER)])
+def test_suns_and_what_is_left_are_the_whole_map(suns):
+    radiance = sky(*suns)
+    found = without_suns(radiance)
+    assert len(found.suns) == len(suns)
+    np.testing.assert_allclose(
+        sum(sun.irradiance for sun in found.suns) + brought(found.beside), brought(radiance), rtol=1e-5
+    )
+    np.testing.assert_allclose(found.beside, sky(), atol=0.1)
+    axis = np.asarray(HARD[0]) / np.linalg.norm(HARD[0])
+    first = max(found.suns, key=lambda sun: sun.mean @ axis)
+    assert first.mean @ axis > np.cos(np.radians(0.5)) * np.linalg.norm(first.mean)
+    np.testing.assert_allclose(first.irradiance / first.irradiance[0], np.array(HARD[2]) / HARD[2][0], rtol=1e-3)
+
+
+def test_targets_are_spread_as_the_light_is():
+    sun = without_suns(sky(HARD)).suns[0]
+    assert sun.towards.shape == (TURNS, LANES, 3)
+    np.testing.assert_allclose(np.linalg.norm(sun.towards, axis=2), 1, atol=1e-12)
+    np.testing.assert_allclose(sun.towards.mean(axis=(0, 1)), sun.mean, atol=2e-3)
+    np.testing.assert_allclose(sun.towards.mean(axis=1), np.tile(sun.mean, (TURNS, 1)), atol=6e-3)
+    width = np.sqrt(2 * (1 - np.linalg.norm(sun.mean)))
+    assert 0.8 * width < np.sqrt(2 * (1 - np.linalg.norm(sun.towards.mean(axis=(0, 1))))) < 1.4 * width
+
+
+@pytest.mark.parametrize(
+    "radiance", [sky(), sky(([0, 1, 0.1], 4, [2e3] * 3)), sky((HARD[0], 1.5, [120.0] * 3))], ids=["none", "wide", "dim"]
+)
+def test_light_of_wide_or_dim_places_stays(radiance):
+    found = without_suns(radiance)
+    assert found.suns == ()
+    assert found.beside is radiance

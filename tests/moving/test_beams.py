@@ -1,0 +1,168 @@
+"""Beams: suns and small lamps whose shadows pixels of a moving view find, against all shadow rays and fixed views."""
+
+import copy
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, quad, scene_of, sphere
+
+from relume.bake import Recipe
+from relume.environments.equirect import texel_directions
+from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.arriving import wholly
+from relume.moving.beams.shadows import shares_seen
+from relume.moving.picture import MovingPicture
+from relume.picture.light import light_of
+from relume.render.image import render_image
+from relume.scene.model import Material
+from relume.store import bake_here
+from relume.trace.visibility import trace_visibility
+
+CAMERA = looking("front", [0.5, 2.2, 2.6], [0, 0.2, 0], 0.7)
+SIZE = (96, 72)
+SUN = np.array([0.5, 1.0, 0.25]) / np.linalg.norm([0.5, 1.0, 0.25])
+FLOOR = quad("floor", [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], 0)
+LAMBERT = {"model": "lambert", "color": [0.8, 0.7, 0.6]}
+GLOSSY = {"model": "blinn_phong", "color": [0.2, 0.2, 0.2], "params": {"exponent": 8.0}}
+LAMPS = {
+    "point": {"kind": "point", "position": [0.8, 1.9, 0.4], "emission": [9.0, 8.0, 6.0]},
+    "spot": {
+        "kind": "spot", "position": [0.8, 1.9, 0.4], "direction": [-0.5, -1.0, -0.2], "emission": [9.0, 8.0, 6.0],
+        "cone": [20.0, 40.0],
+    },
+    "directional": {"kind": "directional", "direction": [-0.5, -1.0, -0.25], "emission": [3.0, 2.8, 2.5]},
+}  # fmt: skip
+
+
+def hard_sky(turn=0.0):
+    towards = texel_directions(128, 256).astype(np.float64)
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    sun = SUN @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    radiance = np.where(towards[..., 1:2] > 0, 0.3, 0.0) * [0.6, 0.8, 1.0]
+    radiance[towards @ sun > np.cos(np.radians(1.0))] += [5e3, 4.6e3, 4e3]
+    return radiance.astype(np.float32)
+
+
+def scene(environment, terms=(LAMBERT,)):
+    ball, wall = (
+        sphere("ball", [0.1, 0.4, 0], 0.4, 1, 16),
+        quad("wall", [[-1, 0, 0], [-1, 0, -1], [-1, 1, -1], [-1, 1, 0]], 1),
+    )
+    materials = [Material("Floor", terms), Material("Things", (LAMBERT,))]
+    return scene_of(FLOOR, ball, wall, camera=CAMERA, environment=environment, materials=materials)
+
+
+def opened(of, method, folder, num_points=2000):
+    recipe = Recipe(method, ("front",), SIZE, 200, num_points=num_points)
+    return open_bake(bake_here(METHODS[method], of, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+
+
+def look_of(bake, change=lambda document: None):
+    document = copy.deepcopy(complete({}, bake.default_look))
+    document["transport"]["show"] = "direct"
+    change(document)
+    return validate(document, bake.default_look)
+
+
+def picture_of(bake, look, *, draws=True):
+    picture = MovingPicture(bake, "front")
+    picture.set_look(look)
+    picture.draws = draws
+    picture.advance(None)
+    return picture
+
+
+def error(found, expected):
+    """Relative to what is expected, root mean square."""
+    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+
+
+@pytest.fixture(scope="module")
+def sunlit(tmp_path_factory):
+    return opened(scene(hard_sky()), "surface", tmp_path_factory.mktemp("beams"))
+
+
+@pytest.fixture(scope="module")
+def fixed(tmp_path_factory):
+    return opened(scene(hard_sky()), "direct", tmp_path_factory.mktemp("fixed"))
+
+
+def test_shares_are_those_of_all_shadow_rays(sunlit):
+    """Where all targets say the same about a pixel and its neighbours, so does what is predicted."""
+    picture = picture_of(sunlit, look_of(sunlit))
+    picture.image()
+    seen, solid = picture._look_around(), sunlit.solid
+    (beam,) = sunlit.beams(picture._now(), None)
+    found = shares_seen(solid, seen, CAMERA, SIZE, beam.targets)
+    face, place = seen.hits.face, CAMERA.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
+    normal = solid.surface.face_normal[face] * -np.sign(
+        np.einsum("nc,nc->n", solid.surface.face_normal[face], seen.directions)
+    )[:, None].astype(np.float32)
+    hits = np.flatnonzero(face >= 0)
+    origins = (place + solid.off_surface * normal)[hits].astype(np.float32)
+    towards = np.ascontiguousarray(beam.targets.towards.reshape(-1, 3))
+    bits = trace_visibility(sunlit.embree, origins, np.ascontiguousarray(normal[hits]), towards).visible
+    expected = np.zeros(len(face))
+    expected[hits] = np.unpackbits(bits, axis=1, count=len(towards), bitorder="little").mean(axis=1)
+    width, height = SIZE
+    of_pixels, around = expected[: width * height].reshape(height, width), []
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            around.append(np.roll(of_pixels, (dy, dx), axis=(0, 1)))
+    is_even = (np.ptp(around, axis=0) == 0) & (np.arange(width) % (width - 1) > 0)
+    off = np.abs(found[: width * height].reshape(height, width) - of_pixels)
+    assert 0.1 < of_pixels.mean() < 0.9
+    assert is_even.mean() > 0.8
+    assert (off[is_even] > 0).mean() < 1e-3
+    assert off[~is_even].mean() < 0.15
+    across = slice(width * height, None)
+    assert np.abs(found[across] - expected[across]).mean() < 0.1
+
+
+@pytest.mark.parametrize("terms", [(LAMBERT,), (LAMBERT, GLOSSY)], ids=["diffuse", "glossy"])
+def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
+    of = scene(hard_sky(), terms)
+    fixed, bake = (opened(of, method, tmp_path) for method in ("direct", "surface"))
+    expected = render_image(fixed, "front", look_of(fixed))
+    by_pixels = error(picture_of(bake, look_of(bake)).image(), expected)
+    by_points = error(picture_of(bake, look_of(bake), draws=False).image(), expected)
+    assert by_pixels < 0.1
+    assert by_points > 2 * by_pixels
+
+
+def test_a_turned_sun_casts_its_shadows_where_it_stands(sunlit, tmp_path):
+    """Those of a sky that was baked as it is turned; the bake's own lights lie about where the sun was."""
+    turned = scene(hard_sky(70.0))
+    baked = opened(turned, "direct", tmp_path)
+    expected = render_image(baked, "front", look_of(baked))
+    look = look_of(sunlit, lambda document: document["environment"].update(rotation=70.0))
+    by_pixels = error(picture_of(sunlit, look).image(), expected)
+    assert by_pixels < 0.12
+    assert error(picture_of(sunlit, look, draws=False).image(), expected) > 2 * by_pixels
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
+    def lit(document):
+        document["lights"] = {"Lamp": copy.deepcopy(LAMPS[kind])}
+        document["environment"]["scale"] = 0.0
+
+    expected = render_image(fixed, "front", look_of(fixed, lit))
+    by_pixels = error(picture_of(sunlit, look_of(sunlit, lit)).image(), expected)
+    assert by_pixels < 0.1
+    assert error(picture_of(sunlit, look_of(sunlit, lit), draws=False).image(), expected) > 1.5 * by_pixels
+
+
+def test_points_know_all_light_that_beams_take_from_them(sunlit):
+    """Where nothing hides the sun, what a shader gets is what is interpolated and the beam."""
+    light = light_of(look_of(sunlit), sunlit.material_names, has_bounces=True)
+    whole, apart = wholly(sunlit, light), wholly(sunlit, light, has_beams=True)
+    (beam,) = apart.beams
+    assert not whole.beams
+    together = apart.total[:, :, 0] + beam.gain * beam.vectors[:, :, 0]
+    is_lit = whole.total[:, 0, 0] > 0.9 * together[:, 0]
+    assert 0.2 < is_lit.mean() < 0.9
+    np.testing.assert_allclose(whole.total[is_lit][:, :, 0], together[is_lit], rtol=0.05)
+    assert (apart.total[:, 0, 0] < 0.3 * together[is_lit, 0].max()).all()
