@@ -40,7 +40,7 @@ def _all(folder: Path, context: dict[str, Any], tiny: bool) -> Figure:
     ratios, of_sizes = [], dict[str, Any]()
     for num_points, theirs in list(_SUN.items())[: 1 if tiny else None]:
         (scratch := folder / str(num_points)).mkdir()
-        box = MovingScene("cornell_box", scratch, (60, 60) if tiny else (400, 400), tiny, num_points)
+        box = MovingScene("cornell_box", scratch, (60, 60) if tiny else (400, 400), tiny, None if tiny else num_points)
         whole, two = (_all_s(box, 2 if tiny else _FRAMES, bounces) for bounces in (24, 2))
         ratios.append(1 / (theirs * whole))
         of_sizes[f"{box.num_points}_points"] = (
