@@ -92,8 +92,10 @@ def for_steps(
 def for_shares(kernel: Callable[[int, int], object], count: int, shares_a_thread: int = _SHARES_A_THREAD) -> None:
     """Call `kernel(start, stop)` over [0, count) in a few even shares for each thread.
 
-    For work of a few milliseconds, where handing out a range costs as much as doing it; more shares where it takes
-    longer, and one may cost much more than another.
+    For work of a few milliseconds, where handing out a range costs as much as doing it.
+
+    Args:
+        kernel: works on a range. count: of all. shares_a_thread: more where one may cost much more than another.
     """
     grain = max(1, -(-count // (shares_a_thread * num_threads())))
     _run(kernel, count, grain, "frame")

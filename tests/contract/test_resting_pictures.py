@@ -167,8 +167,8 @@ def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
 def few_at_once(picture, aside, monkeypatch):
     """The same, darker than it should be, with exact samples at every fourth pixel: found, shaded, and shown."""
 
-    def darkened(transfer, wanted, seen, camera, size):
-        frame = frame_of(transfer, wanted, seen, camera, size)
+    def darkened(transfer, wanted, seen, camera, size, shares):
+        frame = frame_of(transfer, wanted, seen, camera, size, shares)
         is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
