@@ -29,8 +29,8 @@ from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
-from relume.moving.resting import RestingPicture
-from relume.moving.still_jobs import TRACING, SparseJob, StillJob
+from relume.moving.rest.resting import RestingPicture
+from relume.moving.rest.still_jobs import TRACING, SparseJob, StillJob
 from relume.parallel import num_threads
 from relume.scene.built_in import built_in
 from relume.scene.model import Scene

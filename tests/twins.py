@@ -184,7 +184,9 @@ def arriving(transfer, view: View, index, look):
         )
         every = light._replace(environment_gain=look.environment.gain)
         arrived = on_cells.arrived(every, reflecting, is_preview=False)
-        reflected = sent_between(transfer.cells, reflecting, arrived, light.paths.first, light.paths.last)
+        reflected = sent_between(transfer.cells, reflecting, arrived, light.paths.first, light.paths.last).sent(
+            transfer.cells
+        )
     local = transfer.local.all_rays(light, view.points(index))
     straight = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.none()
     return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)

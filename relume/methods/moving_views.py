@@ -167,7 +167,11 @@ class MovingViews:
         return light_vectors(points, self._visible, lights, rays)
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool = False) -> F32:
-        """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32"""
+        """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32
+
+        Args:
+            element, beside_suns: as of `vectors`. chosen: the points.
+        """
         points, rays = self.surface.points.rows(chosen), list[Rays]()
         if element.paths.direct:
             for source in element.local:

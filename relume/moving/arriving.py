@@ -66,7 +66,11 @@ def arriving(
 
 
 def wholly(transfer: MovingTransfer, light: Light, *, has_beams: bool = False) -> Arriving:
-    """Find what arrives at all points, where it is not known too. has_beams: pixels find the shadows of beams."""
+    """Find what arrives at all points, where it is not known too.
+
+    Args:
+        transfer: of the points. light: that arrives. has_beams: pixels find the shadows of beams.
+    """
     beams = transfer.beams(light, None) if has_beams else ()
     return arriving(transfer, light, lambda element: Found(transfer.vectors(element, has_beams)), beams)
 

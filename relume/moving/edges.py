@@ -25,7 +25,12 @@ _DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
-    """Tell whether two pixels see different things, or one thing turned or offset."""
+    """Tell whether two pixels see different things, or one thing turned or offset.
+
+    Args:
+        material, normals: of faces. (faces,), (faces, 3). faces: that pixels see, −1 for none. (pixels,)
+        distance, directions: of the rays through pixels. (pixels,), (pixels, 3) float32. p, q: the pixels.
+    """
     f, g = faces[p], faces[q]
     if f < 0 or g < 0:
         return (f < 0) != (g < 0)

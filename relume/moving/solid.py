@@ -32,7 +32,11 @@ class Solid(NamedTuple):
 
     @classmethod
     def of(cls, surface: Surface, positions: F32, embree: EmbreeScene) -> Self:
-        """Find what rays need besides."""
+        """Find what rays need besides.
+
+        Args:
+            surface: that is seen. positions: of its vertices. (vertices, 3) float32. embree: its tree.
+        """
         off, corners = off_surface(positions), positions[surface.faces]
         twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         return cls(surface, positions, embree, off, least_shares(corners, twice_area, OFF_EDGES * off))

@@ -67,7 +67,11 @@ class MovingTransfer(Opened, Protocol):
         ...
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool) -> F32:
-        """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32"""
+        """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32
+
+        Args:
+            element, beside_suns: as of `vectors`. chosen: the points.
+        """
         ...
 
     def change_between(self, before: Light, after: Light, chosen: NDArray[np.intp]) -> F32:

@@ -12,7 +12,7 @@ from relume.look import Look
 from relume.methods.moving_views import MovingViews
 from relume.methods.stills import Stills
 from relume.moving.picture import MovingPicture
-from relume.moving.still_jobs import ExactView
+from relume.moving.rest.still_jobs import ExactView
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.picture import Picture

@@ -24,7 +24,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.methods.registry import open_bake
     from relume.methods.stills import Stills
     from relume.moving.picture import MovingPicture
-    from relume.moving.resting import RestingPicture
+    from relume.moving.rest.resting import RestingPicture
     from relume.moving.shader.geometry import arrays_of, constants
     from relume.picture.picture import Picture
     from relume.picture.transfer import Eyes

@@ -13,8 +13,8 @@ from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.methods.stills import Stills, Tracing
 from relume.moving.frame import frame_of
 from relume.moving.picture import MovingPicture
-from relume.moving.resting import RestingPicture
-from relume.moving.still_jobs import SparseJob, StillJob
+from relume.moving.rest.resting import RestingPicture
+from relume.moving.rest.still_jobs import SparseJob, StillJob
 from relume.render.image import render_image
 from relume.scene.placed_camera import with_cameras
 from relume.store import bake_here
@@ -173,7 +173,7 @@ def few_at_once(picture, aside, monkeypatch):
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
     monkeypatch.setattr("relume.moving.picture.frame_of", darkened)
-    monkeypatch.setattr("relume.moving.still_jobs.STEP", 4)
+    monkeypatch.setattr("relume.moving.rest.still_jobs.STEP", 4)
     picture.set_eye(aside, (160, 100))
     picture.advance(None)
     before, job = picture.image().copy(), picture.next_job()
@@ -197,7 +197,7 @@ def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there
 
 
 def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, aside, monkeypatch):
-    monkeypatch.setattr("relume.moving.still_jobs.STEP", 4)
+    monkeypatch.setattr("relume.moving.rest.still_jobs.STEP", 4)
     picture.set_eye(aside, (160, 100))
     picture.advance(None)
     before = picture.image().copy()

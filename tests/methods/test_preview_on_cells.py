@@ -25,7 +25,7 @@ def turned(transfer):
 
 
 def test_what_a_hand_saw_is_not_what_is_exact(store, monkeypatch):
-    monkeypatch.setattr(transfers, "_PREVIEW_WIDTH", 4)
+    monkeypatch.setattr(transfers, "PREVIEW_WIDTH", 4)
     expected = open_transfer(store, Memory(BUDGET))
     exact = expected.reflected.under(turned(expected)).even
     again = open_transfer(store, Memory(BUDGET))

@@ -84,7 +84,13 @@ def targets_of_lamp(geometry: LightGeometry) -> Targets:
 
 
 def light_of_sun(sun: Sun, rotation: float, points: Points) -> F32:
-    """Find what points get of a sun if nothing hides it. (points, 3, K) float32"""
+    """Find what points get of a sun if nothing hides it.
+
+    Args:
+        sun: of a map. rotation: of the map, degrees. points: that are asked about.
+    Returns:
+        Light vectors. (points, 3, K) float32
+    """
     mean = turned(sun.mean[None], rotation)
     length = np.linalg.norm(mean)
     one = TriangleLights(

@@ -81,7 +81,12 @@ def _aim_at(packet, lane, targets, turn, which, x, y, z, normal):  # type: ignor
 
 @nb.njit(nogil=True, cache=True)
 def trace_one(occluded, scene, arguments, rays, targets, chosen, width, start, stop, num):  # type: ignore[no-untyped-def]
-    """Ask for one target from each of rays chosen[start:stop]. num: written, 0 or `LANES`. (rays,)"""
+    """Ask for one target from each of rays chosen[start:stop].
+
+    Args:
+        occluded, scene, arguments: of Embree. rays: of the eye. targets: on the beam. chosen: numbers of rays. (m,)
+        width: of the picture, pixels. start, stop: the range. num: written, 0 or `LANES`. (rays,) uint8
+    """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
     for begin in range(start, stop, LANES):
@@ -100,7 +105,12 @@ def trace_one(occluded, scene, arguments, rays, targets, chosen, width, start, s
 
 @nb.njit(nogil=True, cache=True)
 def trace_all(occluded, scene, arguments, rays, targets, chosen, is_edge, width, start, stop, num):  # type: ignore[no-untyped-def]
-    """Ask for all targets of rays chosen[start:stop], over what their pixels cover. num: written. (rays,)"""
+    """Ask for all targets of rays chosen[start:stop], over what their pixels cover.
+
+    Args:
+        occluded, scene, arguments, rays, targets, chosen, width, start, stop: as of `trace_one`.
+        is_edge: whether a pixel lies on one. (pixels,) num: written, targets that are seen. (rays,) uint8
+    """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     above, step = np.zeros(LANES, np.bool_), np.empty((2, 3), np.float32)
     for begin in range(start, stop):
@@ -141,7 +151,12 @@ def _is_beside(rays, p, q):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def predict(rays, width, height, start, stop, num, is_doubted):  # type: ignore[no-untyped-def]
-    """Predict what was not asked in squares of 2 × 2 pixels [start, stop); doubt it where others disagree."""
+    """Predict what was not asked in squares of 2 × 2 pixels [start, stop); doubt it where others disagree.
+
+    Args:
+        rays: of the eye. width, height: of the picture, pixels. start, stop: the range.
+        num: targets that are seen, written where nobody asked. (rays,) uint8. is_doubted: written. (rays,)
+    """
     across, down = (width + 1) // 2, (height + 1) // 2
     for square in range(start, stop):
         left, top = square % across, square // across
@@ -176,7 +191,12 @@ def _predict_pixel(rays, width, height, x, y, num, is_doubted):  # type: ignore[
 
 @nb.njit(nogil=True, cache=True)
 def doubt(rays, width, height, found, is_known, num, start, stop, is_doubted):  # type: ignore[no-untyped-def]
-    """Doubt what was predicted near found[start:stop], on their surface, and differs from them."""
+    """Doubt what was predicted near found[start:stop], on their surface, and differs from them.
+
+    Args:
+        rays, width, height, num: as of `predict`. found: pixels that were asked for all targets. (m,)
+        is_known: whether a pixel was. (pixels,) start, stop: the range. is_doubted: written. (rays,)
+    """
     for k in range(start, stop):
         p = found[k]
         x, y = p % width, p // width
@@ -189,7 +209,12 @@ def doubt(rays, width, height, found, is_known, num, start, stop, is_doubted):  
 
 @nb.njit(nogil=True, cache=True)
 def doubt_across(rays, owner, num_pixels, more, num, start, stop, is_doubted):  # type: ignore[no-untyped-def]
-    """Doubt rays across edges of pixels owner[more · (start:stop)] that differ from others on a surface."""
+    """Doubt rays across edges of pixels owner[more · (start:stop)] that differ from others on a surface.
+
+    Args:
+        rays, num: as of `predict`. owner: pixels of the rays that go through no middle, rising. (k,)
+        num_pixels: of the picture. more: such rays a pixel has. start, stop: the range. is_doubted: written. (k,)
+    """
     for first in range(start * more, stop * more, more):
         pixel = owner[first]
         for k in range(first, first + more):
@@ -205,7 +230,11 @@ def doubt_across(rays, owner, num_pixels, more, num, start, stop, is_doubted):  
 
 @nb.njit(nogil=True, cache=True)
 def even_out(rays, width, height, num, start, stop, out):  # type: ignore[no-untyped-def]
-    """Write the shares of pixels [start, stop): the mean of nine where all of them are partly in shadow."""
+    """Write the shares of pixels [start, stop): the mean of nine where all of them are partly in shadow.
+
+    Args:
+        rays, width, height, num: as of `predict`. start, stop: the range. out: written, 0…1. (rays,) float32
+    """
     for p in range(start, stop):
         x, y, total = p % width, p // width, np.int64(num[p])
         out[p] = np.float32(total) / np.float32(LANES)

@@ -20,8 +20,8 @@ from relume.look import Look
 from relume.memory import Memory
 from relume.moving.arriving import LightJob
 from relume.moving.picture import MovingPicture
+from relume.moving.rest.still_jobs import ExactView, Eye, MakeStill, SparseJob, StillJob
 from relume.moving.shader.tables import Numbers, Part
-from relume.moving.still_jobs import ExactView, Eye, MakeStill, SparseJob, StillJob
 from relume.picture.light import Solo
 from relume.picture.picture import Advance, Picture
 from relume.scene.model import Camera
