@@ -17,11 +17,11 @@ from relume.moving.arriving import Arriving, LightJob, followed, roughly, wholly
 from relume.moving.beams.beam import Beam
 from relume.moving.beams.shadows import shares_seen
 from relume.moving.behind import alpha_of
+from relume.moving.correction import corrected
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
 from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
-from relume.moving.rest.correction import corrected
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.fidelity import Word
@@ -116,7 +116,7 @@ class MovingPicture:
         self._by = None
 
     def correct(self, by: F32 | None) -> None:
-        """Add what it is off by, see `relume.moving.rest.correction`, until another look or eye is given.
+        """Add what it is off by, see `relume.moving.correction`, until another look or eye is given.
 
         Args:
             by: of each pixel, (height, width, 3) float32; None: nothing.

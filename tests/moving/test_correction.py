@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.moving.rest.correction import Places, corrected, correction
+from relume.moving.correction import Places, corrected, correction
 
 STEP, WIDTH, HEIGHT = 4, 48, 32
 

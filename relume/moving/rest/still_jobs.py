@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from relume.errors import CancelledError, RelumeError
 from relume.look import Look
 from relume.memory import Memory
+from relume.moving.correction import Places, correction
 from relume.moving.picture import MovingPicture
-from relume.moving.rest.correction import Places, correction
 from relume.picture.finish import finish
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.light import Solo
