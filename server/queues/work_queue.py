@@ -173,8 +173,11 @@ class WorkQueue(ABC, Generic[Request]):
             row = session.get(self.row, identity)
         if row is None:
             raise NotFoundError(f"there is no {self.noun} {identity[:40]}; start one first")
+        return self._work(row)
+
+    def _work(self, row: WorkRow) -> Work[Request]:
         request = self.request_type.model_validate_json(row.request)
-        total, timer = self.steps(request), self._timers.get(identity) if row.state == "running" else None
+        total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.share if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         return Work(row.id, request, row.state, row.done, total, progress, seconds_left, row.problem)
@@ -182,12 +185,7 @@ class WorkQueue(ABC, Generic[Request]):
     def all(self) -> list[Work[Request]]:
         """All rows, oldest first."""
         with self._sessions() as session:
-            found = session.scalars(select(self.row.id).order_by(self.row.created)).all()
-        works = []
-        for identity in found:
-            with suppress(NotFoundError):  # somebody has deleted it since
-                works.append(self.get(identity))
-        return works
+            return [self._work(row) for row in session.scalars(select(self.row).order_by(self.row.created))]
 
     def delete(self, identity: str) -> None:
         """Stop the work and forget its files. Raises NotFoundError."""
