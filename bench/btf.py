@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from bench.btf_pictures import against_geometry, against_table
 from bench.figure import Figure
 from bench.moving_scene import MovingScene, rotated
-from bench.timing import percentiles
 from relume.btf.compress import compress
 from relume.btf.eigen import EigenBtf
 from relume.btf.rings import ubo_rings
@@ -166,9 +165,9 @@ def _shown(record: BtfRecord, folder: Path, tiny: bool) -> list[Figure]:
         rotated(document, share)
 
     frames = 3 if tiny else 40
-    eye, light = still.eye_s(frames, covered), still.edits_s(frames, turned, is_watched=True)
+    eye, light = still.eye_s(frames, covered), still.edits(frames, turned, is_watched=True)
     context = {"size": "400×400", "points": still.num_points, "every_surface": "woven"}
     return [
         Figure("btf.view_fps", 1 / float(np.median(eye)), "frames/s", context),
-        Figure("btf.light_ms", 1e3 * percentiles(light)[0], "ms", {**context, "bounces": "all"}),
+        Figure("btf.light_ms", 1e3 * light.median_s, "ms", {**context, **light.said(), "bounces": "all"}),
     ]

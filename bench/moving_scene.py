@@ -7,11 +7,13 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.beside import Beside
+from bench.timing import percentiles
 from relume.bake import Recipe
 from relume.look import Look, complete, validate
 from relume.memory import Memory
@@ -28,11 +30,43 @@ _MOVED = 0.01  # of the distance to the target, each frame
 _MEMORY = 4 << 30
 
 
+class Drag(NamedTuple):
+    """Times of its frames.
+
+    Attributes:
+        seconds: of each. lag_s: how old the look is whose light between surfaces is shown, the median.
+    """
+
+    seconds: list[float]
+    lag_s: float
+
+    @property
+    def median_s(self) -> float:
+        """Of the frames."""
+        return float(np.median(self.seconds))
+
+    def said(self) -> dict[str, float]:
+        """What a context tells of it: milliseconds, and frames a second of all."""
+        p50, p95 = percentiles(self.seconds)
+        per_second = len(self.seconds) / sum(self.seconds)
+        return {"p50_ms": 1e3 * p50, "p95_ms": 1e3 * p95, "per_s": per_second, "lag_ms": 1e3 * self.lag_s}
+
+
+def follow(picture: MovingPicture) -> None:
+    """What is made beside the frames while a hand moves, made now."""
+    while (job := picture.next_job()) is not None and not job.refines:
+        _make(picture, job)
+
+
 def rest(picture: MovingPicture) -> None:
     """What follows when a hand rests: all its light is found."""
-    if (job := picture.next_job()) is not None:
-        picture.install(job, job.make(lambda share: None, lambda: False))
-        picture.advance(None)
+    while (job := picture.next_job()) is not None:
+        _make(picture, job)
+
+
+def _make(picture: MovingPicture, job: Any) -> None:
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    picture.advance(None)
 
 
 class MovingScene:
@@ -89,21 +123,23 @@ class MovingScene:
             to_world[:3, 3] += _MOVED * (k + 1) * to_world[:3, 0]
             picture.set_eye(replace(camera, to_world=to_world), self.size)
 
-        return self._timed(picture, frames, move)
+        return self._timed(picture, frames, move).seconds
 
-    def edits_s(
+    def edits(
         self,
         frames: int,
         change: Callable[[dict[str, Any], float], None],
         *,
         is_watched: bool = False,
         beside: Callable[[MovingPicture, int], None] = lambda picture, k: None,
-    ) -> list[float]:
-        """Seconds from a look to its encoded frame, each once.
+    ) -> Drag:
+        """A look after the other, each as soon as the frame of the one before is encoded.
 
         Args:
             frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
             beside: what else happens to the picture in each frame.
+        Returns:
+            Seconds from each look to its frame.
         """
         looks = [
             self.look(lambda document, k=k: change(document, k / frames))  # type: ignore[misc]
@@ -124,15 +160,18 @@ class MovingScene:
         seen = self.moving.surface.face_material[face[face >= 0]]
         return float(np.sum(seen == list(self.moving.material_names).index(material)) / len(face))
 
-    def _timed(self, picture: MovingPicture, frames: int, begin: Callable[[int], None]) -> list[float]:
+    def _timed(self, picture: MovingPicture, frames: int, begin: Callable[[int], None]) -> Drag:
         found = []
-        for k in range(frames):
-            began = time.perf_counter()
-            begin(k)
-            picture.advance(None)
-            picture.encode(picture.all_tiles(), "rgb9e5")
-            found.append(time.perf_counter() - began)
-        return found
+        with Beside(picture) as beside:
+            for k in range(frames):
+                began = time.perf_counter()
+                begin(k)
+                beside.want()
+                picture.advance(None)
+                picture.encode(picture.all_tiles(), "rgb9e5")
+                found.append(time.perf_counter() - began)
+                beside.go_on()
+        return Drag(found, beside.lag_s)
 
     def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:
         """The picture of a fixed view from the same place."""

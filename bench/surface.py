@@ -4,8 +4,9 @@ Scenes: the Cornell box under the sky at 400×400, and the still life at 640×48
 points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the look
 stays; `surface.sun_fps`: the same under a clear sky, the shadows of whose sun pixels find. `surface.brdf_ms`: the
 exponent of the floor's highlight moves, the eye and the lights stay; `edited_share` of the picture's pixels show it.
-What surfaces reflect onto each other follows, anew with each step of it that is told apart. `surface.light_ms`: the
-environment turns, with all bounces, and is followed roughly; `all_points_ms` is what all of it takes, at rest.
+What surfaces reflect onto each other is made beside the frames and follows `lag_ms` behind; `per_s` counts all frames,
+those among them that show it in every pixel, too. `surface.light_ms`: the environment turns, with all bounces, and is
+followed roughly, in the same way; `all_points_ms` is what all of it takes, at rest.
 `surface.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
 place, pixels at edges of objects left out, which one side has antialiased; both spread evenly what highlights send to
 other surfaces.
@@ -23,7 +24,6 @@ import numpy as np
 
 from bench.figure import Figure
 from bench.moving_scene import MovingScene, rotated
-from bench.timing import percentiles
 from relume.parallel import num_threads
 
 
@@ -37,10 +37,10 @@ def measure(tiny: bool) -> list[Figure]:
         sun = {one.name: one.eye_s(frames, _clear) for one in (box, still)}
         context = {"threads": num_threads(), "points": {one.name: one.num_points for one in (box, still)}}
         brdf, light = (
-            box.edits_s(frames, exponent_of(_EDITED), is_watched=True),
-            box.edits_s(max(2, frames // 6), rotated, is_watched=True),
+            box.edits(frames, exponent_of(_EDITED), is_watched=True),
+            box.edits(max(2, frames // 6), rotated, is_watched=True),
         )
-        exactly = {"all_points_ms": 1e3 * percentiles(box.edits_s(3, rotated))[0]}
+        exactly = {"all_points_ms": 1e3 * box.edits(3, rotated).median_s}
         return [
             Figure("surface.bake_s", still.bake_s, "s", {**context, "cornell_box": box.bake_s, **still.sizes}),
             Figure("surface.bytes_per_point", still.num_bytes / still.num_points, "bytes", context),
@@ -58,11 +58,11 @@ def measure(tiny: bool) -> list[Figure]:
             ),
             Figure(
                 "surface.brdf_ms",
-                1e3 * percentiles(brdf)[0],
+                1e3 * brdf.median_s,
                 "ms",
                 {
                     **context,
-                    "p95_ms": 1e3 * percentiles(brdf)[1],
+                    **brdf.said(),
                     "edited_share": box.share_of(_EDITED),
                     "size": "400×400",
                     "bounces": "all",
@@ -70,9 +70,9 @@ def measure(tiny: bool) -> list[Figure]:
             ),
             Figure(
                 "surface.light_ms",
-                1e3 * percentiles(light)[0],
+                1e3 * light.median_s,
                 "ms",
-                {**context, **exactly, "size": "400×400", "bounces": "all"},
+                {**context, **light.said(), **exactly, "size": "400×400", "bounces": "all"},
             ),
             *(_error(box if "diffuse" in name else still, name, terms) for name, terms in _MATERIALS.items()),
         ]

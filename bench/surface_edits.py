@@ -3,8 +3,9 @@
     ratio = (1 / frames a second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
 
 The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has points here.
-The exponent of the floor's highlight moves, its light between surfaces followed as `surface.brdf_ms` says; `widest` is
-the same of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine of
+The exponent of the floor's highlight moves; what the floor sends to others follows some frames behind, `lag_ms`, made
+beside the frames on the same cores. `p95_ms` is of frames that show it in all pixels, `per_s` counts all; `widest` is
+the ratio of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine of
 2007, in scenes and at frame sizes of its own. `moved_eye` is the ratio where our eye moves in each frame, too.
 """
 
@@ -16,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from bench.figure import Figure
-from bench.moving_scene import MovingScene
+from bench.moving_scene import Drag, MovingScene
 from bench.surface import exponent_of
-from bench.timing import percentiles
 from relume.parallel import num_threads
 
 _SUN_FPS = {"tweety": (13_000, 28.73), "indoor": (35_700, 12.57), "watch": (62_100, 7.23)}
@@ -34,20 +34,20 @@ def measure(tiny: bool) -> list[Figure]:
         with tempfile.TemporaryDirectory() as folder:
             box = MovingScene("cornell_box", Path(folder), size, tiny, num_points=2000 if tiny else num_points)
             of_sun_ms = 1e3 / fps
-            ms, worst_ms = (1e3 * s for s in percentiles(box.edits_s(frames, exponent_of(_FLOOR), is_watched=True)))
-            widest_ms = 1e3 * percentiles(box.edits_s(frames, exponent_of(_WALLS), is_watched=True))[0]
-            moved_ms = 1e3 * percentiles(_with_eye(box, frames))[0]
-        ratios.append(of_sun_ms / ms)
+            floor = box.edits(frames, exponent_of(_FLOOR), is_watched=True)
+            widest = box.edits(frames, exponent_of(_WALLS), is_watched=True)
+            moved = _with_eye(box, frames)
+        ratios.append(of_sun_ms / (1e3 * floor.median_s))
         context |= {"floor": box.share_of(_FLOOR), "walls": box.share_of(_WALLS)}
         context[name] = {
-            "points": box.num_points, "sun_ms": of_sun_ms, "ms": ms, "p95_ms": worst_ms, "ratio": ratios[-1],
-            "widest": of_sun_ms / widest_ms, "moved_eye": of_sun_ms / moved_ms,
+            "points": box.num_points, "sun_ms": of_sun_ms, "ratio": ratios[-1], **floor.said(),
+            "widest": of_sun_ms / (1e3 * widest.median_s), "moved_eye": of_sun_ms / (1e3 * moved.median_s),
         }  # fmt: skip
     return [Figure("surface.brdf_vs_sun", min(ratios), "×", context)]
 
 
-def _with_eye(box: MovingScene, frames: int) -> list[float]:
-    """Seconds of frames in which the eye moves and the floor is edited."""
+def _with_eye(box: MovingScene, frames: int) -> Drag:
+    """Frames in which the eye moves and the floor is edited."""
     camera, change = box.scene.cameras[0], exponent_of(_FLOOR)
 
     def move(picture: Any, k: int) -> None:
@@ -55,4 +55,4 @@ def _with_eye(box: MovingScene, frames: int) -> list[float]:
         to_world[:3, 3] += 0.01 * (k + 1) * to_world[:3, 0]
         picture.set_eye(replace(camera, to_world=to_world), box.size)
 
-    return box.edits_s(max(2, frames // 3), change, is_watched=True, beside=move)
+    return box.edits(max(2, frames // 3), change, is_watched=True, beside=move)

@@ -3,10 +3,12 @@
 `surface.all_vs_sun`: in every frame the eye moves, the environment turns to where nobody had it, and the exponent of
 the floor's highlight moves, whose light all other surfaces get, with as many bounces as the bake has (24), and with
 two (`two_bounces`); of the Cornell box at 400×400, at as many points as scenes of Sun 2007 had vertices, whose frames
-a second (table 1, light, view and BRDF) are the other side; the smallest ratio. `surface.first_touch_s`: from a hand's
-first edit of a material in a bake that has been shown once, to the frame that shows what others get of its light; the
-longest of both scenes and of all drags. `surface.follow_error`: the picture that a hand sees at the end of a drag
-against the same at rest, by what the drag has changed; the largest, and in the context all, by the picture too.
+a second (table 1, light, view and BRDF) are the other side; the smallest ratio. What surfaces send each other is made
+beside the frames, on the same cores, and is as old as `lag` says. `surface.first_touch_s`: from a hand's first edit of
+a material in a bake that has been shown once, to the frame that shows what others get of its light; the longest of
+both scenes and of all drags. `surface.follow_error`: the picture that a hand sees at the end of a drag, once that light
+has followed, against the same at rest, by what the drag has changed; the largest, and in the context all, by the
+picture too.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.moving_scene import MovingScene, rest
+from bench.moving_scene import Drag, MovingScene, follow, rest
+from relume.moving.picture import MovingPicture
 from relume.parallel import num_threads
 
 _SUN = {13_000: 5.82, 35_700: 3.40, 62_100: 1.53}
@@ -41,16 +44,17 @@ def _all(folder: Path, context: dict[str, Any], tiny: bool) -> Figure:
     for num_points, theirs in list(_SUN.items())[: 1 if tiny else None]:
         (scratch := folder / str(num_points)).mkdir()
         box = MovingScene("cornell_box", scratch, (60, 60) if tiny else (400, 400), tiny, None if tiny else num_points)
-        whole, two = (_all_s(box, 2 if tiny else _FRAMES, bounces) for bounces in (24, 2))
-        ratios.append(1 / (theirs * whole))
+        whole, two = (_together(box, 2 if tiny else _FRAMES, bounces) for bounces in (24, 2))
+        ratios.append(1 / (theirs * whole.median_s))
         of_sizes[f"{box.num_points}_points"] = (
-            f"{1e3 * whole:.0f} ms, {1 / whole:.1f} a second, two bounces {1e3 * two:.0f} ms; Sun {theirs} a second"
+            f"{1e3 * whole.median_s:.0f} ms, {1 / whole.median_s:.1f} a second, lag {1e3 * whole.lag_s:.0f} ms, "
+            f"two bounces {1e3 * two.median_s:.0f} ms; Sun {theirs} a second"
         )
     return Figure("surface.all_vs_sun", min(ratios), "ratio", {**of_sizes, **context})
 
 
-def _all_s(of: MovingScene, frames: int, bounces: int) -> float:
-    """Median seconds of a frame in which all three change."""
+def _together(of: MovingScene, frames: int, bounces: int) -> Drag:
+    """Frames in which all three change."""
     camera = of.scene.cameras[0]
 
     def change(document: dict[str, Any], share: float) -> None:
@@ -58,21 +62,12 @@ def _all_s(of: MovingScene, frames: int, bounces: int) -> float:
         document["transport"]["bounces"] = bounces
         _exponent(document, share)
 
-    looks = [
-        of.look(lambda document, k=k: change(document, (k + 1) / (frames + 1)))  # type: ignore[misc]
-        for k in range(frames)
-    ]
-    picture, found = of.picture(of.look(lambda document: change(document, 0.0)), is_watched=True), []
-    for k, look in enumerate(looks):
+    def move(picture: MovingPicture, k: int) -> None:
         to_world = camera.to_world.copy()
         to_world[:3, 3] += 0.01 * (k + 1) * to_world[:3, 0]
-        began = time.perf_counter()
         picture.set_eye(replace(camera, to_world=to_world), of.size)
-        picture.set_look(look)
-        picture.advance(None)
-        picture.encode(picture.all_tiles(), "rgb9e5")
-        found.append(time.perf_counter() - began)
-    return float(np.median(found[1:]))
+
+    return of.edits(frames, change, is_watched=True, beside=move)
 
 
 def _lambert(red: float, green: float, blue: float) -> dict[str, Any]:
@@ -146,6 +141,7 @@ def _drag(of: MovingScene, change: Change) -> tuple[float, tuple[float, float]]:
         began = time.perf_counter()
         picture.set_look(look)
         picture.advance(None)
+        follow(picture)
         picture.encode(picture.all_tiles(), "rgb9e5")
         first = first or time.perf_counter() - began
     followed = picture.image().copy()

@@ -20,8 +20,8 @@ from bench.moving_scene import MovingScene
 from bench.standard_error import NoiseFree, over_passes
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.look import Look
-from relume.moving.arriving import wholly
 from relume.moving.evaluate import send, tables_of
+from relume.moving.vectors.arriving import wholly
 from relume.picture.light import light_of
 from relume.picture.view_images import documents_of
 from relume.reference import Points, reference_radiance, texels_of

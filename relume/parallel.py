@@ -1,17 +1,19 @@
-"""The threads for every kernel of this process: a pool for long work, and one for what a frame waits for.
+"""The threads for every kernel of this process: pools for long work, for what a frame waits for, and for what follows.
 
 Kernels release the interpreter lock and work on ranges; they are split here and nowhere else, so that two layers of
 threads never fight over the same cores. A freeze hands out hundreds of ranges at once, which a frame's few must not
-queue behind: they have threads of their own, and the system shares the cores between the two.
+queue behind: they have threads of their own, and where both want a core the system gives frames most of it.
 `RELUME_THREADS` bounds each pool; worker processes set it to 1.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 
 from relume.errors import CancelledError
 
@@ -21,7 +23,10 @@ _SHARES_A_THREAD = 2
 # asked once: of an edit's frame of three milliseconds, asking at every kernel took a third of one
 _AVAILABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
+_NICE = 5  # of threads of long work: frames get three quarters of a core that both want
+
 _lock = threading.Lock()
+_beside = threading.local()
 _pools: dict[str, ThreadPoolExecutor] = {}
 
 
@@ -34,8 +39,27 @@ def num_threads() -> int:
 def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
         if name not in _pools:
-            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}")
+            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}", _PREPARE[name])
         return _pools[name]
+
+
+def _let_frames_first() -> None:
+    if sys.platform == "linux":  # elsewhere it would be of the whole process
+        with suppress(OSError):  # not allowed to
+            os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE)
+
+
+_PREPARE = {"kernel": _let_frames_first, "beside": _let_frames_first, "frame": None}
+
+
+@contextmanager
+def beside_frames() -> Iterator[None]:
+    """Inside, shares of this thread's kernels are done by threads that let those of frames go first."""
+    _beside.is_on = True
+    try:
+        yield
+    finally:
+        _beside.is_on = False
 
 
 def _run(kernel: Callable[[int, int], object], count: int, grain: int, pool: str) -> None:
@@ -98,4 +122,4 @@ def for_shares(kernel: Callable[[int, int], object], count: int, shares_a_thread
         kernel: works on a range. count: of all. shares_a_thread: more where one may cost much more than another.
     """
     grain = max(1, -(-count // (shares_a_thread * num_threads())))
-    _run(kernel, count, grain, "frame")
+    _run(kernel, count, grain, "beside" if getattr(_beside, "is_on", False) else "frame")

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from relume.look import Look
 from relume.moving.again import Part, Shown, resolve_some
-from relume.moving.arriving import Arriving
 from relume.moving.basis.lobes import Lobes, lobes_of
 from relume.moving.beams.show import add_beams
 from relume.moving.behind import Caught, lay_over, seen_behind
@@ -26,6 +25,7 @@ from relume.moving.relief.show import Sight, show_texels
 from relume.moving.relief.tables import Cover, covers_of
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
+from relume.moving.vectors.arriving import Arriving
 from relume.picture.light import Light, emission_of
 from relume.scene.model import Camera
 

@@ -13,7 +13,6 @@ from relume.brdf.registry import TERMS
 from relume.errors import EditNotSupportedError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
-from relume.moving.arriving import Arriving, LightJob, followed, roughly, wholly
 from relume.moving.beams.beam import Beam
 from relume.moving.beams.shadows import shares_seen
 from relume.moving.behind import alpha_of
@@ -24,8 +23,11 @@ from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
+from relume.moving.vectors.arriving import Arriving
+from relume.moving.vectors.jobs import FollowJob, LightJob
+from relume.moving.vectors.live import Asked, LiveVectors
 from relume.picture.fidelity import Word
-from relume.picture.light import Light, Solo, gain_of, is_same_but_for_surfaces, light_of, vector_of
+from relume.picture.light import Light, Solo, gain_of, light_of
 from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
@@ -75,14 +77,13 @@ class MovingPicture:
         self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
-        self._vectors: tuple[tuple[Light, bool], Arriving] | None = None
-        self._quick: tuple[NDArray[np.uint8], tuple[Light, bool], Arriving] | None = None  # at points that are needed
+        self._vectors, self._everywhere = LiveVectors(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
         self._by: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
         self.draws = True
-        self._told: tuple[Light, Arriving, bool] | None = None
+        self._told: Arriving | None = None
         self._num_told = self._num_materials = 0
 
     def check(self, look: Look) -> None:
@@ -153,27 +154,18 @@ class MovingPicture:
         if pointer.name not in [one.name for one in names]:
             raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")
 
-    def next_job(self) -> LightJob | None:
+    def next_job(self) -> FollowJob | LightJob | None:
         """What makes a rough picture as good as it gets: the light vectors that it lacks."""
         is_waiting = self._is_rough and self._has_to_be_rough()
-        return LightJob(self._transfer, *self._asked(), self.take) if is_waiting else None
+        return self._vectors.next_job(self._asked(), self._needed) if is_waiting else None
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
         job.install(made)
 
-    def take(self, light: Light, has_beams: bool, vectors: Arriving) -> None:
-        """Go on with the light vectors of a light, unless another one is asked for by now.
-
-        Args:
-            light: that arrives. has_beams: pixels find the shadows of beams. vectors: of the light.
-        """
-        if (light, has_beams) == self._asked():
-            self._vectors = self._asked(), vectors
-
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
-        wanted = (self._look, self._solo, self._num_eyes)
+        wanted = (self._look, self._solo, self._num_eyes, self._vectors.version)
         is_drawn = wanted == self._shown and self._is_rough == self._has_to_be_rough()
         if self._look is None or (is_drawn and self._is_corrected == self.is_corrected):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)
@@ -191,15 +183,17 @@ class MovingPicture:
 
     def _has_to_be_rough(self) -> bool:
         """Whether somebody would wait for light vectors that nobody has."""
-        light, has_beams = self._asked()
-        has_them = self._vectors is not None and self._vectors[0] == (light, has_beams)
-        knows = self._transfer.knows
-        return self._is_watched and not has_them and not all(knows(one, has_beams) for one in vector_of(light))
+        return self._is_watched and not self._vectors.are_there(self._asked())
 
-    def _asked(self) -> tuple[Light, bool]:
-        """What arrives, and whether pixels find shadows of beams: not where a shader draws, nor on BTFs."""
+    def _asked(self) -> Asked:
+        """What is to arrive; pixels find no shadows of beams where a shader draws, nor on BTFs."""
         assert self._look is not None
-        return self._now(), self.draws and not self._materials_of(self._look).covers
+        return Asked(self._now(), self.draws and not self._materials_of(self._look).covers)
+
+    @property
+    def _needed(self) -> NDArray[np.uint8]:
+        """Points whose light is asked about: those that the eye sees, or all where a shader draws from anywhere."""
+        return self._look_around().is_needed if self.draws else self._everywhere
 
     def _draw(self) -> _Drawn | None:
         """What is shown, evaluated where that has not been done; None before there is a look."""
@@ -240,26 +234,17 @@ class MovingPicture:
 
     def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
         gain = np.array(gain_of(shown, self._solo), np.float32)
-        is_rough = self._is_rough and not self._follows  # what follows is known up to all functions
+        is_exact_but_for_surfaces = self._vectors.follow(self._asked())
+        is_rough = self._is_rough and not is_exact_but_for_surfaces
         return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough)
-
-    @property
-    def _follows(self) -> bool:
-        """Whether all that somebody would wait for is what surfaces send each other."""
-        if self._vectors is None:
-            return False
-        (before, had_beams), (light, has_beams) = self._vectors[0], self._asked()
-        return had_beams == has_beams and is_same_but_for_surfaces(before, light)
 
     def parts(self) -> tuple[dict[str, Part], Numbers]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""
         assert self._look is not None
-        if self._told is None or self._told[::2] != (self._now(), self._is_rough):
-            everywhere = np.ones(self._transfer.vectors_shape[0], np.uint8)
-            vectors, before = self._vectors_now(everywhere), self._told
-            self._told = self._now(), vectors, self._is_rough
-            self._num_told += before is None or before[1] is not vectors
-        wanted = self._wanted(self._look, self._told[1])
+        vectors = self._vectors_now(self._everywhere)
+        self._num_told += vectors is not self._told
+        self._told = vectors
+        wanted = self._wanted(self._look, vectors)
         versions = self._num_materials, self._num_told
         return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
 
@@ -311,23 +296,8 @@ class MovingPicture:
 
     def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
-        asked, known = self._asked(), self._vectors
-        if self._is_rough:
-            quick = self._quick
-            if quick is None or quick[0] is not is_needed or quick[1] != asked:
-                self._quick = quick = is_needed, asked, self._quickly(np.flatnonzero(is_needed))
-            return quick[2]
-        if known is None or known[0] != asked:
-            light, has_beams = asked
-            self._vectors = known = asked, wholly(self._transfer, light, has_beams=has_beams)
-        return known[1]
-
-    def _quickly(self, chosen: NDArray[np.intp]) -> Arriving:
-        light, has_beams = self._asked()
-        if self._vectors is not None and self._follows:
-            (before, _), known = self._vectors
-            return followed(self._transfer, before, known, light, chosen)
-        return roughly(self._transfer, light, chosen, has_beams=has_beams)
+        asked = self._asked()
+        return self._vectors.quickly(asked, is_needed) if self._is_rough else self._vectors.exactly(asked)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""

@@ -36,14 +36,15 @@ class Job(Protocol):
     """Something to be made.
 
     Attributes:
-        what: in words. state: what making it is called. key: equal keys are the same job.
+        what: in words. key: equal keys are the same job.
+        state: what making it is called; what follows a hand takes a few frames, and nobody is told of it.
         refines: the picture is near its look without it, so that it can wait until the hand rests.
     """
 
     @property
     def what(self) -> str: ...
     @property
-    def state(self) -> Literal["freezing", "shading"]: ...
+    def state(self) -> Literal["freezing", "shading", "following"]: ...
     @property
     def key(self) -> tuple[Hashable, ...]: ...
     @property

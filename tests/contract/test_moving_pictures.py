@@ -154,8 +154,9 @@ FOLLOWED = {
 
 @pytest.mark.parametrize("edit", FOLLOWED)
 @pytest.mark.parametrize("solo", [None, frozenset({"Lamp"})])
-def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo, monkeypatch):
-    """Under a light that is known, a frame is what was exact and what surfaces send otherwise; at rest all is exact."""
+def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
+    """Under a light that is known, a frame is what was exact and what surfaces send otherwise, made beside the frames;
+    at rest all is exact."""
     pointer, change = FOLLOWED[edit]
     other = environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
 
@@ -171,15 +172,12 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo, monkeypatch
         picture.touch(pointer)
     picture.set_look(shown(change), solo=solo)
     assert picture.advance(None).fidelity == "preview"
+    stale = picture.image()  # of surfaces as they are, in what they sent each other before
+    job = picture.next_job()
+    assert not job.refines
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    assert picture.advance(None).fidelity == "preview"
     seen = picture.image()
-    kept = MovingPicture(moving, "front", is_watched=True)
-    kept.set_look(shown(), solo=solo)
-    kept.advance(None)
-    with monkeypatch.context() as nothing_follows:
-        nothing_follows.setattr("relume.moving.picture.followed", lambda transfer, light, known, now, chosen: known)
-        kept.set_look(shown(change), solo=solo)
-        kept.advance(None)
-        stale = kept.image()
     rest(picture)
     exact = picture.image()
     alone = MovingPicture(moving, "front")
@@ -190,6 +188,87 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo, monkeypatch
     picture.set_look(shown(), solo=solo)
     assert picture.advance(None).fidelity == "approximate"  # it is known
     np.testing.assert_array_equal(picture.image(), before)
+
+
+def begun(moving, *changes):
+    """A picture that somebody watches, all its light there."""
+    picture = MovingPicture(moving, "front", is_watched=True)
+    picture.set_look(look_of(moving, lit(*changes)))
+    picture.advance(None)
+    rest(picture)
+    return picture
+
+
+def made(job):
+    return job.make(lambda share: None, lambda: False)
+
+
+def test_edits_wait_for_no_light_and_light_for_no_edits(moving, monkeypatch):
+    """Twice: an edit changes a part of the frame, and what was begun before it comes to all of it afterwards."""
+    other = environment(rotation=301.0)
+    picture = begun(moving, other)
+    picture.set_look(look_of(moving, lit(other, exponent(30))))
+    picture.advance(None)
+    for step in (60, 90):
+        job, before = picture.next_job(), picture.image()
+        with monkeypatch.context() as nothing_whole:
+            nothing_whole.setattr("relume.moving.picture.frame_of", None)
+            nothing_whole.setattr("relume.moving.vectors.live.changed", None)
+            picture.set_look(look_of(moving, lit(other, exponent(step))))
+            assert picture.advance(None).changed
+        edited = picture.image()
+        assert (edited != before).any()
+        picture.install(job, made(job))
+        assert picture.advance(None).changed
+        assert (picture.image() != edited).any()
+        assert picture.next_job().key != job.key  # of the newer look
+    rest(picture)
+    np.testing.assert_array_equal(picture.image(), seen(moving, exponent(90), other).image())
+
+
+def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
+    turns = [look_of(moving, lit(environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
+    picture = begun(moving, environment(rotation=310.0))
+    picture.set_look(turns[1])
+    picture.advance(None)
+    job, behind = picture.next_job(), picture.image()
+    assert not job.refines
+    picture.set_look(turns[2])
+    picture.advance(None)
+    picture.install(job, made(job))
+    picture.advance(None)
+    job = picture.next_job()
+    picture.install(job, made(job))
+    assert picture.advance(None).fidelity == "preview"
+    assert picture.next_job().refines
+    caught_up = picture.image()
+    at_once = MovingPicture(moving, "front", is_watched=True)
+    at_once.set_look(turns[2])
+    at_once.advance(None)
+    np.testing.assert_allclose(caught_up, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+    assert relative_rmse(behind, caught_up) > 1e-3
+    rest(picture)
+    np.testing.assert_array_equal(picture.image(), seen(moving, environment(rotation=326.0)).image())
+
+
+def test_an_eye_that_moves_finds_light_from_surfaces_wherever_it_looks(moving, aside):
+    """The light turns, and the eye moves before what surfaces send is there: no point is left without."""
+    picture = begun(moving, environment(rotation=331.0))
+    now = look_of(moving, lit(environment(rotation=339.0)))
+    picture.set_look(now)
+    picture.advance(None)
+    job = picture.next_job()
+    picture.set_eye(aside, (64, 40))
+    picture.advance(None)
+    before = picture.image()
+    picture.install(job, made(job))
+    picture.advance(None)
+    at_once = MovingPicture(moving, "front", is_watched=True)
+    at_once.set_look(now)
+    at_once.set_eye(aside, (64, 40))
+    at_once.advance(None)
+    np.testing.assert_allclose(picture.image(), at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+    assert 0 < relative_rmse(before, at_once.image()) < 0.1
 
 
 def test_a_shader_gets_what_follows(moving):
@@ -213,6 +292,9 @@ def test_a_shader_gets_what_follows(moving):
     rest(picture)
     picture.set_look(bounces(painted, exponent(8.0)))
     assert picture.advance(None).fidelity == "preview"
+    job = picture.next_job()
+    picture.install(job, job.make(lambda share: None, lambda: False))
+    assert picture.advance(None).fidelity == "preview"
     followed = sent(picture)
     rest(picture)
     exact = sent(picture)
@@ -225,9 +307,9 @@ def test_a_shader_gets_what_follows(moving):
 
 def rest(picture):
     """As when a hand rests."""
-    job = picture.next_job()
-    if job is not None:
+    while (job := picture.next_job()) is not None:
         picture.install(job, job.make(lambda share: None, lambda: False))
+        picture.advance(None)
     assert picture.advance(None).fidelity == "approximate"
 
 

@@ -11,9 +11,9 @@ from relume.environments.equirect import texel_directions
 from relume.look import complete, validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.arriving import wholly
 from relume.moving.beams.shadows import shares_seen
 from relume.moving.picture import MovingPicture
+from relume.moving.vectors.arriving import wholly
 from relume.picture.light import light_of
 from relume.render.image import render_image
 from relume.scene.model import Material

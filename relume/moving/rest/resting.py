@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from relume.errors import ParameterError
 from relume.look import Look
 from relume.memory import Memory
-from relume.moving.arriving import LightJob
 from relume.moving.picture import MovingPicture
 from relume.moving.rest.still_jobs import ExactView, Eye, MakeStill, SparseJob, StillJob
 from relume.moving.shader.tables import Numbers, Part
+from relume.moving.vectors.jobs import FollowJob, LightJob
 from relume.picture.light import Solo
 from relume.picture.picture import Advance, Picture
 from relume.scene.model import Camera
@@ -147,7 +147,7 @@ class RestingPicture:
         """Go on with what a job has made."""
         if isinstance(job, StillJob | SparseJob):
             job.install(made)
-        elif isinstance(job, LightJob):
+        elif isinstance(job, FollowJob | LightJob):
             self._moving.install(job, made)
         elif self._still is not None:  # else it was made for one that is gone
             self._still.install(job, made)

@@ -78,12 +78,14 @@ class Freezer:
             return None
         if error is not None:
             raise error
-        self._metrics.freeze.observe(time.perf_counter() - running.start_s)
+        if running.job.state != "following":
+            self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         return running.viewport, running.job, running.future.result()
 
     async def say_ready(self, viewport: Viewport, job: Job) -> None:
         """Tell the client that this is not waited for any more: it has been handed over, or given up."""
-        await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.what, progress=1.0))
+        if job.state != "following":
+            await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.what, progress=1.0))
 
     async def end(self) -> None:
         """Cancel what runs and wait for its thread; nobody asks for its result any more."""
@@ -98,7 +100,10 @@ class Freezer:
                 part.exception()
 
     async def _tell(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
-        """Say how far it is, each per cent once."""
+        """Say how far it is, each per cent once; what follows a hand is not worth a word."""
+        if job.state == "following":
+            await asyncio.wait({future})
+            return
         told = -1.0
         while not future.done():
             shown = round(min(1.0, max(0.0, progress[0])), 2)
