@@ -1,8 +1,8 @@
-"""The threads for every kernel of this process: pools for long work, for what a frame waits for, and for what follows.
+"""The threads for every kernel of this process: pools for what a frame waits for, for what follows, and for long work.
 
 Kernels release the interpreter lock and work on ranges; they are split here and nowhere else, so that two layers of
 threads never fight over the same cores. A freeze hands out hundreds of ranges at once, which a frame's few must not
-queue behind: they have threads of their own, and where both want a core the system gives frames most of it.
+queue behind: who calls decides whose threads work, and where both want a core the system gives frames most of it.
 `RELUME_THREADS` bounds each pool; worker processes set it to 1.
 """
 
@@ -26,8 +26,9 @@ _AVAILABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") el
 _NICE = 5  # of threads of long work: frames get three quarters of a core that both want
 
 _lock = threading.Lock()
-_beside = threading.local()
+_here = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
 _pools: dict[str, ThreadPoolExecutor] = {}
+_FRAME, _BESIDE, _LONG = "frame", "beside", "long"
 
 
 def num_threads() -> int:
@@ -39,36 +40,42 @@ def num_threads() -> int:
 def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
         if name not in _pools:
-            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}", _PREPARE[name])
+            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}", _begin, (name,))
         return _pools[name]
 
 
-def _let_frames_first() -> None:
-    if sys.platform == "linux":  # elsewhere it would be of the whole process
+def _begin(name: str) -> None:
+    _here.is_of_pool = True
+    if name != _FRAME and sys.platform == "linux":  # elsewhere it would be of the whole process
         with suppress(OSError):  # not allowed to
             os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE)
 
 
-_PREPARE = {"kernel": _let_frames_first, "beside": _let_frames_first, "frame": None}
+def do_long_work() -> None:
+    """From now on kernels that this thread calls let those of frames go first; nobody waits for them."""
+    _here.pool = _LONG
 
 
 @contextmanager
 def beside_frames() -> Iterator[None]:
-    """Inside, shares of this thread's kernels are done by threads that let those of frames go first."""
-    _beside.is_on = True
+    """Inside, kernels that this thread calls let those of frames go first, and do not queue behind long work."""
+    before = getattr(_here, "pool", _FRAME)
+    _here.pool = _BESIDE
     try:
         yield
     finally:
-        _beside.is_on = False
+        _here.pool = before
 
 
-def _run(kernel: Callable[[int, int], object], count: int, grain: int, pool: str) -> None:
+def _run(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
-    if num_threads() == 1 or len(ranges) == 1:
+    # a thread of a pool that waited for its own pool would wait for itself
+    if num_threads() == 1 or len(ranges) == 1 or getattr(_here, "is_of_pool", False):
         for start, stop in ranges:
             kernel(start, stop)
         return
-    futures = [_pool(pool).submit(kernel, start, stop) for start, stop in ranges]
+    pool = _pool(getattr(_here, "pool", _FRAME))
+    futures = [pool.submit(kernel, start, stop) for start, stop in ranges]
     errors = [error for future in futures if (error := future.exception()) is not None]
     if errors:
         raise errors[0]
@@ -79,7 +86,7 @@ def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> 
 
     Ranges must not depend on each other. The first exception is raised here after all ranges have ended.
     """
-    _run(kernel, count, grain, "kernel")
+    _run(kernel, count, grain)
 
 
 def for_steps(
@@ -122,4 +129,4 @@ def for_shares(kernel: Callable[[int, int], object], count: int, shares_a_thread
         kernel: works on a range. count: of all. shares_a_thread: more where one may cost much more than another.
     """
     grain = max(1, -(-count // (shares_a_thread * num_threads())))
-    _run(kernel, count, grain, "beside" if getattr(_beside, "is_on", False) else "frame")
+    _run(kernel, count, grain)

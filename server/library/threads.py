@@ -8,6 +8,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, ParamSpec, TypeVar
 
+from relume.parallel import do_long_work
+
 P = ParamSpec("P")
 T = TypeVar("T")
 NUM_LONG = 8  # more than cores: a view that is opened must not wait until others have frozen theirs
@@ -19,7 +21,7 @@ class Threads:
     def __init__(self) -> None:
         num_cores = os.cpu_count() or 1
         self.quick = ThreadPoolExecutor(max(2, num_cores), "relume-frame")
-        self.long = ThreadPoolExecutor(NUM_LONG, "relume-long")
+        self.long = ThreadPoolExecutor(NUM_LONG, "relume-long", do_long_work)
 
     def close(self) -> None:
         """Take no more work; what runs is finished."""

@@ -3,56 +3,77 @@
 import os
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relume.parallel import beside_frames, for_ranges, for_shares
+from relume.parallel import beside_frames, do_long_work, for_ranges, for_shares
+
+
+@pytest.fixture(autouse=True)
+def two_threads(monkeypatch):
+    monkeypatch.setenv("RELUME_THREADS", "2")
+
+
+def shares(kernel):
+    for_shares(kernel, 1000)
+
+
+def ranges(kernel):
+    for_ranges(kernel, 1000, 10)
 
 
 def names_of(run):
+    """Of the pools that work, each part once."""
     found = []
     run(lambda start, stop: found.append((start, stop, threading.current_thread().name)))
-    assert sorted((start, stop) for start, stop, _ in found)[0][0] == 0
-    assert sum(stop - start for start, stop, _ in found) == 1000
+    parts = sorted((start, stop) for start, stop, _ in found)
+    assert [start for start, _ in parts] == [0, *(stop for _, stop in parts[:-1])]
+    assert parts[-1][1] == 1000
     return {name.rsplit("_", 1)[0] for *_, name in found}
 
 
-def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(monkeypatch):
-    monkeypatch.setenv("RELUME_THREADS", "2")
-
-    def frame(kernel):
-        for_shares(kernel, 1000)
-
-    assert names_of(frame) == {"relume-frame"}
+@pytest.mark.parametrize("run", [shares, ranges])
+def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
+    assert names_of(run) == {"relume-frame"}
     with beside_frames():
-        assert names_of(frame) == {"relume-beside"}
-    assert names_of(frame) == {"relume-frame"}
-    assert names_of(lambda kernel: for_ranges(kernel, 1000, 10)) == {"relume-kernel"}
+        assert names_of(run) == {"relume-beside"}
+    assert names_of(run) == {"relume-frame"}
+    with ThreadPoolExecutor(1, initializer=do_long_work) as long:
+        assert long.submit(names_of, run).result() == {"relume-long"}
+
+        def follows():
+            with beside_frames():
+                return names_of(run)
+
+        assert long.submit(follows).result() == {"relume-beside"}
+        assert long.submit(names_of, run).result() == {"relume-long"}
 
 
-def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was(monkeypatch):
-    monkeypatch.setenv("RELUME_THREADS", "2")
-
+def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
     def fails(start, stop):
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError), beside_frames():
         for_shares(fails, 1000)
-    assert names_of(lambda kernel: for_shares(kernel, 1000)) == {"relume-frame"}
+    assert names_of(shares) == {"relume-frame"}
+
+
+def test_kernels_within_kernels_wait_for_nobody():
+    found = []
+    for_shares(lambda start, stop: for_shares(lambda a, b: found.append((start + a, start + b)), stop - start), 1000)
+    assert sum(stop - start for start, stop in found) == 1000
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own elsewhere")
-def test_frames_go_first(monkeypatch):
-    monkeypatch.setenv("RELUME_THREADS", "2")
-    found = []
+def test_frames_go_first():
+    def niceness():
+        found = []
+        shares(lambda start, stop: found.append(os.getpriority(os.PRIO_PROCESS, 0)))
+        return found
 
-    def kernel(start, stop):
-        found.append(os.getpriority(os.PRIO_PROCESS, 0))
-
-    for_shares(kernel, 1000)
-    of_frames = max(found)
-    found.clear()
+    of_frames = max(niceness())
     with beside_frames():
-        for_shares(kernel, 1000)
-    for_ranges(kernel, 1000, 100)
-    assert min(found) > of_frames or of_frames == 19  # there is nothing beyond
+        assert min(niceness()) > of_frames or of_frames == 19  # there is nothing beyond
+    with ThreadPoolExecutor(1, initializer=do_long_work) as long:
+        assert min(long.submit(niceness).result()) > of_frames or of_frames == 19
