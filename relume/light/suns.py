@@ -17,7 +17,7 @@ from relume.environments.equirect import texel_directions, texel_solid_angles, u
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-TURNS, LANES = 9, 16  # sets of directions, one for each of 3 × 3 pixels; directions of each
+TURNS, NUM_TARGETS = 9, 16  # sets of directions, one for each of 3 × 3 pixels; directions of each
 _MOST = 2
 _LEAST_SHARE = 0.05  # of all light of the map
 _BRIGHT = 100.0  # times the mean radiance
@@ -36,7 +36,7 @@ class Sun(NamedTuple):
     Attributes:
         irradiance: ∫ L dω, of each channel. (3,)
         mean: Σ ω L / Σ L, luminous; shorter than one by as much as the sun is wide. (3,)
-        towards: unit directions, each with an equal share of the light. (`TURNS`, `LANES`, 3)
+        towards: unit directions, each with an equal share of the light. (`TURNS`, `NUM_TARGETS`, 3)
     """
 
     irradiance: F64
@@ -121,8 +121,8 @@ def _sun(bright: _Texels, is_in: NDArray[np.bool_], light: F64, size: tuple[int,
     mean = luminous @ bright.directions[is_in] / luminous.sum()
     backwards = np.where(rows % 2 == 0, columns, -columns)  # there and back again: what follows lies beside
     order = np.lexsort((backwards, rows))
-    ends, num = np.cumsum(luminous[order]), TURNS * LANES
+    ends, num = np.cumsum(luminous[order]), TURNS * NUM_TARGETS
     which = order[np.searchsorted(ends, (np.arange(num) + 0.5) / num * ends[-1])]
     x, y = ((np.arange(num) + 1) / _PLASTIC) % 1, ((np.arange(num) + 1) / _PLASTIC**2) % 1
     directions = uv_to_direction((columns[which] + x) / size[1], (rows[which] + y) / size[0])
-    return Sun(light.sum(axis=0), mean, directions.reshape(LANES, TURNS, 3).transpose(1, 0, 2))
+    return Sun(light.sum(axis=0), mean, directions.reshape(NUM_TARGETS, TURNS, 3).transpose(1, 0, 2))

@@ -19,7 +19,7 @@ from relume.moving.look_up import Seen
 from relume.moving.points.lattice import Lattice, node_of
 from relume.moving.solid import Solid
 from relume.parallel import for_ranges, for_shares
-from relume.trace.embree import occluded16, packet_arguments
+from relume.trace.embree import occluded, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
 
 F32 = NDArray[np.float32]
@@ -60,7 +60,7 @@ def _join(packet, lane, start, end):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _flush(occluded, packet, waiting, ends, is_parted):  # type: ignore[no-untyped-def]
-    """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (16, 2)"""
+    """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (`LANES`, 2)"""
     ask_first(packet, waiting)
     trace_shadows(occluded, packet)
     for lane in range(waiting):
@@ -98,7 +98,7 @@ def find_parted(solid: Solid) -> NDArray[np.uint8]:
     """Find the vertices that do not see all of their neighbours in the grids of faces. (vertices,) uint8"""
     surface, arguments = solid.surface, packet_arguments(coherent=True)
     is_parted = np.zeros(len(surface.vertices.normal), np.uint8)
-    args = occluded16, solid.embree.handle, arguments.ctypes.data, _grids_of(solid)
+    args = occluded, solid.embree.handle, arguments.ctypes.data, _grids_of(solid)
     # threads may note one twice
     for_ranges(lambda start, stop: _part(*args, start, stop, is_parted), len(surface.faces), _FACES_A_RANGE)
     return is_parted
@@ -180,7 +180,7 @@ def mend(seen: Seen, is_parted: NDArray[np.uint8], solid: Solid) -> None:
         return
     arguments, hits = packet_arguments(coherent=False), seen.hits
     args = (
-        occluded16, solid.embree.handle, arguments.ctypes.data, _grids_of(solid), is_parted, hits.face, hits.uv,
+        occluded, solid.embree.handle, arguments.ctypes.data, _grids_of(solid), is_parted, hits.face, hits.uv,
         seen.directions, seen.vertex,
     )  # fmt: skip
     for_shares(lambda start, stop: _mend(*args, start, stop, seen.weight), len(hits.face))

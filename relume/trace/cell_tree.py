@@ -13,6 +13,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.trace.packet import LANES
+
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
 
@@ -39,24 +41,24 @@ class CellTree(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True)
-def locate16(tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """Locate the cells of 16 points on surfaces; all go down the tree together, so that none waits for memory alone.
+def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
+    """Locate the cells of `LANES` points; all go down the tree together, so that none waits for memory alone.
 
     Args:
         tree: a `CellTree`.
-        keys: position and normal of each. (6, 16) float32
-        nodes: the tree's root on each one's side; becomes its cell, `NO_CELL` where there is none. (16,) int32
+        keys: position and normal of each. (6, `LANES`) float32
+        nodes: the tree's root on each one's side; becomes its cell, `NO_CELL` where there is none. (`LANES`,) int32
     """
     axes, values, children = tree.axis, tree.value, tree.children
-    num_inner = 16
+    num_inner = LANES
     while num_inner > 0:
         num_inner = 0
-        for k in range(16):
+        for k in range(LANES):
             node = nodes[k]
             if node >= 0:
                 nodes[k] = children[node, int(keys[axes[node], k] >= values[node])]
                 num_inner += 1
-    for k in range(16):
+    for k in range(LANES):
         nodes[k] = -1 - nodes[k]
 
 

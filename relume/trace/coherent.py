@@ -19,7 +19,7 @@ from relume.color import luminance
 from relume.light.neighbours import neighbours_of
 from relume.parallel import for_ranges
 from relume.trace.coherent_kernel import BLOCK, trace_blocks
-from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 
 F32 = NDArray[np.float32]
 
@@ -97,13 +97,13 @@ def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targ
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
-    arguments = packet_arguments(coherent=True)
+    arguments = packet_arguments(coherent=False)
     found = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
         trace_blocks(
-            occluded16, scene.handle, arguments.ctypes.data, origins, normals, targets, start, stop, bits, counts
+            occluded, scene.handle, arguments.ctypes.data, origins, normals, targets, start, stop, bits, counts
         )
         found.append(counts)
 

@@ -314,7 +314,7 @@ def trace_blocks(occluded, scene, arguments, origins, normals, lights, start, st
     """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
     Args:
-        occluded: `occluded16`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
+        occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
         origins: off the surface. normals: shading normals. (n, 3) float32
         lights: directions, the two arrays of `relume.light.neighbours.Neighbours`, and which are always traced.
         start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8

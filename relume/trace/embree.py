@@ -1,7 +1,7 @@
 """Embree 4 through its C interface: the packet calls that embreex's own wrapper does not offer.
 
-The library is the one that the embreex wheel bundles. Numba kernels receive `occluded16` and `intersect16` as
-first-class functions and call them without the interpreter: 16 rays a call.
+The library is the one that the embreex wheel bundles. Numba kernels receive `occluded` and `intersect` as first-class
+functions and call them without the interpreter: `PACKET_WIDTH` rays a call.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ _POINTER, _WORD = ctypes.c_void_p, ctypes.c_uint64
 _TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9003
 _COHERENT, _FEATURE_TRIANGLE = 1 << 16, 2
 _BUILD_QUALITY_MEDIUM = 1
+_NATIVE_RAY16 = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED
 
 PacketCall = types.void(types.int64, types.int64, types.int64, types.int64)
 
@@ -68,6 +69,10 @@ _commit_scene = _function("rtcCommitScene", None, _POINTER)
 _device_error = _function("rtcGetDeviceError", ctypes.c_int, _POINTER)
 
 _device = _new_device(b"threads=1")
+_property = _function("rtcGetDeviceProperty", ctypes.c_ssize_t, _POINTER, ctypes.c_int)
+
+# Rays of a packet: what this processor's vectors hold. Embree takes larger packets apart and traces ray by ray.
+PACKET_WIDTH = 16 if _property(_device, _NATIVE_RAY16) else 8
 
 
 class _ByAddress(types.WrapperAddressProtocol):
@@ -84,8 +89,8 @@ class _ByAddress(types.WrapperAddressProtocol):
         return PacketCall
 
 
-occluded16 = _ByAddress("rtcOccluded16")
-intersect16 = _ByAddress("rtcIntersect16")
+occluded = _ByAddress(f"rtcOccluded{PACKET_WIDTH}")
+intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
 
 
 def packet_arguments(coherent: bool) -> NDArray[np.uint64]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from relume.light.gather_rays import Pattern, cosine_ray, glossy_ray, small_shifts_of
 from relume.parallel import for_ranges
 from relume.points import Points
-from relume.trace.cell_tree import NO_CELL_NODE, CellTree, locate16
-from relume.trace.embree import intersect16, packet_arguments
+from relume.trace.cell_tree import NO_CELL_NODE, CellTree, locate
+from relume.trace.embree import intersect, packet_arguments
 from relume.trace.geometry import Geometry
 from relume.trace.packet import LANES, aim, ask, direction_of, hit_of, new_packet, place_of, set_origin, trace_hits
 
@@ -40,7 +40,7 @@ class Links:
 def _enter(points, wo, pattern, first, width, packet, frame, towards, shifts):  # type: ignore[no-untyped-def]
     """Begin with points [first, first + width): origins of their rays, local frames, shifts; one lane each.
 
-    wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, 16) shifts: (2 sets, 4, 16)
+    wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, `LANES`) shifts: (2 sets, 4, `LANES`)
     """
     position, normal, tangent, seed = points
     for k in range(LANES):
@@ -81,7 +81,7 @@ def _aim(pattern, ray, frame, towards, shifts, packet, width):  # type: ignore[n
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _find(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """Find the cells that the rays of all lanes have hit, into nodes. (16,) int32. keys: scratch. (6, 16) float32"""
+    """Find the cells that the rays of all lanes have hit, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
     normals, sides, roots = surfaces[0], surfaces[1], tree.roots
     for k in range(LANES):
         nodes[k] = NO_CELL_NODE
@@ -98,14 +98,14 @@ def _find(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
         if is_behind:
             for axis in range(3, 6):
                 keys[axis, k] = -keys[axis, k]
-    locate16(tree, keys, nodes)
+    locate(tree, keys, nodes)
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
     intersect, scene, arguments, points, wo, surfaces, tree, pattern, start, stop, links
 ):
-    """Trace all rays of points [start, stop), the same ray of 16 points at once; returns how many.
+    """Trace all rays of points [start, stop), the same ray of `LANES` points at once; returns how many.
 
     surfaces: normal, and number of the front side, of each face.
     """
@@ -139,14 +139,14 @@ def trace_links(geometry: Geometry, tree: CellTree, points: Points, wo: F32, pat
     Cost: O(n · rays · (log triangles + log cells)) time.
     """
     links = np.empty((points.num_points, pattern.num_rays), np.uint16)
-    arguments = packet_arguments(coherent=True)
+    arguments = packet_arguments(coherent=False)
     surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
     counts: list[int] = []
 
     def kernel(start: int, stop: int) -> None:
         counts.append(
             _trace(
-                intersect16, geometry.embree.handle, arguments.ctypes.data, points, wo, surfaces, tree, pattern,
+                intersect, geometry.embree.handle, arguments.ctypes.data, points, wo, surfaces, tree, pattern,
                 start, stop, links,
             )
         )  # fmt: skip

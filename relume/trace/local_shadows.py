@@ -13,7 +13,7 @@ from relume.light.gather_rays import Pattern, shift_of
 from relume.light.local import LocalLight, light_sample
 from relume.parallel import for_ranges
 from relume.points import Points
-from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.packet import LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
 
 F32 = NDArray[np.float32]
@@ -85,7 +85,7 @@ def trace_local(
     arguments = packet_arguments(coherent=True)
     args = (light, pattern, np.float32(off_surface), points)
     for_ranges(
-        lambda start, stop: _trace(occluded16, scene.handle, arguments.ctypes.data, *args, start, stop, bits),
+        lambda start, stop: _trace(occluded, scene.handle, arguments.ctypes.data, *args, start, stop, bits),
         points.num_points,
         _POINTS_A_RANGE,
     )

@@ -1,4 +1,4 @@
-"""Sixteen rays at once, in the memory that Embree reads them from: every kernel that traces goes through here.
+"""`LANES` rays at once, in the memory that Embree reads them from: every kernel that traces goes through here.
 
 A kernel aims the lanes of one packet, asks Embree, reads the answers, and aims the same lanes again. The helpers are
 inlined: calls would count references to the packet's arrays, and the loops over lanes would not be vectors.
@@ -12,9 +12,12 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-LANES = 16
+from relume.trace.embree import PACKET_WIDTH
+
+LANES = PACKET_WIDTH
+
 FAR = np.float32(1e30)  # where shadow rays end that no light's surface ends
-# rows of RTCRayHit16, sixteen words each; an origin and a direction take three
+# rows of RTCRayHit8 or 16, a word of each lane; an origin and a direction take three
 _ORIGIN, _DIRECTION, _CHANCE, _FAR, _MASK = 0, 4, 7, 8, 9
 _U, _V, _PRIMITIVE, _GEOMETRY, _INSTANCE = 15, 16, 17, 18, 19
 _ROWS = 21
@@ -22,13 +25,13 @@ _NOTHING = 0xFFFFFFFF
 
 
 class Packet(NamedTuple):
-    """Sixteen rays, and what Embree is called with to trace them.
+    """`LANES` rays, and what Embree is called with to trace them.
 
     Attributes:
-        rays: RTCRay16, then RTCHit16 with its instance ids; on a 64-byte boundary. (21 · 16,) float32
-        words: the same memory. (21 · 16,) uint32
-        is_asked: −1 where the ray of a lane is to be traced, else 0. (16,) int32
-        owner: for the caller, whose ray lies in each lane. (16,) int64
+        rays: RTCRay8 or 16, then RTCHit with its instance ids; on a 64-byte boundary. (21 · `LANES`,) float32
+        words: the same memory. (21 · `LANES`,) uint32
+        is_asked: −1 where the ray of a lane is to be traced, else 0. (`LANES`,) int32
+        owner: for the caller, whose ray lies in each lane. (`LANES`,) int64
         scene, arguments: addresses of the scene and of `packet_arguments`.
     """
 
@@ -42,7 +45,7 @@ class Packet(NamedTuple):
 
 @nb.njit(nogil=True, cache=True)
 def _aligned(num_words):  # type: ignore[no-untyped-def]
-    """Zeroed float32 memory on a 64-byte boundary, as Embree's 16-wide packets need it. (num_words,)"""
+    """Zeroed float32 memory on a 64-byte boundary, as Embree's widest packets need it. (num_words,)"""
     raw = np.zeros(num_words + 16, np.float32)
     skip = (64 - raw.ctypes.data % 64) // 4 % 16
     return raw[skip : skip + num_words]
@@ -105,7 +108,7 @@ def _call(embree, packet):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def trace_shadows(occluded, packet):  # type: ignore[no-untyped-def]
-    """Find which of the asked rays reach their ends. occluded: `relume.trace.embree.occluded16`"""
+    """Find which of the asked rays reach their ends. occluded: `relume.trace.embree.occluded`"""
     _call(occluded, packet)
 
 
@@ -117,7 +120,7 @@ def is_free(packet, lane):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def trace_hits(intersect, packet):  # type: ignore[no-untyped-def]
-    """Find what the asked rays hit first. intersect: `relume.trace.embree.intersect16`"""
+    """Find what the asked rays hit first. intersect: `relume.trace.embree.intersect`"""
     packet.words[_GEOMETRY * LANES : (_INSTANCE + 1) * LANES] = _NOTHING
     _call(intersect, packet)
 

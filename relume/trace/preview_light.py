@@ -18,7 +18,7 @@ from relume.light.gather_rays import Pattern, shift_of
 from relume.light.local import LocalLight, light_sample
 from relume.parallel import for_shares
 from relume.points import Points
-from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.local_shadows import shadow_ray
 from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
 
@@ -145,7 +145,7 @@ def preview_light(
 
     def kernel(start: int, stop: int) -> None:
         first, last = start * BLOCK, min(stop * BLOCK, num)
-        _light(occluded16, scene.handle, arguments.ctypes.data, *args, first, last, *found)
+        _light(occluded, scene.handle, arguments.ctypes.data, *args, first, last, *found)
 
     for_shares(kernel, -(-num // BLOCK))
     return found

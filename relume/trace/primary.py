@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.parallel import for_ranges, num_threads
 from relume.scene.model import Camera
-from relume.trace.embree import EmbreeScene, intersect16, packet_arguments
+from relume.trace.embree import EmbreeScene, intersect, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
 
 F32 = NDArray[np.float32]
@@ -82,7 +82,7 @@ def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | n
     arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(
-            intersect16, scene.handle, arguments.ctypes.data, origins, directions, chances, start, stop,
+            intersect, scene.handle, arguments.ctypes.data, origins, directions, chances, start, stop,
             hits.face, hits.uv, hits.distance,
         ),
         n,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges, for_shares
-from relume.trace.embree import EmbreeScene, occluded16, packet_arguments
+from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
 
 F32 = NDArray[np.float32]
@@ -82,7 +82,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
 
     def kernel(start: int, stop: int) -> None:
         counts.append(
-            _trace(occluded16, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits)
+            _trace(occluded, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits)
         )
 
     began = time.perf_counter()

@@ -8,10 +8,11 @@ from tiny_scenes import looking, points_at, scene_of, sphere
 
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.scene.cornell import cornell_box
-from relume.trace.cell_tree import NO_CELL, grow_tree, locate16
+from relume.trace.cell_tree import NO_CELL, grow_tree, locate
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.geometry import merge
 from relume.trace.links import trace_links
+from relume.trace.packet import LANES
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import trace_from
 
@@ -38,10 +39,13 @@ def random_keys(num, num_sides, seed):
     return keys, rng.integers(0, num_sides, num).astype(np.int32)
 
 
-def locate(tree, side, key):
-    """The cell of one point, in all 16 lanes alike."""
-    keys, nodes = np.repeat(np.asarray(key, np.float32)[:, None], 16, axis=1), np.full(16, tree.roots[side], np.int32)
-    locate16(tree, keys, nodes)
+def cell_of(tree, side, key):
+    """The cell of one point, in all lanes alike."""
+    keys, nodes = (
+        np.repeat(np.asarray(key, np.float32)[:, None], LANES, axis=1),
+        np.full(LANES, tree.roots[side], np.int32),
+    )
+    locate(tree, keys, nodes)
     assert len(set(nodes)) == 1
     return int(nodes[0])
 
@@ -54,7 +58,7 @@ def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_po
     assert len(members) == pytest.approx(num_cells, abs=4)
     for cell, rows in enumerate(members):
         assert len(set(side[rows])) == 1
-        assert {locate(tree, side[row], keys[row]) for row in rows} == {cell}
+        assert {cell_of(tree, side[row], keys[row]) for row in rows} == {cell}
 
 
 def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
@@ -69,28 +73,28 @@ def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
     is_near = [set(z[rows]) == {near} for rows in members]
     assert {len(set(z[rows])) for rows in members} == {1}
     for x, y in rng.uniform((-2.7, 0), (-2.5, 1), (50, 2)):
-        assert is_near[locate(tree, 0, (x, y, near, 0, 0, 1))]
+        assert is_near[cell_of(tree, 0, (x, y, near, 0, 0, 1))]
     for x, y in rng.uniform((-2.4, 0), (2.5, 1), (50, 2)):
-        assert not is_near[locate(tree, 0, (x, y, far, 0, 0, 1))]
+        assert not is_near[cell_of(tree, 0, (x, y, far, 0, 0, 1))]
 
 
 def test_a_side_without_points_has_no_cell():
     keys, side = random_keys(100, 2, seed=1)
     tree, _ = grow_tree(keys, side, 4, 10)
-    assert locate(tree, 3, keys[0]) == NO_CELL
+    assert cell_of(tree, 3, keys[0]) == NO_CELL
 
 
 def test_coinciding_points_end_in_one_cell():
     keys, _ = random_keys(1, 1, seed=1)
     tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.zeros(100, np.int32), 1, 10)
     assert len(members) == 1
-    assert locate(tree, 0, keys[0]) == 0
+    assert cell_of(tree, 0, keys[0]) == 0
 
 
 def test_no_points_make_no_cells():
     tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.int32), 2, 10)
     assert members == []
-    assert locate(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_CELL
+    assert cell_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_CELL
 
 
 def test_points_lie_where_light_can_arrive(box):
@@ -192,7 +196,7 @@ def test_links_are_those_of_first_hits(box):
             behind = normals[face] @ direction > 0
             normal = -normals[face] if behind else normals[face]
             side = 2 * geometry.face_mesh[face] + int(behind)
-            expected = locate(cells.tree, side, (*(origin + distance * direction), *normal))
+            expected = cell_of(cells.tree, side, (*(origin + distance * direction), *normal))
         wrong += int(expected != links.cell[p, ray])
     assert wrong <= 0.005 * len(origins)  # rounding at the edge of a cell
 

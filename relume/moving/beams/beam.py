@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.equirect import turned
-from relume.light.suns import LANES, TURNS, Sun
+from relume.light.suns import NUM_TARGETS, TURNS, Sun
 from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
 from relume.picture.light import Light, Source
@@ -27,7 +27,7 @@ class Targets(NamedTuple):
 
     Attributes:
         towards: unit directions, or places in metres; each has an equal share of the light. One of `TURNS` sets is a
-            pixel's own. (`TURNS`, `LANES`, 3) float32
+            pixel's own. (`TURNS`, `NUM_TARGETS`, 3) float32
         is_far: they are directions.
     """
 
@@ -80,7 +80,7 @@ def targets_of_lamp(geometry: LightGeometry) -> Targets:
     if is_far:
         where = -np.array(geometry.direction, np.float64)
         where /= np.linalg.norm(where)
-    return Targets(np.tile(where, (TURNS, LANES, 1)).astype(np.float32), is_far)
+    return Targets(np.tile(where, (TURNS, NUM_TARGETS, 1)).astype(np.float32), is_far)
 
 
 def light_of_sun(sun: Sun, rotation: float, points: Points) -> F32:

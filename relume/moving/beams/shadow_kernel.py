@@ -1,6 +1,6 @@
 """The kernels of `relume.moving.beams.shadows`: rays ask for targets, and pixels are predicted, doubted, evened out.
 
-A target is one of `Targets.towards`. What a ray has seen is counted in targets, from 0 to `LANES`.
+A target is one of `Targets.towards`. What a ray has seen is counted in targets, from 0 to `NUM_TARGETS`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.suns import LANES
+from relume.light.suns import NUM_TARGETS
 from relume.moving.edges import differ
-from relume.trace.packet import FAR, aim, ask, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
 
 F32 = NDArray[np.float32]
 
@@ -85,7 +85,7 @@ def trace_one(occluded, scene, arguments, rays, targets, chosen, width, start, s
 
     Args:
         occluded, scene, arguments: of Embree. rays: of the eye. targets: on the beam. chosen: numbers of rays. (m,)
-        width: of the picture, pixels. start, stop: the range. num: written, 0 or `LANES`. (rays,) uint8
+        width: of the picture, pixels. start, stop: the range. num: written, 0 or `NUM_TARGETS`. (rays,) uint8
     """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
@@ -95,12 +95,12 @@ def trace_one(occluded, scene, arguments, rays, targets, chosen, width, start, s
             p = chosen[begin + min(lane, many - 1)]
             x, y = (p % width) >> 1, (p // width) >> 1
             _place(rays, p, at)
-            turn, which = (x + y) % targets.towards.shape[0], _ORDER[(x + 4 * y) & (LANES - 1)]
+            turn, which = (x + y) % targets.towards.shape[0], _ORDER[(x + 4 * y) & (NUM_TARGETS - 1)]
             is_above[lane] = _aim_at(packet, lane, targets, turn, which, at[0, 0], at[0, 1], at[0, 2], at[1])
             ask(packet, lane, is_above[lane] and lane < many)
         trace_shadows(occluded, packet)
         for lane in range(many):
-            num[chosen[begin + lane]] = LANES if is_above[lane] and is_free(packet, lane) else 0
+            num[chosen[begin + lane]] = NUM_TARGETS if is_above[lane] and is_free(packet, lane) else 0
 
 
 @nb.njit(nogil=True, cache=True)
@@ -125,20 +125,22 @@ def trace_all(occluded, scene, arguments, rays, targets, chosen, is_edge, width,
             for axis in range(3):
                 step[side, axis] = reach * (across[axis] - rays.directions[p, axis] * away / slant)
         turn = p % width % 3 + 3 * (p // width % 3)
-        for lane in range(LANES):
-            column, row = lane & 3, lane >> 2
-            a, b = np.float32(column) - np.float32(1.5), np.float32(row) - np.float32(1.5)
-            dx = a * step[0, 0] + b * step[1, 0]
-            dy = a * step[0, 1] + b * step[1, 1]
-            dz = a * step[0, 2] + b * step[1, 2]
-            lift = _LIFT * math.sqrt(dx * dx + dy * dy + dz * dz)
-            x, y, z = at[0, 0] + dx + lift * at[1, 0], at[0, 1] + dy + lift * at[1, 1], at[0, 2] + dz + lift * at[1, 2]
-            above[lane] = _aim_at(packet, lane, targets, turn, 4 * ((column + row) & 3) + row, x, y, z, at[1])
-        trace_shadows(occluded, packet)
         num[p] = 0
-        for lane in range(LANES):
-            if above[lane] and is_free(packet, lane):
-                num[p] += 1
+        for first in range(0, NUM_TARGETS, LANES):
+            for lane in range(LANES):
+                column, row = (first + lane) & 3, (first + lane) >> 2
+                a, b = np.float32(column) - np.float32(1.5), np.float32(row) - np.float32(1.5)
+                dx = a * step[0, 0] + b * step[1, 0]
+                dy = a * step[0, 1] + b * step[1, 1]
+                dz = a * step[0, 2] + b * step[1, 2]
+                lift = _LIFT * math.sqrt(dx * dx + dy * dy + dz * dz)
+                x, y = at[0, 0] + dx + lift * at[1, 0], at[0, 1] + dy + lift * at[1, 1]
+                z, which = at[0, 2] + dz + lift * at[1, 2], 4 * ((column + row) & 3) + row
+                above[lane] = _aim_at(packet, lane, targets, turn, which, x, y, z, at[1])
+            trace_shadows(occluded, packet)
+            for lane in range(LANES):
+                if above[lane] and is_free(packet, lane):
+                    num[p] += 1
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -237,15 +239,15 @@ def even_out(rays, width, height, num, start, stop, out):  # type: ignore[no-unt
     """
     for p in range(start, stop):
         x, y, total = p % width, p // width, np.int64(num[p])
-        out[p] = np.float32(total) / np.float32(LANES)
-        if total == 0 or total == LANES or x == 0 or y == 0 or x == width - 1 or y == height - 1:
+        out[p] = np.float32(total) / np.float32(NUM_TARGETS)
+        if total == 0 or total == NUM_TARGETS or x == 0 or y == 0 or x == width - 1 or y == height - 1:
             continue
         is_even = True
         total = np.int64(0)
         for row in range(y - 1, y + 2):
             for column in range(x - 1, x + 2):
                 q = row * width + column
-                is_even = is_even and 0 < num[q] < LANES and _is_beside(rays, p, q)
+                is_even = is_even and 0 < num[q] < NUM_TARGETS and _is_beside(rays, p, q)
                 total += num[q]
         if is_even:
-            out[p] = np.float32(total) / np.float32(9 * LANES)
+            out[p] = np.float32(total) / np.float32(9 * NUM_TARGETS)

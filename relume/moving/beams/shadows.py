@@ -1,7 +1,7 @@
 """Which share of a beam each ray's surface sees, with few shadow rays: every fourth pixel is asked, others predicted.
 
 Every second pixel of every second row asks for one of its targets, neighbours for different ones. Where all that are
-asked about a pixel, on its surface, say the same, so does it. Others ask for `LANES` targets, from places spread over
+asked about a pixel, on its surface, say the same, so does it. Others ask for all targets, from places spread over
 what the pixel covers: so edges of shadows are smooth, and as wide as the light is. Where one of those finds else than
 what was predicted beside it, its neighbours ask too, in a few rounds. Where a whole neighbourhood is partly in
 shadow, each pixel takes the mean of nine, whose targets together are `TURNS` times as many.
@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.suns import LANES
+from relume.light.suns import NUM_TARGETS
 from relume.moving.beams.beam import Targets
 from relume.moving.beams.shadow_kernel import Rays, doubt, doubt_across, even_out, predict, trace_all, trace_one
 from relume.moving.look_up import Seen
 from relume.moving.solid import Solid
 from relume.parallel import for_shares
 from relume.scene.model import Camera
-from relume.trace.embree import occluded16, packet_arguments
+from relume.trace.embree import occluded, packet_arguments
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -43,10 +43,10 @@ def shares_seen(solid: Solid, seen: Seen, camera: Camera, size: tuple[int, int],
     width, height = size
     num_pixels, num = width * height, np.zeros(len(seen.hits.face), np.uint8)
     arguments = packet_arguments(coherent=True)
-    asking = (occluded16, solid.embree.handle, arguments.ctypes.data, _rays_of(solid, seen, camera, height), targets)
+    asking = (occluded, solid.embree.handle, arguments.ctypes.data, _rays_of(solid, seen, camera, height), targets)
     _ask_pixels(asking, seen, size, num)
     _ask_across_edges(asking, seen, num_pixels, width, num)
-    out = np.divide(num, LANES, dtype=np.float32)
+    out = np.divide(num, NUM_TARGETS, dtype=np.float32)
     for_shares(lambda a, b: even_out(asking[3], width, height, num, a, b, out), num_pixels)
     return out
 
