@@ -49,10 +49,13 @@ def test_fuzzed_file_is_good_to_begin_with() -> None:
     assert scene.warnings == ()
 
 
-@pytest.mark.parametrize("folder", ["conformance", "bad-inputs"])
-def test_every_file_is_imported_or_refused(shared_data: Path, folder: str) -> None:
-    files = [p for p in sorted((shared_data / folder).rglob("*")) if p.suffix in (".glb", ".gltf")]
-    assert len(files) > 100
+@pytest.mark.parametrize(
+    ("folder", "step"),
+    [("conformance", 4), ("bad-inputs", 1), pytest.param("conformance", 1, marks=pytest.mark.slow)],
+)
+def test_every_file_is_imported_or_refused(shared_data: Path, folder: str, step: int) -> None:
+    files = [p for p in sorted((shared_data / folder).rglob("*")) if p.suffix in (".glb", ".gltf")][::step]
+    assert len(files) > 25
     num_imported, messages = 0, []
     for path in files:
         for data in {path.read_bytes(), self_contained(path) if path.suffix == ".gltf" else b""} - {b""}:

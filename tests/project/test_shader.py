@@ -75,6 +75,7 @@ def test_operators_are_those_of_finely_divided_light(lights, receivers):
     assert abs(found.sum() / expected.sum() - 1) < 1.5e-3
 
 
+@pytest.mark.slow
 def test_drawn_steps_are_integrated(lights, receivers):
     """A curve of eight bright rings, each a band or two wide, the triangles' angles spread over several."""
     term, bands = curves_of("blinn_phong", {})

@@ -80,7 +80,10 @@ def test_task_that_kills_every_worker_fails_the_bake_clearly(tmp_path: Path) -> 
     assert not bake_path(tmp_path, IDENTITY).exists()
 
 
-@pytest.mark.parametrize("num_rays", [1000, LARGE], ids=["in the service's process", "on a cluster"])
+@pytest.mark.parametrize(
+    "num_rays",
+    [pytest.param(1000, id="in the service's process", marks=pytest.mark.slow), pytest.param(LARGE, id="on a cluster")],
+)
 def test_everything_killed_resumes_where_the_ledger_stands(tmp_path: Path, expected: str, num_rays: int) -> None:
     log, data_dir = tmp_path / "log", tmp_path / "data"
     process = start(data_dir, num_rays=num_rays, delay_s=0.1, log=str(log))
@@ -128,6 +131,7 @@ def test_workers_that_have_nothing_to_do_end_and_others_start_for_the_next_bake(
         assert tree_hash(service.store_path(IDENTITY)) == expected
 
 
+@pytest.mark.slow
 def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scheduler and workers of a real cluster die in the middle; with new ones the bake goes on where it stopped."""
     monkeypatch.setenv("PYTHONPATH", str(PROGRAM.parent))
