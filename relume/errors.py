@@ -115,6 +115,10 @@ class DatabaseDamagedError(RelumeError):
         )
 
 
+class LedgerVersionError(RelumeError):
+    """The database has a schema that this relume cannot work with, or may not change by itself."""
+
+
 class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 

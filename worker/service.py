@@ -10,6 +10,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from relume.bake import BakeMethod, Plan, Recipe
 from relume.code_version import bake_code
 from relume.errors import NotFoundError, ParameterError
@@ -51,7 +53,7 @@ class BakeService:
         """
         Args:
             data_dir: folder of scenes and bakes; made where it is missing.
-            ledger_url: SQLAlchemy URL; None: relume.db in the data directory.
+            ledger_url: of SQLite or PostgreSQL; None: relume.db in the data directory.
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
@@ -234,6 +236,8 @@ class BakeService:
                 self.ledger.beat(status.id, self._owner, phase="starting", phase_since=time.time())
                 self._board.changed()
             executor = self._executors.here() if tiny else self._executors.cluster()
+        except SQLAlchemyError:  # its lease runs out, and it is claimed again
+            raise
         except Exception as error:
             self.ledger.finish(status.id, self._owner, "failed", str(error))
             self._board.changed()
