@@ -22,6 +22,7 @@ from cli import (
     serve,
     worker,
 )
+from cli.keeping import backup, restore
 from cli.ledger import draft, upgrade
 from cli.material import exporting, importing, making
 from cli.sentence import sentence
@@ -42,6 +43,8 @@ app.command("bake")(bake.bake)
 app.command("render")(render.render)
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
+app.command("backup")(backup.backup)
+app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
 materials = typer.Typer(

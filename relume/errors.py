@@ -119,6 +119,10 @@ class LedgerVersionError(RelumeError):
     """The database has a schema that this relume cannot work with, or may not change by itself."""
 
 
+class BackupError(RelumeError):
+    """A backup cannot be made, read or restored as asked."""
+
+
 class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 

@@ -66,7 +66,7 @@ class Cluster:
 
     def remove(self) -> None:
         """Stop it and forget it."""
-        self.stop()
+        self._run([str(self._ctl), "-D", str(self._data), "-m", "immediate", "stop"])
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _run(self, command: Sequence[str]) -> None:

@@ -16,6 +16,7 @@ from relume.bake import BakeMethod, Plan, Recipe
 from relume.code_version import bake_code
 from relume.errors import NotFoundError, ParameterError
 from relume.store import code_of
+from worker.backup.restore import refuse_unfinished
 from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
@@ -61,6 +62,7 @@ class BakeService:
         bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(parents=True, exist_ok=True)
+        refuse_unfinished(self.data_dir)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)

@@ -1,0 +1,54 @@
+"""Commands that keep what there is: upgrades of the ledger, backups, restores."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from cli.main import main
+
+BEFORE = (Path(__file__).parents[1] / "worker" / "before_revisions.sql").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A data folder of before revisions; its scene and its bake have no files any more."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    with closing(sqlite3.connect(folder / "relume.db")) as connection:
+        connection.executescript(BEFORE)
+    monkeypatch.setenv("RELUME_DATA", str(folder))
+    return folder
+
+
+def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ledger", "upgrade"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "0001: The tables as they were before there were revisions"
+    assert main(["ledger", "upgrade"]) == 0
+    assert capsys.readouterr().out.splitlines() == said[-1:]
+
+
+def test_a_backup_says_what_is_not_in_it_and_comes_back(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    backups = str(tmp_path / "backups")
+    assert main(["backup", backups]) == 1
+    said = capsys.readouterr()
+    assert said.err.count("is not in the data directory, though the ledger names it") == 2
+    assert main(["backup", backups, "--verify"]) == 0
+    assert "0 of 1 files are damaged" in capsys.readouterr().err
+    assert main(["restore", backups, "--snapshot", said.out.strip(), "--data", str(tmp_path / "new")]) == 0
+    with closing(sqlite3.connect(tmp_path / "new" / "relume.db")) as connection:
+        assert connection.execute("SELECT name FROM looks").fetchall() == [("red",)]
+
+
+def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["restore", str(tmp_path / "nothing"), "--data", str(tmp_path / "new")]) == 1
+    said = capsys.readouterr().err.strip()
+    assert said.startswith("relume: ")
+    assert "holds no backup; make one with: relume backup" in said
+    assert "\n" not in said
