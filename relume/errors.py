@@ -123,6 +123,10 @@ class BackupError(RelumeError):
     """A backup cannot be made, read or restored as asked."""
 
 
+class StorageError(RelumeError):
+    """The object storage does not answer, refuses, or holds something damaged."""
+
+
 class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 

@@ -97,6 +97,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
     (relume_errors.DiskFullError, Row(507, "disk", "Disk is full", CLOSE_INTERNAL)),
+    (relume_errors.StorageError, Row(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
     (relume_errors.DatabaseDamagedError, Row(503, "database", "Database damaged", CLOSE_BUSY)),
     (RelumeError, Row(500, "failure", "Failure", CLOSE_INTERNAL)),
     (OperationalError, Row(503, "database", "Database not reachable", CLOSE_BUSY)),

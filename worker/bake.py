@@ -29,6 +29,7 @@ from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
 from worker.status import Phase, TaskCost
+from worker.storage import push
 from worker.tasks import Job, idle_timer, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
@@ -73,6 +74,7 @@ class BakeRunner:
         identity = self.job.bake_id
         try:
             num_bytes = self._bake()
+            push(self._target)
         except CancelledError:
             self._land()
             self._ask(self.ledger.release, identity, self.owner)

@@ -28,9 +28,10 @@ from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger
 from worker.notes import forget_note
-from worker.paths import bake_path
+from worker.paths import bake_path, scene_path
 from worker.progress import Expected
 from worker.status import BakeStatus, bake_id
+from worker.storage import configured, is_elsewhere, push
 from worker.tasks import Job, idle_timer, scene_of
 
 log = logging.getLogger(__name__)
@@ -59,6 +60,7 @@ class BakeService:
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
         """
+        configured()  # what is wrong with its address is said before anything runs
         bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(parents=True, exist_ok=True)
@@ -80,6 +82,10 @@ class BakeService:
         for tiny in (True, False):
             name = "relume-tiny-bakes" if tiny else "relume-bakes"
             self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
+            self._threads[-1].start()
+
+        if configured() is not None:
+            self._threads.append(threading.Thread(target=self._store_all, name="relume-storage", daemon=True))
             self._threads[-1].start()
 
     def close(self) -> None:
@@ -192,7 +198,7 @@ class BakeService:
             return False
         if state != "ready":
             return False
-        if check_published(self.store_path(identity)):
+        if check_published(self.store_path(identity)) or is_elsewhere(self.store_path(identity)):
             return True
         self.ledger.forget_tasks(identity)
         self.ledger.requeue(identity, ("ready",))
@@ -262,6 +268,19 @@ class BakeService:
             runner.run()
         finally:
             self._is_crowding.clear()
+
+    def _store_all(self) -> None:
+        """Store what is here and not in the storage: from before there was one, or from while it was away."""
+        try:
+            statuses = self.ledger.bakes()
+            scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(one.scene for one in statuses)]
+            ready = [bake_path(self.data_dir, status.id) for status in statuses if status.state == "ready"]
+            for path in (path for path in (*scenes, *ready) if path.exists()):
+                if self._closing.is_set():
+                    return
+                push(path)
+        except Exception as error:  # bakes go on
+            Complaint(log, "what is in the data directory cannot be put into the object storage").meet(error)
 
     def _remove_strays(self) -> None:
         """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again."""

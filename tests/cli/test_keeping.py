@@ -1,15 +1,22 @@
-"""Commands that keep what there is: upgrades of the ledger, backups, restores."""
+"""Commands that keep what there is, upgrades of the ledger, backups, restores; and workers for a team."""
 
 from __future__ import annotations
 
 import sqlite3
+import subprocess
+import sys
+import time
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from cli.main import main
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.paths import bake_path
 
+RELUME = [sys.executable, "-m", "cli.main"]
 BEFORE = (Path(__file__).parents[1] / "worker" / "before_revisions.sql").read_text(encoding="utf-8")
 
 
@@ -52,3 +59,24 @@ def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys:
     assert said.startswith("relume: ")
     assert "holds no backup; make one with: relume backup" in said
     assert "\n" not in said
+
+
+def test_a_worker_bakes_what_waits_in_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RELUME_DATA", str(tmp_path / "server"))
+    monkeypatch.setenv("RELUME_DATABASE", f"sqlite:///{tmp_path / 'ledger.db'}")
+    monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")
+    assert main(["import", "--built-in", "cornell_box"]) == 0
+    assert main(["bake", "Cornell box", "--size", "24x16", "--lights", "100", "--no-watch"]) == 0
+    worker = subprocess.Popen([*RELUME, "worker", "--processes", "1", "--data", str(tmp_path / "far")])
+    try:
+        with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'ledger.db'}"))) as ledger:
+            deadline = time.monotonic() + 120
+            while (status := ledger.bakes()[0]).state in ("queued", "running") and time.monotonic() < deadline:
+                time.sleep(0.1)
+            assert status.state == "ready"
+    finally:
+        worker.terminate()
+        assert worker.wait(30) == 0
+    assert not bake_path(tmp_path / "server", status.id).exists()
+    assert main(["render", "Cornell box", "--output", str(tmp_path / "box.png")]) == 0
+    assert bake_path(tmp_path / "server", status.id).exists()

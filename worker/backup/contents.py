@@ -20,6 +20,8 @@ LEFT_OUT = (
     "upload-*",
     "thumbnails",
     "bakes/staging",
+    "bakes/locks",
+    "scenes/locks",
     "bakes/*.zarr/derived",
     "bakes/*.zarr/edited",
     f"*{UNFINISHED}",

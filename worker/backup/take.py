@@ -21,6 +21,7 @@ from worker.backup.shelf import COPIES, Kept, Shelf, Snapshot, Tell, digest_of
 from worker.database.models import BakeRow, SceneRow
 from worker.database.opening import connect
 from worker.database.upgrading import newest_revision
+from worker.storage import is_elsewhere
 
 ATTEMPTS = 3
 
@@ -54,7 +55,7 @@ def _take(data_dir: Path, ledger: Engine, shelf: Shelf, begin: Begin) -> Snapsho
             copy_ledger(ledger, copy)
             named, kept_ledger = _named(copy), _keep_ledger(copy, shelf)
         files, problems = _keep_files(data_dir, shelf, known, begin)
-        lacking = named - {kept.path for kept in files}
+        lacking = {path for path in named - {kept.path for kept in files} if not is_elsewhere((data_dir / path).parent)}
         if not lacking or attempt == ATTEMPTS - 1:
             break
         known = {kept.path: kept for kept in files}
