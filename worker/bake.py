@@ -28,12 +28,14 @@ from worker.ledger import Ledger
 from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
+from worker.runs import begin_run, forget_run, run_of
 from worker.status import Phase, TaskCost
 from worker.storage import push
 from worker.tasks import Job, idle_timer, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
 UPGRADED = "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
+TAKEN_OVER = "another machine had begun this bake; it starts again here"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
@@ -75,6 +77,7 @@ class BakeRunner:
         try:
             num_bytes = self._bake()
             push(self._target)
+            forget_run(self._staging)
         except CancelledError:
             self._land()
             self._ask(self.ledger.release, identity, self.owner)
@@ -90,7 +93,7 @@ class BakeRunner:
         job, target, staging = self.job, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger knew
             return _size(target)
-        self._begin_with_one_code()
+        self._begin_or_go_on()
         status = self._ask(self.ledger.bake, job.bake_id)
         shown = status.progress if self._ask(self.ledger.finished_tasks, job.bake_id) else 0.0
         progress = Progress(status.plan, shown, self.expected)
@@ -107,16 +110,19 @@ class BakeRunner:
             self._ask(self.ledger.forget_tasks, job.bake_id)
             raise
 
-    def _begin_with_one_code(self) -> None:
-        """Keep what an earlier run has finished where the same code did it; else start from nothing, and say why."""
+    def _begin_or_go_on(self) -> None:
+        """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
         identity, staging = self.job.bake_id, self._staging
         has_begun = staging.exists()
-        if has_begun and code_of(staging) == self.job.code:
+        is_here = has_begun and run_of(staging) == self._ask(self.ledger.run, identity)
+        if is_here and code_of(staging) == self.job.code:
             return
-        if has_begun:
-            log.warning("bake %s: %s", identity, UPGRADED)
-            shutil.rmtree(staging)
-        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, UPGRADED if has_begun else None)
+        is_of_others = bool(self._ask(self.ledger.finished_tasks, identity)) and not is_here
+        why = TAKEN_OVER if is_of_others else UPGRADED if has_begun else None
+        if why is not None:
+            log.warning("bake %s: %s", identity, why)
+        shutil.rmtree(staging, ignore_errors=True)
+        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, begin_run(staging), why)
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
         job = self.job

@@ -198,15 +198,21 @@ class Ledger:
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
 
-    def begin_anew(self, identity: str, owner: str, code: str, why: str | None) -> None:
+    def run(self, identity: str) -> str | None:
+        """The name of a bake's beginning."""
+        row = self._get(identity)
+        return None if row is None else row.run
+
+    def begin_anew(self, identity: str, owner: str, code: str, run: str, why: str | None) -> None:
         """Start a bake from nothing, under this code.
 
         Args:
             identity: of the bake. owner: the process that runs it. code: that will make all of it.
+            run: names this beginning.
             why: one sentence for people where it had been begun before.
         """
         self.forget_tasks(identity)
-        self._change(identity, ("running",), BakeRow.owner == owner, code=code, problem=why)
+        self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=why)
 
     def finished_bakes(self, limit: int) -> list[Finished]:
         """What the newest ready bakes took."""

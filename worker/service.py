@@ -30,6 +30,7 @@ from worker.ledger import Ledger
 from worker.notes import forget_note
 from worker.paths import bake_path, scene_path
 from worker.progress import Expected
+from worker.runs import forget_run
 from worker.status import BakeStatus, bake_id
 from worker.storage import configured, is_elsewhere, push
 from worker.tasks import Job, idle_timer, scene_of
@@ -292,3 +293,4 @@ class BakeService:
             if state == "ready" or (is_stopped and code_of(folder) != bake_code()):
                 shutil.rmtree(folder, ignore_errors=True)
                 forget_note(folder)
+                forget_run(folder)

@@ -13,6 +13,7 @@ import pytest
 
 from cli.main import main
 from worker.database import open_database
+from worker.database.upgrading import newest_revision
 from worker.ledger import Ledger
 from worker.paths import bake_path
 
@@ -36,7 +37,7 @@ def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "0001: The tables as they were before there were revisions"
     assert main(["ledger", "upgrade"]) == 0
-    assert capsys.readouterr().out.splitlines() == said[-1:]
+    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {newest_revision()}"]
 
 
 def test_a_backup_says_what_is_not_in_it_and_comes_back(

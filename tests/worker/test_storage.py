@@ -17,19 +17,21 @@ import pytest
 import zarr
 from fake_method import RECIPE, FakeMethod, tiny_scene
 from moto.server import ThreadedMotoServer
-from test_processes import tree_hash
+from test_processes import tree_hash, wait_for
 from zarr.storage import ObjectStore
 
 from relume.bake import Recipe
 from relume.errors import ParameterError, StorageError
 from relume.scene.archive import load_scene
-from relume.store import Reader, open_store
+from relume.store import Reader, bake_here, open_store
 from server.errors import problem_of
 from worker.backup.shelf import Shelf
 from worker.backup.take import back_up
+from worker.bake import TAKEN_OVER
 from worker.paths import scene_path
 from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
+from worker.status import BakeStatus
 from worker.storage import configured, fetched, open_kept
 from worker.storage.remote import Remote
 
@@ -99,6 +101,28 @@ def test_one_machine_imports_another_bakes_and_the_first_opens_it(
         assert tree_hash(here) == tree_hash(path)
         assert load_scene(scene_path(far.data_dir, SCENE.id)).id == SCENE.id
         assert not list(server.data_dir.rglob(".unfinished-*"))
+
+
+def test_a_bake_that_another_machine_had_begun_starts_again_and_says_so(
+    tmp_path: Path, storage: Remote, ledger_of_all: str
+) -> None:
+    def half(name: str) -> BakeStatus:
+        log = tmp_path / f"{name}.log"
+        methods = {"fake": FakeMethod(delay_s=0.2, log=str(log))}
+        with BakeService(tmp_path / name, ledger_of_all, methods=methods) as service:
+            register_scene(service.data_dir, service.ledger, SCENE)
+            identity = service.submit(SCENE.id, RECIPE)
+            wait_for(log, 6)
+            return service.get(identity)
+
+    half("first")
+    assert half("second").problem == TAKEN_OVER
+    with machine(tmp_path, "first", ledger_of_all) as service:  # what it has of its own is not what the ledger counts
+        path = bake(service)
+        assert service.get(path.stem).problem is None
+    target = bake_here(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr")
+    assert tree_hash(path) == tree_hash(target)
+    assert not list((service.data_dir / "bakes" / "staging").iterdir())
 
 
 def test_what_is_stored_is_a_zarr_store_that_others_can_open(

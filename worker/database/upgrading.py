@@ -6,6 +6,7 @@ somebody says `relume ledger upgrade`.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -19,6 +20,7 @@ from sqlalchemy import Connection, Engine, text
 
 from relume.errors import LedgerVersionError
 
+logging.getLogger("alembic").setLevel(logging.WARNING)  # what is made, whoever upgrades says
 REVISIONS = Path(__file__).with_name("revisions")
 _LOCK = 0x72656C756D65  # of PostgreSQL, by its number; "relume"
 
