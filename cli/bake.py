@@ -100,6 +100,7 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str) 
 def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
     """Say how it ended; the id alone goes to stdout."""
     from worker.paths import bake_path
+    from worker.storage import fetched
 
     if status.state != "ready":
         typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
@@ -107,7 +108,7 @@ def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
     typer.echo(status.id)
     typer.echo(f"{status.bytes / 1e6:,.1f} MB in {seconds:.1f} s", err=True)
     if status.recipe.method == "direct":
-        _report_rays(bake_path(settings.data, status.id))
+        _report_rays(fetched(bake_path(settings.data, status.id)))
     return 0
 
 

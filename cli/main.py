@@ -22,6 +22,8 @@ from cli import (
     serve,
     worker,
 )
+from cli.keeping import backup, restore
+from cli.ledger import draft, upgrade
 from cli.material import exporting, importing, making
 from cli.sentence import sentence
 
@@ -41,6 +43,8 @@ app.command("bake")(bake.bake)
 app.command("render")(render.render)
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
+app.command("backup")(backup.backup)
+app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
 materials = typer.Typer(
@@ -56,6 +60,10 @@ environments = typer.Typer(help="Light that a look may name.", no_args_is_help=T
 environments.command("import")(environment_import.environment_import)
 environments.command("list")(environment_list.environment_list)
 app.add_typer(environments, name="environment")
+ledger = typer.Typer(help="The database of scenes, bakes and looks.", no_args_is_help=True, rich_markup_mode=None)
+ledger.command("upgrade")(upgrade.ledger_upgrade)
+ledger.command("draft")(draft.ledger_draft)
+app.add_typer(ledger, name="ledger")
 
 INTERRUPTED = 130
 

@@ -37,6 +37,7 @@ def reference(
     from relume.scene.placed_camera import with_cameras
     from worker.paths import scene_path
     from worker.presets import PRESETS
+    from worker.storage import fetched
 
     check_output(output)
     partial, pixels = read_look(look), parse_size(size) if size else PRESETS["good"].size
@@ -47,7 +48,7 @@ def reference(
         service.close()
     if view is not None and view not in record.views:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
-    loaded, seen_from = load_scene(scene_path(service.data_dir, record.id)), view or record.views[0]
+    loaded, seen_from = load_scene(fetched(scene_path(service.data_dir, record.id))), view or record.views[0]
     if camera is not None:
         placed = read_camera(camera)
         loaded, seen_from = with_cameras(loaded, [placed.camera]), placed.name

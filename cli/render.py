@@ -40,6 +40,7 @@ def render(
     from relume.render.image import render_image
     from relume.scene.archive import load_scene
     from worker.paths import scene_path
+    from worker.storage import fetched, open_kept
 
     if turntable is None:
         check_output(output)
@@ -53,12 +54,12 @@ def render(
     try:
         record = find_scene(service.ledger, scene)
         bake, view_name = find_bake(service, record, view, moves=turntable is not None)
-        transfer = open_bake(service.store_path(bake.id), Memory(4 << 30))
+        transfer = open_kept(service.store_path(bake.id), lambda store: open_bake(store, Memory(4 << 30)))
         if not bake.is_current:
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
         stills = None
         if isinstance(transfer, MovingViews) and not quick:
-            stills = Stills(transfer.lit, load_scene(scene_path(service.data_dir, record.id)))
+            stills = Stills(transfer.lit, load_scene(fetched(scene_path(service.data_dir, record.id))))
         if isinstance(transfer, MovingViews) and quick:
             typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
         document = complete_look(partial, transfer.default_look)

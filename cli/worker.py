@@ -1,17 +1,40 @@
-"""`relume worker`: joins a cluster."""
+"""`relume worker`: bakes for others, from the ledger or for a cluster."""
 
 from __future__ import annotations
 
+import signal
+import threading
 from typing import Annotated
 
 import typer
 
+from cli.options import Data
+
 
 def worker(
-    scheduler: Annotated[str, typer.Option(metavar="tcp://…", help="Address of the Dask scheduler to join.")],
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://…", help="Address of the Dask scheduler to join; else the ledger's own."),
+    ] = None,
     processes: Annotated[int | None, typer.Option(min=1, max=1024, help="Worker processes; else one per core.")] = None,
+    data: Data = None,
 ) -> int:
-    """Bake for a cluster until stopped. Every worker needs the data folder at the same path as the server."""
-    from worker.cluster import join
+    """Bake for others until stopped: what waits in the ledger (RELUME_DATABASE), or what a Dask scheduler hands out.
 
-    return join(scheduler, processes)
+    From the ledger this machine takes whole bakes; it needs the server's data folder, or RELUME_STORAGE and a folder of
+    its own. For a scheduler every worker needs the data folder at the same path as the server.
+    """
+    if scheduler is not None:
+        from worker.cluster import join
+
+        return join(scheduler, processes)
+    from cli.data_folder import open_settings
+    from worker.service import BakeService
+
+    settings, asked = open_settings(data), threading.Event()
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, lambda *_: asked.set())
+    with BakeService(settings.data, settings.database_url, num_workers=processes):
+        typer.echo("waiting for bakes", err=True)
+        asked.wait()
+    return 0

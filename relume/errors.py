@@ -115,6 +115,18 @@ class DatabaseDamagedError(RelumeError):
         )
 
 
+class LedgerVersionError(RelumeError):
+    """The database has a schema that this relume cannot work with, or may not change by itself."""
+
+
+class BackupError(RelumeError):
+    """A backup cannot be made, read or restored as asked."""
+
+
+class StorageError(RelumeError):
+    """The object storage does not answer, refuses, or holds something damaged."""
+
+
 class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 

@@ -13,12 +13,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import ValidationError
 from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 
 from relume import errors as relume_errors
 from relume.errors import ProtocolError, RelumeError
 from server.wire.protocol import Problem
-from worker.database.faults import told
+from worker.database.faults import database_away, is_away, told
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -96,9 +97,11 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
     (relume_errors.DiskFullError, Row(507, "disk", "Disk is full", CLOSE_INTERNAL)),
+    (relume_errors.StorageError, Row(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
     (relume_errors.DatabaseDamagedError, Row(503, "database", "Database damaged", CLOSE_BUSY)),
     (RelumeError, Row(500, "failure", "Failure", CLOSE_INTERNAL)),
     (OperationalError, Row(503, "database", "Database not reachable", CLOSE_BUSY)),
+    (PoolTimeoutError, Row(503, "database", "Database too slow", CLOSE_BUSY)),
     (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
 )
 DEFECT = Row(500, "defect", "Defect in the server", CLOSE_INTERNAL)
@@ -122,7 +125,7 @@ def problem_of(error: Exception) -> Problem:
         extra = {"parameter": error.name, "allowed": error.allowed}
     if isinstance(error, RelumeError):
         detail = str(error)
-    elif isinstance(error, OperationalError):
+    elif isinstance(error, OperationalError | PoolTimeoutError):
         detail = "try again in a while; if it stays so, the server's log says why"
     elif isinstance(error, OSError):
         detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
@@ -163,7 +166,9 @@ def install(app: FastAPI) -> None:
     """Make every failure of the app an `application/problem+json` response."""
 
     async def on_known(_: Request, error: Exception) -> JSONResponse:
-        if row_of(error).status >= 500:
+        if is_away(error):
+            database_away.meet(error)
+        elif row_of(error).status >= 500:
             log.error("%s: %s", type(error).__name__, told(error))
         return problem_response(problem_of(error))
 
@@ -180,7 +185,7 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, RequestValidationError)
         return problem_response(validation_problem(error.errors()))
 
-    for kind in (RelumeError, OperationalError, OSError):
+    for kind in (RelumeError, OperationalError, PoolTimeoutError, OSError):
         app.add_exception_handler(kind, on_known)
     app.add_exception_handler(HTTPException, on_http)
     app.add_exception_handler(RequestValidationError, on_validation)

@@ -31,7 +31,6 @@ from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
 from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
-from server.records import tables  # noqa: F401  its tables must be known before the database is opened
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
 from server.settings import Settings

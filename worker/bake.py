@@ -22,16 +22,20 @@ from relume.bake import Task
 from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, is_no_room
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
+from worker.database.patience import Given, Result, patiently
 from worker.lease import HEARTBEAT_S, LeaseKeeper
 from worker.ledger import Ledger
 from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
+from worker.runs import begin_run, forget_run, run_of
 from worker.status import Phase, TaskCost
+from worker.storage import push
 from worker.tasks import Job, idle_timer, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
 UPGRADED = "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
+TAKEN_OVER = "another machine had begun this bake; it starts again here"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
@@ -72,24 +76,26 @@ class BakeRunner:
         identity = self.job.bake_id
         try:
             num_bytes = self._bake()
+            push(self._target)
+            forget_run(self._staging)
         except CancelledError:
             self._land()
-            self.ledger.release(identity, self.owner)
+            self._ask(self.ledger.release, identity, self.owner)
         except Exception as error:  # whatever a method raises must not end the service
             self._land()
             if not isinstance(error, RelumeError | OSError):
                 log.exception("bake %s failed", identity)
-            self.ledger.finish(identity, self.owner, "failed", self._sentence(error))
+            self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
         else:
-            self.ledger.finish(identity, self.owner, "ready", num_bytes=num_bytes)
+            self._ask(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
 
     def _bake(self) -> int:
         job, target, staging = self.job, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger knew
             return _size(target)
-        self._begin_with_one_code()
-        status = self.ledger.bake(job.bake_id)
-        shown = status.progress if self.ledger.finished_tasks(job.bake_id) else 0.0
+        self._begin_or_go_on()
+        status = self._ask(self.ledger.bake, job.bake_id)
+        shown = status.progress if self._ask(self.ledger.finished_tasks, job.bake_id) else 0.0
         progress = Progress(status.plan, shown, self.expected)
         self._beat(progress, "reading")
         scene = job.recipe.seen(scene_of(job.data_dir, job.scene_id))
@@ -101,25 +107,28 @@ class BakeRunner:
             return publish(staging, target)
         except ChunkDamagedError:
             shutil.rmtree(staging, ignore_errors=True)
-            self.ledger.forget_tasks(job.bake_id)
+            self._ask(self.ledger.forget_tasks, job.bake_id)
             raise
 
-    def _begin_with_one_code(self) -> None:
-        """Keep what an earlier run has finished where the same code did it; else start from nothing, and say why."""
+    def _begin_or_go_on(self) -> None:
+        """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
         identity, staging = self.job.bake_id, self._staging
         has_begun = staging.exists()
-        if has_begun and code_of(staging) == self.job.code:
+        is_here = has_begun and run_of(staging) == self._ask(self.ledger.run, identity)
+        if is_here and code_of(staging) == self.job.code:
             return
-        if has_begun:
-            log.warning("bake %s: %s", identity, UPGRADED)
-            shutil.rmtree(staging)
-        self.ledger.begin_anew(identity, self.owner, self.job.code, UPGRADED if has_begun else None)
+        is_of_others = bool(self._ask(self.ledger.finished_tasks, identity)) and not is_here
+        why = TAKEN_OVER if is_of_others else UPGRADED if has_begun else None
+        if why is not None:
+            log.warning("bake %s: %s", identity, why)
+        shutil.rmtree(staging, ignore_errors=True)
+        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, begin_run(staging), why)
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
         job = self.job
         tasks = fill.begin_stage(job.method, scene, job.recipe, self._staging, stage)
         progress.begin_stage(tasks, last=stage == len(job.method.stages) - 1)
-        done = self.ledger.finished_tasks(job.bake_id)
+        done = self._ask(self.ledger.finished_tasks, job.bake_id)
         waiting: deque[tuple[Task, int]] = deque()
         for task in tasks:
             if (cost := done.get((stage, task.index))) is not None:
@@ -168,7 +177,7 @@ class BakeRunner:
             log.warning("a worker process died; task %s is given to another", task)
             waiting.append((task, attempt + 1))
             return
-        self.ledger.finish_task(self.job.bake_id, task, cost, attempt)
+        self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
         self._is_working = True
         progress.add(task, cost, here=True)
 
@@ -177,7 +186,9 @@ class BakeRunner:
         if phase != self._entered[0]:
             self._entered = phase, time.time()
         entered = dict(zip(("phase", "phase_since"), self._entered, strict=True))
-        if self.stopped() or not self.ledger.beat(self.job.bake_id, self.owner, **progress.fields(), **entered):
+        if self.stopped() or not self._ask(
+            self.ledger.beat, self.job.bake_id, self.owner, **progress.fields(), **entered
+        ):
             raise CancelledError("the bake was stopped")
         self.changed()
 
@@ -190,14 +201,18 @@ class BakeRunner:
                 task, attempt = self._flying.pop(future)
                 if not future.cancelled() and future.exception() is None:
                     try:
-                        self.ledger.finish_task(self.job.bake_id, task, future.result(), attempt)
+                        self._ask(self.ledger.finish_task, self.job.bake_id, task, future.result(), attempt)
                     except IntegrityError:  # the bake was deleted
                         return
+
+    def _ask(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
+        """Call the ledger; one that is away for a while delays the bake and ends nothing."""
+        return patiently(self.stopped, call, *args, **kwargs)
 
     def _sentence(self, error: Exception) -> str:
         """What went wrong and what to do, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
-            needed = self.ledger.bake(self.job.bake_id).plan.store_bytes
+            needed = self._ask(self.ledger.bake, self.job.bake_id).plan.store_bytes
             missing = max(1, needed - _size(self._staging)) / 1e6
             return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):

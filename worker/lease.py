@@ -34,7 +34,7 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
     """Whether an owner still holds its lease, by what can be known from here.
 
     Args:
-        heartbeat, now: seconds since 1970.
+        heartbeat, now: seconds since 1970, of one clock: the database's.
     """
     if now - heartbeat > LEASE_S:
         return False

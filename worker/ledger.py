@@ -22,6 +22,7 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.bake import Plan, Recipe, Task
 from relume.code_version import bake_code
 from relume.errors import NotFoundError
+from worker.database.clock import epoch_s
 from worker.database.models import BakeRow, TaskRow
 from worker.estimate import Finished, crowding, load_of_machine
 from worker.executor import is_tiny
@@ -113,15 +114,17 @@ class Ledger:
 
     def claimable(self) -> list[str]:
         """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
-        query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
+        query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
-            return [row.id for row in session.scalars(query) if not _is_owned(row)]
+            return [row.id for row, now in session.execute(query) if not _is_owned(row, now)]
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and make it running. False where somebody else has it."""
-        row = self._get(identity)
-        if row is None or _is_owned(row):
+        with self.sessions() as session:
+            found = session.execute(select(BakeRow, epoch_s()).where(BakeRow.id == identity)).first()
+        if found is None or _is_owned(*found):
             return False
+        row = found[0]
         unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
         return self._change(
             identity,
@@ -129,7 +132,7 @@ class Ledger:
             unchanged,
             state="running",
             owner=owner,
-            heartbeat=time.time(),
+            heartbeat=epoch_s(),
             phase=None,
             seconds_left=None,
         )
@@ -137,11 +140,11 @@ class Ledger:
     def beat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
         """Record progress. False where the bake was cancelled or taken over: stop."""
         mine = BakeRow.owner == owner
-        return self._change(identity, ("running",), mine, heartbeat=time.time(), **progress)
+        return self._change(identity, ("running",), mine, heartbeat=epoch_s(), **progress)
 
     def keep_lease(self, identity: str, owner: str) -> None:
         """Renew the lease of a bake in whatever state it is."""
-        self._change(identity, None, BakeRow.owner == owner, heartbeat=time.time())
+        self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
 
     def finish(
         self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
@@ -195,15 +198,21 @@ class Ledger:
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
 
-    def begin_anew(self, identity: str, owner: str, code: str, why: str | None) -> None:
+    def run(self, identity: str) -> str | None:
+        """The name of a bake's beginning."""
+        row = self._get(identity)
+        return None if row is None else row.run
+
+    def begin_anew(self, identity: str, owner: str, code: str, run: str, why: str | None) -> None:
         """Start a bake from nothing, under this code.
 
         Args:
             identity: of the bake. owner: the process that runs it. code: that will make all of it.
+            run: names this beginning.
             why: one sentence for people where it had been begun before.
         """
         self.forget_tasks(identity)
-        self._change(identity, ("running",), BakeRow.owner == owner, code=code, problem=why)
+        self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=why)
 
     def finished_bakes(self, limit: int) -> list[Finished]:
         """What the newest ready bakes took."""
@@ -259,8 +268,8 @@ def _execute(session: Session, statement: Any) -> Any:
     return session.execute(statement, execution_options={"synchronize_session": False})
 
 
-def _is_owned(row: BakeRow) -> bool:
-    return row.owner is not None and is_alive(row.owner, row.heartbeat, time.time())
+def _is_owned(row: BakeRow, now: float) -> bool:
+    return row.owner is not None and is_alive(row.owner, row.heartbeat, now)
 
 
 def _plan(text: str) -> Plan:

@@ -20,6 +20,7 @@ from relume.scene.projected import are_projected
 from worker.database.models import CameraRow, SceneRow
 from worker.ledger import Ledger
 from worker.paths import bake_path, scene_path, staging_path
+from worker.storage import forget, push
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         The scene's id.
     """
     save_scene(scene, scene_path(data_dir, scene.id))
+    push(scene_path(data_dir, scene.id))
     summary = {
         "views": [camera.name for camera in scene.cameras],
         "materials": [
@@ -112,12 +114,14 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
     for status in ledger.bakes(scene_id):
         ledger.cancel(status.id)
     for identity in ledger.delete_bakes(scene_id):
+        forget(bake_path(data_dir, identity))
         shutil.rmtree(bake_path(data_dir, identity), ignore_errors=True)
         shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
     with ledger.sessions.begin() as session:
         session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
         if (row := session.get(SceneRow, scene_id)) is not None:
             session.delete(row)
+    forget(scene_path(data_dir, scene_id))
     shutil.rmtree(scene_path(data_dir, scene_id), ignore_errors=True)
 
 

@@ -10,10 +10,13 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from relume.bake import BakeMethod, Plan, Recipe
 from relume.code_version import bake_code
 from relume.errors import NotFoundError, ParameterError
 from relume.store import code_of
+from worker.backup.restore import refuse_unfinished
 from worker.bake import BakeRunner, check_published
 from worker.board import StatusBoard, Subscription
 from worker.budget import check_budget
@@ -25,9 +28,11 @@ from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger
 from worker.notes import forget_note
-from worker.paths import bake_path
+from worker.paths import bake_path, scene_path
 from worker.progress import Expected
+from worker.runs import forget_run
 from worker.status import BakeStatus, bake_id
+from worker.storage import configured, is_elsewhere, push
 from worker.tasks import Job, idle_timer, scene_of
 
 log = logging.getLogger(__name__)
@@ -51,14 +56,16 @@ class BakeService:
         """
         Args:
             data_dir: folder of scenes and bakes; made where it is missing.
-            ledger_url: SQLAlchemy URL; None: relume.db in the data directory.
+            ledger_url: of SQLite or PostgreSQL; None: relume.db in the data directory.
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
         """
+        configured()  # what is wrong with its address is said before anything runs
         bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(parents=True, exist_ok=True)
+        refuse_unfinished(self.data_dir)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)
@@ -76,6 +83,10 @@ class BakeService:
         for tiny in (True, False):
             name = "relume-tiny-bakes" if tiny else "relume-bakes"
             self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
+            self._threads[-1].start()
+
+        if configured() is not None:
+            self._threads.append(threading.Thread(target=self._store_all, name="relume-storage", daemon=True))
             self._threads[-1].start()
 
     def close(self) -> None:
@@ -188,7 +199,7 @@ class BakeService:
             return False
         if state != "ready":
             return False
-        if check_published(self.store_path(identity)):
+        if check_published(self.store_path(identity)) or is_elsewhere(self.store_path(identity)):
             return True
         self.ledger.forget_tasks(identity)
         self.ledger.requeue(identity, ("ready",))
@@ -234,6 +245,8 @@ class BakeService:
                 self.ledger.beat(status.id, self._owner, phase="starting", phase_since=time.time())
                 self._board.changed()
             executor = self._executors.here() if tiny else self._executors.cluster()
+        except SQLAlchemyError:  # its lease runs out, and it is claimed again
+            raise
         except Exception as error:
             self.ledger.finish(status.id, self._owner, "failed", str(error))
             self._board.changed()
@@ -257,6 +270,19 @@ class BakeService:
         finally:
             self._is_crowding.clear()
 
+    def _store_all(self) -> None:
+        """Store what is here and not in the storage: from before there was one, or from while it was away."""
+        try:
+            statuses = self.ledger.bakes()
+            scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(one.scene for one in statuses)]
+            ready = [bake_path(self.data_dir, status.id) for status in statuses if status.state == "ready"]
+            for path in (path for path in (*scenes, *ready) if path.exists()):
+                if self._closing.is_set():
+                    return
+                push(path)
+        except Exception as error:  # bakes go on
+            Complaint(log, "what is in the data directory cannot be put into the object storage").meet(error)
+
     def _remove_strays(self) -> None:
         """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again."""
         staging = self.data_dir / "bakes" / "staging"
@@ -267,3 +293,4 @@ class BakeService:
             if state == "ready" or (is_stopped and code_of(folder) != bake_code()):
                 shutil.rmtree(folder, ignore_errors=True)
                 forget_note(folder)
+                forget_run(folder)

@@ -19,6 +19,7 @@ from worker.idle import IdleTimer, idle_seconds
 from worker.notes import Notebook
 from worker.paths import scene_path, staging_path
 from worker.status import TaskCost
+from worker.storage import fetched
 
 OTHER_CODE = "a worker process runs another version of relume than the server; start both again, then bake again"
 
@@ -43,7 +44,7 @@ class Job:
 @lru_cache(maxsize=2)
 def scene_of(data_dir: Path, scene_id: str) -> Scene:
     """A registered scene; a process keeps the last two."""
-    return load_scene(scene_path(data_dir, scene_id))
+    return load_scene(fetched(scene_path(data_dir, scene_id)))
 
 
 _methods: dict[bytes, BakeMethod] = {}

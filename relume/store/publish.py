@@ -11,7 +11,7 @@ from pathlib import Path
 import zarr
 from zarr.storage import LocalStore
 
-from relume.errors import ChunkDamagedError
+from relume.errors import ChunkDamagedError, StoreError
 from relume.replacing import UNFINISHED, replacing
 from relume.store.files import read_json
 from relume.store.reader import Reader, open_staging, rows_per_shard
@@ -74,9 +74,21 @@ def _write_manifest(staging: Path) -> int:
     return sum(int(str(entry["bytes"])) for entry in files) + len(text)
 
 
+def manifest_digests(path: Path) -> dict[str, str]:
+    """SHA-256 of every file of a published store, the manifest's own not among them.
+
+    Raises:
+        StoreNotFoundError: there is no published store. StoreError: its manifest is unreadable.
+    """
+    try:
+        return {str(entry["path"]): str(entry["sha256"]) for entry in read_json(path / MANIFEST_NAME)["files"]}
+    except (KeyError, TypeError) as error:
+        raise StoreError(f"the manifest of {path.name} is unreadable; bake the scene again") from error
+
+
 def verify_manifest(path: Path) -> None:
     """Compare every file of a published store with its SHA-256. Raises ChunkDamagedError."""
-    for entry in read_json(path / MANIFEST_NAME)["files"]:
-        with (path / entry["path"]).open("rb") as stream:
-            if hashlib.file_digest(stream, "sha256").hexdigest() != entry["sha256"]:
-                raise ChunkDamagedError(entry["path"], "its SHA-256 differs from the manifest")
+    for name, sha256 in manifest_digests(path).items():
+        with (path / name).open("rb") as stream:
+            if hashlib.file_digest(stream, "sha256").hexdigest() != sha256:
+                raise ChunkDamagedError(name, "its SHA-256 differs from the manifest")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from server.library.ports import Library
 from worker.paths import scene_of_bake
+from worker.storage import fetched, open_kept
 
 if TYPE_CHECKING:
     from relume.scene.model import Camera
@@ -35,14 +36,16 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.scene.placed_camera import with_cameras
 
     def reference(scene: Path, camera: Camera, *args: Any, reflects: bool) -> Any:
-        return reference_image(with_cameras(load_scene(scene), [camera]), camera.name, *args, reflects=reflects)
+        return reference_image(
+            with_cameras(load_scene(fetched(scene)), [camera]), camera.name, *args, reflects=reflects
+        )
 
     def finder(scene: Path) -> Finder:
-        return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(scene)))
+        return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(fetched(scene))))
 
     def stills_of(transfer: Any) -> Stills:
         scene = scene_of_bake(Path(transfer.key), transfer.scene_id)
-        return memory.passing.keep((transfer.key, "scene"), lambda: Stills(transfer.lit, load_scene(scene)))
+        return memory.passing.keep((transfer.key, "scene"), lambda: Stills(transfer.lit, load_scene(fetched(scene))))
 
     def picture(transfer: Any, view: str) -> Any:
         if transfer.eyes is not Eyes.FREE:
@@ -60,8 +63,8 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)
     return Library(
-        open_transfer=lambda path: open_bake(path, memory),
-        open_in_passing=lambda path: open_bake(path, memory.passing),
+        open_transfer=lambda path: open_kept(path, lambda store: open_bake(store, memory)),
+        open_in_passing=lambda path: open_kept(path, lambda store: open_bake(store, memory.passing)),
         make_picture=picture,
         render=render,
         render_small=render_small,

@@ -24,6 +24,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from pydantic import BaseModel
 from sqlalchemy import CursorResult, select, update
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import CancelledError, NotFoundError, RelumeError
@@ -268,6 +269,8 @@ class WorkQueue(ABC, Generic[Request]):
             self._update(work.id, _ACTIVE, done=done, **({"state": "ready"} if done >= work.total else {}))
         except CancelledError:  # closing, stopped, or deleted
             pass
+        except OperationalError:  # the database is away: the step is done again, and finds what is on the disk
+            raise
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self.noun, work.id)

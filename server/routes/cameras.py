@@ -16,6 +16,7 @@ from server.wire.cameras import CameraEntry, CameraFrame
 from worker.cameras import delete_camera, keep_camera, kept_cameras
 from worker.paths import scene_path
 from worker.scenes import get_scene
+from worker.storage import fetched
 
 router = APIRouter(prefix="/api/scenes/{scene}/cameras", tags=["scenes"])
 CameraName = Annotated[str, Path(min_length=1, max_length=MAX_NAME)]
@@ -54,7 +55,7 @@ def _entries(scene: str, services: Services) -> list[CameraEntry]:
     record = get_scene(services.bakes.ledger, scene)
     own = [
         CameraEntry(name=c.name, to_world=c.to_world.ravel().tolist(), yfov=math.degrees(c.yfov), is_placed=False)
-        for c in load_cameras(scene_path(services.settings.data, record.id))
+        for c in load_cameras(fetched(scene_path(services.settings.data, record.id)))
     ]
     placed = kept_cameras(services.bakes.ledger, record.id)
     return own + [CameraEntry(**camera.document(), is_placed=True) for camera in placed]

@@ -24,6 +24,7 @@ from worker.cameras import kept_cameras, placed_names
 from worker.paths import scene_path
 from worker.scenes import SceneRecord, delete_scene, get_scene, list_scenes
 from worker.status import BakeStatus
+from worker.storage import fetched
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 _OF_OLD_ROWS = {"catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
@@ -89,7 +90,8 @@ async def add_ground(scene: Id, services: Shared, response: Response) -> SceneBo
     """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     settings = services.settings
-    order = ImportRequest.of(settings, "grounded", scene_path(settings.data, scene), f"{record.name[:185]} on a ground")
+    folder = await run_in_threadpool(fetched, scene_path(settings.data, scene))
+    order = ImportRequest.of(settings, "grounded", folder, f"{record.name[:185]} on a ground")
     async with services.import_slots:
         identity = await run_in_threadpool(services.importers.run, order)
     response.headers["Location"] = f"/api/scenes/{identity}"

@@ -71,7 +71,7 @@ def test_help_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for command in ("demo", "import", "bake", "render", "serve", "worker", "reference", "bench"):
+    for command in ("demo", "import", "bake", "render", "serve", "worker", "backup", "restore", "reference", "bench"):
         assert re.search(rf"^  {command} ", done.stdout, re.MULTILINE)
 
 

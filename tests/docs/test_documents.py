@@ -101,7 +101,7 @@ def test_method_lists_every_term_and_its_curves() -> None:
 
 def test_operations_lists_every_setting_and_no_other() -> None:
     told = set(re.findall(r"RELUME_[A-Z_]+", _read("docs/operations.md")))
-    from_environment = {"RELUME_THREADS", "RELUME_SHARED_DATA"}
+    from_environment = {"RELUME_THREADS", "RELUME_SHARED_DATA", "RELUME_STORAGE", "RELUME_STORAGE_CACHE_BYTES"}
     assert told == {f"RELUME_{name.upper()}" for name in Settings.model_fields} | from_environment
 
 

@@ -1,4 +1,7 @@
-"""A program of its own that bakes the fake method and can be killed: bake_process.py DATA_DIR METHOD_JSON [WORKERS]."""
+"""A program of its own that bakes the fake method and can be killed.
+
+bake_process.py DATA_DIR LEDGER_URL METHOD_JSON WORKERS
+"""
 
 import json
 import sys
@@ -11,9 +14,9 @@ from worker.service import BakeService
 
 
 def main() -> None:
-    data_dir, options = Path(sys.argv[1]), json.loads(sys.argv[2])
-    num_workers = int(sys.argv[3]) if len(sys.argv) > 3 else None
-    service = BakeService(data_dir, num_workers=num_workers, methods={"fake": FakeMethod(**options)})
+    data_dir, url, options, num_workers = sys.argv[1:]
+    methods = {"fake": FakeMethod(**json.loads(options))}
+    service = BakeService(Path(data_dir), url, num_workers=int(num_workers), methods=methods)
     scene_id = register_scene(service.data_dir, service.ledger, tiny_scene())
     with service, service.subscribe(service.submit(scene_id, RECIPE)) as changes:
         for status in changes:

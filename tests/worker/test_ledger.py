@@ -1,6 +1,8 @@
 """The ledger names each bake once, lets one owner run it, and keeps what was finished."""
 
 import threading
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,10 +21,10 @@ PLAN = FakeMethod().plan(SCENE, RECIPE)
 
 
 @pytest.fixture
-def ledger(tmp_path: Path) -> Ledger:
-    ledger = Ledger(open_database(f"sqlite:///{tmp_path / 'relume.db'}"))
-    register_scene(tmp_path, ledger, SCENE)
-    return ledger
+def ledger(tmp_path: Path, ledger_url: str) -> Iterator[Ledger]:
+    with closing(Ledger(open_database(ledger_url))) as ledger:
+        register_scene(tmp_path, ledger, SCENE)
+        yield ledger
 
 
 def test_recipe_survives_json_and_names_the_bake() -> None:

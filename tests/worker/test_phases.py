@@ -1,7 +1,5 @@
 """People see what a bake is at: behind whom it waits, what its processes do before they trace, when it is published."""
 
-import sqlite3
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,11 +7,9 @@ from typing import Any
 import numba as nb
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
-from sqlalchemy import inspect
 
 from cli.follow import detail
 from relume.bake import Plan, Task
-from worker.database import open_database
 from worker.executor import TINY_BAKE_RAYS
 from worker.ledger import Ledger
 from worker.notes import Notebook, note_path, read_note
@@ -93,24 +89,6 @@ def test_note_that_cannot_be_kept_costs_the_words_alone(tmp_path: Path) -> None:
     assert read_note(tmp_path / "nowhere" / "one.zarr") is None
     note_path(tmp_path / "one.zarr").write_text("something else")
     assert read_note(tmp_path / "one.zarr") is None
-
-
-def test_database_of_an_older_relume_gets_what_it_lacks(tmp_path: Path) -> None:
-    path = tmp_path / "relume.db"
-    service = BakeService(tmp_path, methods={"fake": FakeMethod()})
-    register_scene(service.data_dir, service.ledger, tiny_scene())
-    identity = service.submit(tiny_scene().id, RECIPE)
-    service.close()
-    lacking = ("phase", "phase_since", "crowding")
-    with sqlite3.connect(path) as old:
-        for column in lacking:
-            old.execute(f"ALTER TABLE bakes DROP COLUMN {column}")
-    with ThreadPoolExecutor(4) as threads:  # a server and the command line may start at once
-        engines = list(threads.map(open_database, [f"sqlite:///{path}"] * 4))
-    assert {column["name"] for column in inspect(engines[0]).get_columns("bakes")} >= set(lacking)
-    assert Ledger(engines[0]).bake(identity).phase is None
-    for engine in engines:
-        engine.dispose()
 
 
 def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

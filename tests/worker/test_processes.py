@@ -45,8 +45,8 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
     return tree_hash(bake_here(FakeMethod(), tiny_scene(), RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
 
 
-def start(data_dir: Path, **method: Any) -> "subprocess.Popen[str]":
-    command = [sys.executable, str(PROGRAM), str(data_dir), json.dumps(method), "2"]
+def start(data_dir: Path, url: str, **method: Any) -> "subprocess.Popen[str]":
+    command = [sys.executable, str(PROGRAM), str(data_dir), url, json.dumps(method), "2"]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
@@ -66,31 +66,39 @@ def wait_for(log: Path, num_tasks: int) -> None:
 
 
 def test_worker_killed_during_a_task_is_replaced(tmp_path: Path, expected: str) -> None:
-    log = tmp_path / "log"
-    output = finish(start(tmp_path / "data", num_rays=LARGE, delay_s=0.02, log=str(log), kill="once"))
+    log, url = tmp_path / "log", f"sqlite:///{tmp_path / 'relume.db'}"
+    output = finish(start(tmp_path / "data", url, num_rays=LARGE, delay_s=0.02, log=str(log), kill="once"))
     assert output[-1].startswith("ready")
     assert (tmp_path / "log.died").exists()
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
 
 
 def test_task_that_kills_every_worker_fails_the_bake_clearly(tmp_path: Path) -> None:
-    output = finish(start(tmp_path, num_rays=LARGE, log=str(tmp_path / "log"), kill="always"))
+    url = f"sqlite:///{tmp_path / 'relume.db'}"
+    output = finish(start(tmp_path, url, num_rays=LARGE, log=str(tmp_path / "log"), kill="always"))
     assert "worker processes died of the same task" in output[-1]
     assert output[-1].startswith("failed")
     assert not bake_path(tmp_path, IDENTITY).exists()
 
 
 @pytest.mark.parametrize(
-    "num_rays",
-    [pytest.param(1000, id="in the service's process", marks=pytest.mark.slow), pytest.param(LARGE, id="on a cluster")],
+    ("ledger_url", "num_rays"),
+    [
+        pytest.param("sqlite", 1000, id="in the service's process", marks=pytest.mark.slow),
+        pytest.param("postgresql", 1000, id="its ledger on PostgreSQL"),
+        pytest.param("sqlite", LARGE, id="on a cluster"),
+    ],
+    indirect=["ledger_url"],
 )
-def test_everything_killed_resumes_where_the_ledger_stands(tmp_path: Path, expected: str, num_rays: int) -> None:
+def test_everything_killed_resumes_where_the_ledger_stands(
+    tmp_path: Path, ledger_url: str, expected: str, num_rays: int
+) -> None:
     log, data_dir = tmp_path / "log", tmp_path / "data"
-    process = start(data_dir, num_rays=num_rays, delay_s=0.1, log=str(log))
+    process = start(data_dir, ledger_url, num_rays=num_rays, delay_s=0.1, log=str(log))
     wait_for(log, 8)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
-    ledger = Ledger(open_database(f"sqlite:///{data_dir / 'relume.db'}"))
+    ledger = Ledger(open_database(ledger_url))
     assert ledger.bake(IDENTITY).state == "running"
     done = ledger.finished_tasks(IDENTITY)
     ledger.close()
@@ -98,15 +106,15 @@ def test_everything_killed_resumes_where_the_ledger_stands(tmp_path: Path, expec
     assert not bake_path(data_dir, IDENTITY).exists()
     before = Counter(log.read_text().split())
 
-    assert finish(start(data_dir, num_rays=num_rays, log=str(log)))[-1].startswith("ready")
+    assert finish(start(data_dir, ledger_url, num_rays=num_rays, log=str(log)))[-1].startswith("ready")
     assert tree_hash(bake_path(data_dir, IDENTITY)) == expected
     repeated = Counter(log.read_text().split()) - before
     assert not set(repeated) & {f"{stage}.{index}" for stage, index in done}
 
 
-def test_two_processes_bake_one_recipe_once(tmp_path: Path, expected: str) -> None:
+def test_two_processes_bake_one_recipe_once(tmp_path: Path, ledger_url: str, expected: str) -> None:
     log = tmp_path / "log"
-    both = [start(tmp_path / "data", delay_s=0.02, log=str(log)) for _ in range(2)]
+    both = [start(tmp_path / "data", ledger_url, delay_s=0.02, log=str(log)) for _ in range(2)]
     assert [finish(process)[-1].split()[0] for process in both] == ["ready", "ready"]
     assert set(Counter(log.read_text().split()).values()) == {1}
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected

@@ -11,24 +11,37 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError
 
+log = logging.getLogger(__name__)
+
 AWAY = (SQLAlchemyError, DatabaseDamagedError, DiskFullError)
 """What reading or writing the database raises while it is away, damaged, or without room."""
 
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+_NO_ROOM = "53100"  # of PostgreSQL, as are these: connections that fail, ends by an operator, too many clients
+_NO_ANSWER = ("08", "57P", "53300")
 
 
 def name_fault(context: ExceptionContext) -> None:
-    """Raise what a failure of SQLite means where that is known; listens to `handle_error` of an engine.
+    """Raise what a failure of the database means where that is known; listens to `handle_error` of an engine.
 
     Raises:
         DiskFullError, DatabaseDamagedError: it is one of these.
     """
     cause = context.original_exception
     code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest tells kinds of it apart
-    if code == sqlite3.SQLITE_FULL:
+    if code == sqlite3.SQLITE_FULL or getattr(cause, "sqlstate", None) == _NO_ROOM:
         raise DiskFullError("the database") from cause
     if code in _DAMAGED:
         raise DatabaseDamagedError(str(cause)) from cause
+
+
+def is_away(error: Exception) -> bool:
+    """Whether a database server does not answer, so that asking again in a while may help."""
+    if not isinstance(error, DBAPIError) or not type(error.orig).__module__.startswith("psycopg"):
+        return False
+    state = getattr(error.orig, "sqlstate", None)
+    kind = type(error.orig).__name__  # without a state: nobody has answered
+    return state.startswith(_NO_ANSWER) if state else kind in ("OperationalError", "ConnectionTimeout")
 
 
 def told(error: Exception) -> str:
@@ -40,6 +53,8 @@ def told(error: Exception) -> str:
 class Complaint:
     """Says what a loop meets in one line, and not again until it has gone or another has come; from any thread.
 
+    A database server that is away is said once for the whole process, however many loops meet that.
+
     Args:
         log: where. what: cannot be done, as a sentence begins.
     """
@@ -50,6 +65,9 @@ class Complaint:
 
     def meet(self, error: Exception) -> None:
         """Something failed; what nobody foresaw is told with its trace."""
+        if is_away(error):
+            database_away.meet(error)
+            return
         line, is_known = told(error), isinstance(error, (*AWAY, RelumeError, OSError))
         with self._lock:
             if line == self._said:
@@ -59,7 +77,30 @@ class Complaint:
 
     def well(self) -> None:
         """It works."""
+        database_away.well()
         with self._lock:
             was_said, self._said = self._said, ""
         if was_said:
             self._log.warning("%s: that is over", self._what)
+
+
+class _DatabaseAway:
+    """Says that the database server does not answer, and that it does again: whatever the reasons are meanwhile."""
+
+    def __init__(self) -> None:
+        self._is_said, self._lock = False, threading.Lock()
+
+    def meet(self, error: Exception) -> None:
+        with self._lock:
+            was_said, self._is_said = self._is_said, True
+        if not was_said:
+            log.error("the database does not answer (%s); trying again", told(error))
+
+    def well(self) -> None:
+        with self._lock:
+            was_said, self._is_said = self._is_said, False
+        if was_said:
+            log.warning("the database does not answer: that is over")
+
+
+database_away = _DatabaseAway()

@@ -1,13 +1,17 @@
-"""Tables of the ledger. SQLAlchemy 2, any database; SQLite by default."""
+"""Tables of the ledger, as they are now; `revisions` beside this file has the ways from older ones."""
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, Index, Text
+from typing import Any, ClassVar
+
+from sqlalchemy import BigInteger, ForeignKey, Index, Integer, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
 class Base(DeclarativeBase):
     """The root of all tables in relume's database."""
+
+    type_annotation_map: ClassVar[dict[Any, Any]] = {int: BigInteger().with_variant(Integer(), "sqlite")}  # bytes, rays
 
 
 class SceneRow(Base):
@@ -36,10 +40,12 @@ class CameraRow(Base):
 
 
 class BakeRow(Base):
-    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970).
+    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970
+    by the database's clock).
 
     Attributes:
         code: names the code that makes or made it; None in rows of a relume that did not write that down.
+        run: names its beginning, see `worker.runs`; None in rows of a relume that did not.
         crowding: see `worker.estimate`; None where it is not ready, or was baked before that was measured.
     """
 
@@ -57,6 +63,7 @@ class BakeRow(Base):
     phase_since: Mapped[float | None] = mapped_column(default=None)
     crowding: Mapped[float | None] = mapped_column(default=None)
     code: Mapped[str | None] = mapped_column(default=None)
+    run: Mapped[str | None] = mapped_column(default=None)
     rays_per_second: Mapped[float | None] = mapped_column(default=None)
     seconds_left: Mapped[float | None] = mapped_column(default=None)
     bytes: Mapped[int] = mapped_column(default=0)

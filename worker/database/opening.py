@@ -1,66 +1,75 @@
-"""Opens the database: any SQLAlchemy URL; SQLite is set up for several processes that write."""
+"""Opens the database: SQLite, set up for several processes that write, or PostgreSQL."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Column, Connection, Engine, MetaData, Table, create_engine, event, inspect, text
+from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import make_url
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import ArgumentError
 
+from relume.errors import ParameterError
 from worker.database.faults import name_fault
-from worker.database.models import Base
+from worker.database.upgrading import upgrade
 
 BUSY_TIMEOUT_MS = 30_000
-CREATE_ATTEMPTS = 5
+POOL_TIMEOUT_S = 10.0
+MAX_WAITING = 30  # connections beside the five that are kept: threads of the server that may ask at once
+
+# A PostgreSQL that does not answer is noticed after seconds, by whoever connects and by whoever waits for an answer.
+_POSTGRESQL: dict[str, Any] = {
+    "connect_timeout": 5,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 20_000,
+    "application_name": "relume",
+}
 
 
 def open_database(url: str) -> Engine:
-    """An engine on `url`, its tables made where they are missing. Raises DatabaseDamagedError, DiskFullError."""
-    parsed = make_url(url)
-    sqlite = parsed.get_backend_name() == "sqlite"
-    if sqlite and parsed.database:
-        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
-    engine = create_engine(parsed, pool_pre_ping=not sqlite)
-    event.listen(engine, "handle_error", name_fault)
-    if sqlite:
-        event.listen(engine, "connect", _set_up_sqlite)
-    create_tables(engine, Base.metadata)
-    add_columns(engine, Base.metadata)
+    """An engine on `url`, its tables made or upgraded where that only adds.
+
+    Raises:
+        ParameterError: `url` is neither of SQLite nor of PostgreSQL.
+        DatabaseDamagedError, DiskFullError: what the file says. LedgerVersionError: see `upgrading`.
+    """
+    engine = connect(url)
+    try:
+        upgrade(engine, by_hand=False)
+    except Exception:
+        engine.dispose()
+        raise
     return engine
 
 
-def add_columns(engine: Engine, metadata: MetaData) -> None:
-    """Add the columns that tables of an older relume lack; they are empty there. Two processes may do so at once."""
-    for attempt in range(CREATE_ATTEMPTS):
-        try:
-            with engine.begin() as connection:
-                for table, column in _lacking(connection, metadata):
-                    kind = column.type.compile(engine.dialect)
-                    connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {column.name} {kind}"))
-            return
-        except DBAPIError:
-            if attempt == CREATE_ATTEMPTS - 1:
-                raise
+def connect(url: str) -> Engine:
+    """An engine on `url`, its tables as they are. Raises ParameterError."""
+    parsed = _parse(url)
+    if parsed.get_backend_name() == "postgresql":
+        waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_WAITING}
+        engine = create_engine(parsed, pool_pre_ping=True, connect_args=_POSTGRESQL, **waits)
+    else:
+        if parsed.database:
+            Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+        engine = create_engine(parsed)
+        event.listen(engine, "connect", _set_up_sqlite)
+    event.listen(engine, "handle_error", name_fault)
+    return engine
 
 
-def _lacking(connection: Connection, metadata: MetaData) -> Iterator[tuple[Table, Column[Any]]]:
-    for table in metadata.sorted_tables:
-        known = {column["name"] for column in inspect(connection).get_columns(table.name)}
-        yield from ((table, column) for column in table.columns if column.name not in known and column.nullable)
-
-
-def create_tables(engine: Engine, metadata: MetaData) -> None:
-    """Make the tables that are missing. Two processes may find them missing at once; the later one looks again."""
-    for attempt in range(CREATE_ATTEMPTS):
-        try:
-            metadata.create_all(engine)
-            return
-        except DBAPIError:
-            if attempt == CREATE_ATTEMPTS - 1:
-                raise
+def _parse(url: str) -> URL:
+    allowed = "a URL such as postgresql://user:password@host/name or sqlite:////folder/relume.db"
+    try:
+        parsed = make_url(url)
+    except ArgumentError:
+        raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may hold a password
+    if parsed.drivername in ("postgres", "postgresql"):
+        return parsed.set(drivername="postgresql+psycopg")
+    if parsed.drivername not in ("postgresql+psycopg", "sqlite"):
+        raise ParameterError("RELUME_DATABASE", parsed.drivername, allowed)
+    return parsed
 
 
 def _set_up_sqlite(connection: Any, _: object) -> None:

@@ -1,0 +1,24 @@
+"""`relume ledger draft`: begins a revision, for who changes relume's tables."""
+
+from __future__ import annotations
+
+import tempfile
+from typing import Annotated
+
+import typer
+
+
+def ledger_draft(
+    message: Annotated[str, typer.Argument(metavar="MESSAGE", help="What the revision does, in a few words.")],
+) -> None:
+    """For developers: write the revision that the tables of the code need beyond the newest; look it through."""
+    from server.records import tables  # noqa: F401  the server's, beside the worker's
+    from worker.database import open_database
+    from worker.database.models import Base
+    from worker.database.upgrading import draft
+
+    with tempfile.TemporaryDirectory() as folder:
+        engine = open_database(f"sqlite:///{folder}/relume.db")
+        with engine.begin() as connection:
+            typer.echo(draft(connection, Base.metadata, message))
+        engine.dispose()

@@ -1,0 +1,83 @@
+"""Commands that keep what there is, upgrades of the ledger, backups, restores; and workers for a team."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from cli.main import main
+from worker.database import open_database
+from worker.database.upgrading import newest_revision
+from worker.ledger import Ledger
+from worker.paths import bake_path
+
+RELUME = [sys.executable, "-m", "cli.main"]
+BEFORE = (Path(__file__).parents[1] / "worker" / "before_revisions.sql").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A data folder of before revisions; its scene and its bake have no files any more."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    with closing(sqlite3.connect(folder / "relume.db")) as connection:
+        connection.executescript(BEFORE)
+    monkeypatch.setenv("RELUME_DATA", str(folder))
+    return folder
+
+
+def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ledger", "upgrade"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "0001: The tables as they were before there were revisions"
+    assert main(["ledger", "upgrade"]) == 0
+    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {newest_revision()}"]
+
+
+def test_a_backup_says_what_is_not_in_it_and_comes_back(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    backups = str(tmp_path / "backups")
+    assert main(["backup", backups]) == 1
+    said = capsys.readouterr()
+    assert said.err.count("is not in the data directory, though the ledger names it") == 2
+    assert main(["backup", backups, "--verify"]) == 0
+    assert "0 of 1 files are damaged" in capsys.readouterr().err
+    assert main(["restore", backups, "--snapshot", said.out.strip(), "--data", str(tmp_path / "new")]) == 0
+    with closing(sqlite3.connect(tmp_path / "new" / "relume.db")) as connection:
+        assert connection.execute("SELECT name FROM looks").fetchall() == [("red",)]
+
+
+def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["restore", str(tmp_path / "nothing"), "--data", str(tmp_path / "new")]) == 1
+    said = capsys.readouterr().err.strip()
+    assert said.startswith("relume: ")
+    assert "holds no backup; make one with: relume backup" in said
+    assert "\n" not in said
+
+
+def test_a_worker_bakes_what_waits_in_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RELUME_DATA", str(tmp_path / "server"))
+    monkeypatch.setenv("RELUME_DATABASE", f"sqlite:///{tmp_path / 'ledger.db'}")
+    monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")
+    assert main(["import", "--built-in", "cornell_box"]) == 0
+    assert main(["bake", "Cornell box", "--size", "24x16", "--lights", "100", "--no-watch"]) == 0
+    worker = subprocess.Popen([*RELUME, "worker", "--processes", "1", "--data", str(tmp_path / "far")])
+    try:
+        with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'ledger.db'}"))) as ledger:
+            deadline = time.monotonic() + 120
+            while (status := ledger.bakes()[0]).state in ("queued", "running") and time.monotonic() < deadline:
+                time.sleep(0.1)
+            assert status.state == "ready"
+    finally:
+        worker.terminate()
+        assert worker.wait(30) == 0
+    assert not bake_path(tmp_path / "server", status.id).exists()
+    assert main(["render", "Cornell box", "--output", str(tmp_path / "box.png")]) == 0
+    assert bake_path(tmp_path / "server", status.id).exists()

@@ -1,0 +1,84 @@
+"""A PostgreSQL of our own in a temporary folder, where the server's programs are installed."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import shutil
+import socket
+import subprocess
+import tempfile
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+
+import psycopg
+import pytest
+
+MISSING = "PostgreSQL is not installed (Debian: apt-get install --no-install-recommends postgresql)"
+USER = "relume"
+
+
+def _program(name: str) -> str | None:
+    """Path of one of its programs, the newest version's; Debian puts them where no PATH leads."""
+    versions = sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"), key=lambda path: int(path.parts[-3]))
+    return str(versions[-1]) if versions else shutil.which(name)
+
+
+class Cluster:
+    """A throw-away cluster that listens on a port of this machine; stop and start it as often as you like."""
+
+    def __init__(self) -> None:
+        self._initdb, self._ctl = _program("initdb"), _program("pg_ctl")
+        if self._initdb is None or self._ctl is None:
+            pytest.skip(MISSING)
+        self._user = _somebody() if os.geteuid() == 0 else None  # it refuses to run as root
+        self._folder = Path(tempfile.mkdtemp(prefix="relume-postgresql-"))
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self._port = free.getsockname()[1]
+        if self._user is not None:
+            os.chown(self._folder, self._user.pw_uid, self._user.pw_gid)
+        self._run([self._initdb, "-D", str(self._data), "-U", USER, "-A", "trust", "-E", "UTF8", "--no-sync"])
+        self.start()
+
+    @property
+    def _data(self) -> Path:
+        return self._folder / "data"
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        options = f"-p {self._port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
+        self._run(
+            [str(self._ctl), "-D", str(self._data), "-w", "-l", str(self._folder / "log"), "-o", options, "start"]
+        )
+
+    def stop(self) -> None:
+        """Stop it as a restart does: open connections are ended."""
+        self._run([str(self._ctl), "-D", str(self._data), "-w", "-m", "fast", "stop"])
+
+    def new_database(self) -> str:
+        """The URL of an empty database."""
+        name = f"test_{uuid.uuid4().hex}"
+        where = f"{USER}@127.0.0.1:{self._port}"
+        with psycopg.connect(f"postgresql://{where}/postgres", autocommit=True) as connection:
+            connection.execute(f"CREATE DATABASE {name}".encode())
+        return f"postgresql://{where}/{name}"
+
+    def remove(self) -> None:
+        """Stop it and forget it."""
+        self._run([str(self._ctl), "-D", str(self._data), "-m", "immediate", "stop"])
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _run(self, command: Sequence[str]) -> None:
+        uid = self._user.pw_uid if self._user is not None else None
+        subprocess.run(command, check=True, user=uid, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT, cwd="/")
+
+
+def _somebody() -> pwd.struct_passwd:
+    """A user that is not root."""
+    for name in ("postgres", "nobody"):
+        try:
+            return pwd.getpwnam(name)
+        except KeyError:
+            continue
+    pytest.skip("PostgreSQL does not run as root, and there is no user postgres or nobody")

@@ -1,0 +1,260 @@
+"""What is backed up comes back, from and to either database; what is interrupted is never taken for whole."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from fake_method import RECIPE, FakeMethod, tiny_scene
+from postgres import Cluster
+from test_processes import tree_hash
+
+from relume.errors import BackupError
+from relume.scene.archive import load_scene
+from relume.store import open_store
+from server.records.looks import LookStore
+from worker.backup.restore import restore
+from worker.backup.shelf import Shelf
+from worker.backup.take import back_up
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.paths import bake_path, scene_path
+from worker.scenes import delete_scene, list_scenes, register_scene
+from worker.service import BakeService
+from worker.status import BakeStatus
+
+SCENE = tiny_scene()
+
+
+@pytest.fixture
+def shelf(tmp_path: Path) -> Shelf:
+    return Shelf(tmp_path / "backups")
+
+
+def open_service(data: Path, url: str) -> BakeService:
+    return BakeService(data, url, methods={"fake": FakeMethod()})
+
+
+def bake(service: BakeService) -> BakeStatus:
+    with service, service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
+        return list(changes)[-1]
+
+
+@pytest.fixture
+def data(tmp_path: Path, ledger_url: str) -> Path:
+    """A data directory with a scene, a finished bake, a saved look, a render's picture, and what stays behind."""
+    data = tmp_path / "data"
+    service = open_service(data, ledger_url)
+    register_scene(data, service.ledger, SCENE)
+    LookStore(service.ledger.sessions).put("red", "{}", None, None)
+    status = bake(service)
+    assert status.state == "ready"
+    (data / "renders" / "one").mkdir(parents=True)
+    (data / "renders" / "one" / "0000.png").write_bytes(b"a picture")
+    for path in ("thumbnails/a.png", "upload-x/b.glb", f"bakes/{status.id}.zarr/derived/c.npy", ".unfinished-d"):
+        (data / path).parent.mkdir(exist_ok=True)
+        (data / path).write_bytes(b"not worth keeping")
+    return data
+
+
+def take(data: Path, url: str, shelf: Shelf, **options: Callable[[int], Callable[[int], None]]) -> str:
+    engine = open_database(url)
+    try:
+        snapshot = back_up(data, engine, shelf, **options)
+    finally:
+        engine.dispose()
+    assert snapshot.left_out == ()
+    return snapshot.name
+
+
+@pytest.mark.parametrize("into", ["sqlite", "postgresql"])
+def test_all_comes_back_into_either_database(
+    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path, postgresql: Cluster, into: str
+) -> None:
+    take(data, ledger_url, shelf)
+    elsewhere = tmp_path / "elsewhere"
+    url = f"sqlite:///{elsewhere / 'relume.db'}" if into == "sqlite" else postgresql.new_database()
+    restore(shelf, None, elsewhere, url)
+    with closing(open_service(data, ledger_url)) as old, closing(open_service(elsewhere, url)) as new:
+        assert new.bakes() == old.bakes()
+        (status,) = new.bakes()
+        assert new.ledger.finished_tasks(status.id) == old.ledger.finished_tasks(status.id)
+        assert LookStore(new.ledger.sessions).list() == LookStore(old.ledger.sessions).list() != []
+        assert new.submit(SCENE.id, RECIPE) == status.id
+        assert new.get(status.id).state == "ready"
+        assert len(open_store(bake_path(elsewhere, status.id)).shape("views/0/visibility")) == 2
+        assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
+    assert (elsewhere / "renders" / "one" / "0000.png").read_bytes() == b"a picture"
+    found = {path.relative_to(elsewhere).parts[0] for path in elsewhere.rglob("*") if b"not worth" in read(path)}
+    assert found == set()
+    assert not list(elsewhere.rglob(".unfinished-*"))
+
+
+def read(path: Path) -> bytes:
+    return path.read_bytes() if path.is_file() else b""
+
+
+def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, shelf: Shelf) -> None:
+    first = take(data, ledger_url, shelf)
+    before = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
+    with closing(open_service(data, ledger_url)) as service:
+        register_scene(data, service.ledger, other := tiny_scene("another"))
+    second = take(data, ledger_url, shelf)
+    after = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
+    new = {kept.sha256 for kept in shelf.read(second).all} - {kept.sha256 for kept in shelf.read(first).all}
+    assert {path.name for path in set(after) - set(before)} == new
+    assert before.items() <= after.items()
+    paths = {kept.path for kept in shelf.read(second).files} - {kept.path for kept in shelf.read(first).files}
+    assert paths == {f"scenes/{other.id}/scene.json", f"scenes/{other.id}/arrays.npz"}
+
+
+def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
+    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
+) -> None:
+    ended = threading.Event()
+    with closing(open_service(data, ledger_url)) as service:
+
+        def come_and_go() -> None:
+            k = 0
+            while not ended.is_set():
+                k += 1
+                register_scene(data, service.ledger, tiny_scene(f"scene {k}"))
+                if k % 2:
+                    delete_scene(data, service.ledger, tiny_scene(f"scene {k}").id)
+
+        thread = threading.Thread(target=come_and_go)
+        thread.start()
+        try:
+            snapshot = back_up(data, service.ledger._engine, shelf)
+        finally:
+            ended.set()
+            thread.join()
+    elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
+    restore(shelf, None, elsewhere, url)
+    with closing(Ledger(open_database(url))) as ledger:
+        for record in list_scenes(ledger):
+            if not any(record.id in sentence for sentence in snapshot.left_out):
+                assert load_scene(scene_path(elsewhere, record.id)).id == record.id
+        assert SCENE.id in {record.id for record in list_scenes(ledger)}
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from worker.backup.restore import restore
+from worker.backup.shelf import Shelf
+from worker.backup.take import back_up
+from worker.database import open_database
+
+count = [0]
+def tell(done):
+    count[0] += 1
+    if count[0] == 12:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+what, data, url, shelf = sys.argv[1], Path(sys.argv[2]), sys.argv[3], Shelf(Path(sys.argv[4]))
+if what == "backup":
+    back_up(data, open_database(url), shelf, lambda total: tell)
+else:
+    restore(shelf, None, data, url, lambda total: tell)
+"""
+
+
+def kill(what: str, data: Path, url: str, shelf: Shelf) -> None:
+    """Run it in a process of its own that is killed in the middle of a file."""
+    done = subprocess.run([sys.executable, "-c", KILLED, what, str(data), url, str(shelf.folder)], check=False)
+    assert done.returncode == -signal.SIGKILL
+
+
+def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(data: Path, ledger_url: str, shelf: Shelf) -> None:
+    kill("backup", data, ledger_url, shelf)
+    assert shelf.names() == []
+    with pytest.raises(BackupError, match="holds no backup"):
+        shelf.read()
+    copied = {path.name for path in (shelf.folder / "files").rglob("*") if path.is_file() and path.name[0] != "."}
+    assert len(copied) > 5
+    assert list((shelf.folder / "files").rglob(".unfinished-*"))
+    take(data, ledger_url, shelf)
+    snapshot = shelf.read()
+    assert list(shelf.damaged(snapshot, lambda done: None)) == []
+    kept = copied & {one.sha256 for one in snapshot.files}
+    assert len(kept) == len(copied) - 1  # all but the ledger's copy of before
+    assert not [path for path in shelf.folder.rglob("*") if path.name.startswith(".")]
+
+
+def test_a_restore_that_is_killed_cannot_be_worked_on_and_goes_on(
+    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
+) -> None:
+    first = take(data, ledger_url, shelf)
+    take(data, ledger_url, shelf)
+    elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
+    kill("restore", elsewhere, url, shelf)
+    with pytest.raises(BackupError, match="run relume restore again, which goes on"):
+        open_service(elsewhere, url)
+    with pytest.raises(BackupError, match="go on with that one"):
+        restore(shelf, first, elsewhere, url)
+    restore(shelf, None, elsewhere, url)
+    with closing(open_service(elsewhere, url)) as service:
+        (status,) = service.bakes()
+        store = f"bakes/{status.id}.zarr"
+        (data / store / "derived" / "c.npy").unlink()
+        (data / store / "derived").rmdir()
+        assert tree_hash(elsewhere / store) == tree_hash(data / store)
+    assert not list(elsewhere.rglob(".unfinished-*"))
+
+
+def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf: Shelf) -> None:
+    (store,) = (data / "bakes").glob("*.zarr")
+    shard = store / "views" / "0" / "visibility" / "c" / "3" / "0"
+    shard.write_bytes(bytes(shard.stat().st_size))
+    with closing(Ledger(engine := open_database(ledger_url))):
+        snapshot = back_up(data, engine, shelf)
+    assert f"bakes/{store.name} is damaged: delete it, and bake or import it again" in snapshot.left_out
+    assert not any("bakes/" in kept.path for kept in snapshot.files)
+    assert any("scenes/" in kept.path for kept in snapshot.files)
+
+
+def test_a_damaged_backup_is_found_and_not_restored(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+    take(data, ledger_url, shelf)
+    kept = next(kept for kept in shelf.read().files if kept.path.startswith("scenes/"))
+    path = shelf.path_of(kept.sha256)
+    path.write_bytes(bytes(kept.num_bytes))
+    assert list(shelf.damaged(shelf.read(), lambda done: None)) == [kept]
+    elsewhere = tmp_path / "elsewhere"
+    with pytest.raises(BackupError, match=r"is damaged in the backup"):
+        restore(shelf, None, elsewhere, f"sqlite:///{elsewhere / 'relume.db'}")
+    assert not (elsewhere / kept.path).exists()
+
+
+def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+    take(data, ledger_url, shelf)
+    with pytest.raises(BackupError, match="is not empty"):
+        restore(shelf, None, data, f"sqlite:///{tmp_path / 'new.db'}")
+    empty = tmp_path / "empty"
+    with pytest.raises(BackupError, match="has rows already"):
+        restore(shelf, None, empty, ledger_url)
+    assert list(empty.iterdir()) == []
+    with pytest.raises(BackupError, match="something else than backups"):
+        take(data, ledger_url, Shelf(data))
+
+
+@pytest.mark.parametrize("ledger_url", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("path", ["../out", "/etc/out", "scenes/../../out", "a//b", "", "a\0b"])
+def test_a_snapshot_that_names_places_outside_is_refused(
+    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path, path: str
+) -> None:
+    name = take(data, ledger_url, shelf)
+    file = shelf.folder / "snapshots" / f"{name}.json"
+    document = json.loads(file.read_text())
+    document["files"][0]["path"] = path
+    file.write_text(json.dumps(document))
+    with pytest.raises(BackupError, match="not a snapshot of relume"):
+        restore(shelf, None, tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'new.db'}")
+    assert not (tmp_path / "elsewhere").exists()

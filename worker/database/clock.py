@@ -1,0 +1,27 @@
+"""The clock of the database, by which leases run: processes on several machines share it, whatever their own say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Double
+from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.sql.functions import FunctionElement
+
+
+class epoch_s(FunctionElement[float]):  # noqa: N801  used as a function
+    """Seconds since 1970 when the statement runs."""
+
+    name = "epoch_s"
+    inherit_cache = True
+    type = Double()
+
+
+@compiles(epoch_s, "sqlite")
+def _of_sqlite(element: epoch_s, compiler: Any, **_: object) -> str:
+    return "((julianday('now') - 2440587.5) * 86400.0)"
+
+
+@compiles(epoch_s, "postgresql")
+def _of_postgresql(element: epoch_s, compiler: Any, **_: object) -> str:
+    return "extract(epoch from clock_timestamp())::float8"

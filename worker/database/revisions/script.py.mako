@@ -1,0 +1,15 @@
+"""${message}."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = ${repr(up_revision)}
+down_revision = ${repr(down_revision)}
+is_additive = True  # False where a relume from before it cannot work on: then people run `relume ledger upgrade`
+
+
+def upgrade() -> None:
+    """From the revision before."""
+    ${upgrades if upgrades else "pass"}

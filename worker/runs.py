@@ -1,0 +1,40 @@
+"""Which unfinished store the finished tasks of a bake are in: machines that share a ledger need not share a folder.
+
+Whoever begins a bake from nothing names that beginning, in the ledger and in a file beside the unfinished store. Where
+the two differ, the ledger's tasks are in another machine's folder.
+"""
+
+from __future__ import annotations
+
+import uuid
+from contextlib import suppress
+from pathlib import Path
+
+from relume.replacing import replacing
+
+
+def begin_run(staging: Path) -> str:
+    """Name a beginning, beside the unfinished store that it will be in."""
+    run = uuid.uuid4().hex
+    staging.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(_path(staging)) as unfinished:
+        unfinished.write_text(run)
+    return run
+
+
+def run_of(staging: Path) -> str | None:
+    """The name; None where there is none, or from before there were any."""
+    try:
+        return _path(staging).read_text()
+    except OSError:
+        return None
+
+
+def forget_run(staging: Path) -> None:
+    """Remove the name, where there is one."""
+    with suppress(OSError):
+        _path(staging).unlink(missing_ok=True)
+
+
+def _path(staging: Path) -> Path:
+    return staging.with_suffix(".run")

@@ -1,0 +1,164 @@
+"""What of the object storage is kept in the data directory: scenes, and bakes as long as there is room.
+
+A bake that is open holds a lock that all processes of the machine see; others go when room is needed, those that were
+not opened for longest first. What the storage does not have stays.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from relume.replacing import UNFINISHED
+from relume.store.publish import manifest_digests
+from relume.store.schema import MANIFEST_NAME
+from worker.storage.remote import Remote, configured
+
+DEFAULT_CACHE_BYTES = 20 << 30
+
+Opened = TypeVar("Opened")
+
+
+def cache_bytes() -> int:
+    """How many bytes of bakes are kept here: `RELUME_STORAGE_CACHE_BYTES`."""
+    try:
+        return max(0, int(os.environ.get("RELUME_STORAGE_CACHE_BYTES", "")))
+    except ValueError:
+        return DEFAULT_CACHE_BYTES
+
+
+def push(path: Path) -> None:
+    """Store a scene's folder or a published bake, where there is a storage that lacks it. Raises StorageError."""
+    there = configured()
+    if there is None or there.has(_name(path)):
+        return
+    if path.suffix == ".zarr":
+        files = [*manifest_digests(path), MANIFEST_NAME]
+    else:
+        files = sorted(file.name for file in path.iterdir() if file.is_file() and not file.match(UNFINISHED))
+    there.put(_name(path), path, files)
+    if path.suffix == ".zarr":
+        _make_room(path.parent, there, 0)
+
+
+def fetched(path: Path) -> Path:
+    """A scene's folder or a bake's store, fetched where it is only in the storage; not there where nobody has it.
+
+    Args:
+        path: in the data directory.
+    Returns:
+        The same path.
+    Raises:
+        StorageError: the storage does not answer.
+    """
+    there = configured()
+    if there is None or path.exists():
+        return path
+    with _locked(path, "fetch", fcntl.LOCK_EX):
+        if path.exists():  # another process was faster
+            return path
+        if path.suffix == ".zarr":
+            _make_room(path.parent, there, there.num_bytes(_name(path)))
+        unfinished = path.with_name(UNFINISHED.replace("*", path.name))
+        if there.fetch(_name(path), unfinished):
+            unfinished.rename(path)
+    return path
+
+
+def open_kept(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
+    """Open a bake, fetched where it is only in the storage; it stays here for as long as what was opened lives.
+
+    Args:
+        path: of its store. open_store: what opens it; raises where there is none.
+    """
+    if configured() is None:
+        return open_store(path)
+    lock = _lock(path, "use", fcntl.LOCK_SH)
+    try:
+        opened = open_store(fetched(path))
+    except BaseException:
+        os.close(lock)
+        raise
+    weakref.finalize(opened, os.close, lock)
+    return opened
+
+
+def is_elsewhere(path: Path) -> bool:
+    """Whether the storage has a scene or a bake. Raises StorageError."""
+    there = configured()
+    return there is not None and there.has(_name(path))
+
+
+def forget(path: Path) -> None:
+    """Delete a scene or a bake from the storage; here, whoever asks deletes it. Raises StorageError."""
+    if (there := configured()) is not None:
+        there.delete(_name(path))
+
+
+def _make_room(bakes: Path, there: Remote, num_bytes: int) -> None:
+    """Let go of bakes until there is room for so many bytes more."""
+    stores = sorted(bakes.glob("[!.]*.zarr"), key=_last_used)
+    sizes = {store: sum(file.stat().st_size for file in store.rglob("*") if file.is_file()) for store in stores}
+    excess = sum(sizes.values()) + num_bytes - cache_bytes()
+    for store in stores:
+        if excess <= 0:
+            return
+        if there.has(_name(store)) and _let_go(store):
+            excess -= sizes[store]
+
+
+def _let_go(store: Path) -> bool:
+    """Delete a store unless somebody has it open."""
+    try:
+        lock = _lock(store, "use", fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    try:
+        shutil.rmtree(store, ignore_errors=True)
+    finally:
+        os.close(lock)
+    return True
+
+
+def _last_used(store: Path) -> float:
+    """When a store was opened last, or made."""
+    lock = _lock_path(store, "use")
+    return max(path.stat().st_mtime for path in (store, lock) if path.exists())
+
+
+def _name(path: Path) -> str:
+    return f"{path.parent.name}/{path.name}"
+
+
+def _lock_path(path: Path, what: str) -> Path:
+    return path.parent / "locks" / f"{path.stem}.{what}"
+
+
+def _lock(path: Path, what: str, how: int) -> int:
+    """An open file that holds a lock; closing it gives it up, as does the end of the process."""
+    file = _lock_path(path, what)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        fcntl.flock(descriptor, how)
+        if how == fcntl.LOCK_SH:
+            os.utime(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+@contextmanager
+def _locked(path: Path, what: str, how: int) -> Iterator[None]:
+    descriptor = _lock(path, what, how)
+    try:
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,177 @@
+"""Object storage: S3, or what speaks like it; or a folder that machines share.
+
+scenes/<id>/…       files, as in the data directory
+bakes/<id>.zarr/…   a Zarr store that other programs can open
+whole/<name>.json   the files of one of these with size and SHA-256; written last, so its presence means "complete"
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from datetime import timedelta
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import obstore
+from obstore.exceptions import BaseError
+from obstore.store import from_url
+
+from relume.errors import ParameterError, StorageError
+from relume.replacing import replacing
+
+SCHEMES = ("s3://", "file://")
+AT_ONCE = 4
+MAX_RETRIES, RETRY_S = 6, 20
+PIECE_BYTES = 8 << 20
+MAX_INDEX_BYTES = 64 << 20
+
+
+class Remote:
+    """One place in object storage; safe to use from several threads."""
+
+    def __init__(self, url: str) -> None:
+        """
+        Args:
+            url: s3://bucket/prefix, or file:///folder; keys and endpoint as AWS_… variables say.
+        Raises:
+            ParameterError: it is neither.
+        """
+        if not url.startswith(SCHEMES):
+            raise ParameterError("RELUME_STORAGE", url, "a URL such as s3://bucket/prefix or file:///folder")
+        options: dict[str, Any] = {"mkdir": True} if url.startswith("file") else _s3_options()
+        try:
+            self._store = from_url(url, **options)
+        except (BaseError, ValueError, OSError) as error:
+            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({str(error)[:200]})") from None
+
+    def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
+        """Store a folder under a name, whole or not at all; what was there under it is replaced.
+
+        Args:
+            name: such as scenes/<id>. folder: that holds the files.
+            files: their paths in it.
+        Raises:
+            StorageError: the storage does not answer, or refuses.
+        """
+        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+
+            def put(file: str) -> dict[str, Any]:
+                path = folder / file
+                with path.open("rb") as stream:
+                    sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+                obstore.put(self._store, f"{name}/{file}", path)
+                return {"path": file, "bytes": path.stat().st_size, "sha256": sha256}
+
+            entries = list(threads.map(put, files))
+            obstore.put(self._store, _index(name), json.dumps({"files": entries}).encode())
+
+    def has(self, name: str) -> bool:
+        """Whether a folder is there, whole. Raises StorageError."""
+        with _named_faults():
+            try:
+                obstore.head(self._store, _index(name))
+            except FileNotFoundError:
+                return False
+        return True
+
+    def fetch(self, name: str, folder: Path) -> bool:
+        """Fetch a folder, each file checked; those that are there from an interrupted fetch stay.
+
+        Args:
+            name: that it was stored under. folder: to fetch into; made where it is missing.
+        Returns:
+            Whether there is one of that name.
+        Raises:
+            StorageError: the storage does not answer, or what it has is damaged.
+        """
+        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+            entries = self._entries(name)
+            if entries is None:
+                return False
+            list(threads.map(lambda entry: self._fetch(name, folder, *entry), entries))
+        return True
+
+    def num_bytes(self, name: str) -> int:
+        """Size of a folder; 0 where there is none. Raises StorageError."""
+        with _named_faults():
+            return sum(size for _, size, _ in self._entries(name) or ())
+
+    def delete(self, name: str) -> None:
+        """Delete a folder, if it is there. Raises StorageError."""
+        with _named_faults():
+            keys = [_index(name), *(item["path"] for page in obstore.list(self._store, f"{name}/") for item in page)]
+            for key in keys:  # the index first: what is half deleted is not there
+                try:
+                    obstore.delete(self._store, key)
+                except FileNotFoundError:
+                    continue
+
+    def _entries(self, name: str) -> list[tuple[str, int, str]] | None:
+        try:
+            found = obstore.get(self._store, _index(name))
+        except FileNotFoundError:
+            return None
+        if found.meta["size"] > MAX_INDEX_BYTES:
+            raise StorageError(f"the list of {name} in the object storage is too long to be relume's")
+        try:
+            files = json.loads(bytes(found.bytes()))["files"]
+            entries = [(str(one["path"]), int(one["bytes"]), str(one["sha256"])) for one in files]
+        except (ValueError, KeyError, TypeError) as error:
+            raise StorageError(f"the list of {name} in the object storage is unreadable") from error
+        if any({"", ".", ".."} & set(path.split("/")) for path, _, _ in entries):
+            raise StorageError(f"the list of {name} in the object storage names files outside of it")
+        return entries
+
+    def _fetch(self, name: str, folder: Path, file: str, num_bytes: int, sha256: str) -> None:
+        target = folder / file
+        if target.exists() and target.stat().st_size == num_bytes:
+            return
+        target.parent.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256()
+        with replacing(target) as unfinished:
+            with unfinished.open("wb") as writing:
+                for piece in obstore.get(self._store, f"{name}/{file}").stream(min_chunk_size=PIECE_BYTES):
+                    digest.update(piece)
+                    writing.write(piece)
+            if digest.hexdigest() != sha256:
+                raise StorageError(f"{name}/{file} is damaged in the object storage; delete the bake and bake again")
+
+
+def _s3_options() -> dict[str, Any]:
+    """How S3 is asked; an endpoint without TLS is taken where somebody names one."""
+    is_plain = os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
+    waits = {"connect_timeout": timedelta(seconds=5), "timeout": timedelta(minutes=10)}
+    return {
+        "retry_config": {"max_retries": MAX_RETRIES, "retry_timeout": timedelta(seconds=RETRY_S)},
+        "client_options": {**waits, "allow_http": is_plain},
+    }
+
+
+def _index(name: str) -> str:
+    return f"whole/{name}.json"
+
+
+@contextmanager
+def _named_faults() -> Iterator[None]:
+    try:
+        yield
+    except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
+        line = str(error).split("\n")[0][:200]
+        raise StorageError(f"the object storage cannot be used now ({line}); try again in a while") from error
+
+
+@lru_cache(maxsize=4)
+def _remote(url: str) -> Remote:
+    return Remote(url)
+
+
+def configured() -> Remote | None:
+    """The storage that `RELUME_STORAGE` names, which worker processes inherit; None where there is none."""
+    url = os.environ.get("RELUME_STORAGE", "")
+    return _remote(url) if url else None
