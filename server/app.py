@@ -14,10 +14,13 @@ from relume.btf.shelf import STORE as BTFS
 from relume.environments.asset_store import STORE as ENVIRONMENTS
 from relume.measured.asset_store import STORE as MATERIALS
 from server import errors
+from server.access.gate import Gate
 from server.guard import Guard
 from server.library.opening import open_library
+from server.logs.requests import RequestIds
 from server.metrics import Metrics
 from server.routes import (
+    access,
     bakes,
     btf_works,
     btfs,
@@ -61,6 +64,7 @@ ROUTE_GROUPS = (
     looks,
     shares,
     session,
+    access,
     health,
 )
 
@@ -106,6 +110,8 @@ def create_app(
         responses=errors.OPENAPI_RESPONSES,
     )
     errors.install(app)
+    # the last that is added is the first that a request passes
+    app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(
         Guard,
         allowed_hosts=[*settings.allowed_hosts, settings.host],
@@ -114,6 +120,7 @@ def create_app(
         max_upload_bytes=settings.max_upload_bytes,
         count=metrics.count_request,
     )
+    app.add_middleware(RequestIds)
     for group in ROUTE_GROUPS:
         app.include_router(group.router)
     app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
@@ -136,5 +143,6 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
         log_level="warning",  # the access log would show resume tokens
         server_header=False,
+        proxy_headers=False,  # `server.access.identity` reads them, of proxies that are trusted
         timeout_graceful_shutdown=5,
     )

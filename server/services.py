@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -14,6 +13,8 @@ from starlette.requests import HTTPConnection
 
 from relume.environments.built_in import built_in
 from relume.resident import held_bytes
+from server.access import tables as access_tables  # noqa: F401  like those of the records
+from server.access.access import Access
 from server.apart.pool import Pool
 from server.apart.step import Batches
 from server.files.importers import Importers
@@ -46,12 +47,14 @@ class Services:
     """What routes use.
 
     Attributes:
+        access: who may do what, how much of it, and the audit.
         importers: read files.
-        session_slots: one is held by each live session. import_slots: one by each import that runs.
+        import_slots: one is held by each import that runs.
     """
 
     settings: Settings
     metrics: Metrics
+    access: Access
     bakes: BakeService
     looks: LookStore
     shares: ShareStore
@@ -64,7 +67,6 @@ class Services:
     thumbnails: Thumbnails
     live: SessionServices
     importers: Importers
-    session_slots: threading.BoundedSemaphore
     import_slots: asyncio.Semaphore
 
 
@@ -111,12 +113,14 @@ async def open_services(
     renders = RenderQueue(sessions, settings.data, batch.run, quota, scene_name)
     comparisons = ComparisonQueue(sessions, settings.data, batch.run, quota)
     btfs = BtfQueue(sessions, settings.data, batch.run, quota)
+    access = Access(sessions, settings)
     live = SessionServices(
         library=library,
         threads=threads,
         metrics=metrics,
         resumes=ResumeStore(settings.resume_seconds),
         bake_news=BakeNews(service.bakes),
+        access=access,
         ack_seconds=settings.ack_seconds,
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
@@ -143,6 +147,7 @@ async def open_services(
         yield Services(
             settings=settings,
             metrics=metrics,
+            access=access,
             bakes=service,
             looks=looks,
             shares=ShareStore(service.ledger.sessions),
@@ -155,7 +160,6 @@ async def open_services(
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
             live=live,
             importers=importers,
-            session_slots=threading.BoundedSemaphore(settings.max_sessions),
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
