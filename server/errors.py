@@ -29,6 +29,7 @@ CLOSE_PROTOCOL = 1002
 CLOSE_POLICY = 1008
 CLOSE_TOO_BIG = 1009
 CLOSE_INTERNAL = 1011
+CLOSE_RESTART = 1012
 CLOSE_BUSY = 1013
 CLOSE_LOGIN = 4401
 CLOSE_FORBIDDEN = 4403
@@ -74,6 +75,10 @@ class QuotaError(RelumeError):
     """Who calls has as much as one may."""
 
 
+class LeavingError(RelumeError):
+    """The server is being stopped; another, or it itself in a while, serves what was asked."""
+
+
 class RateError(RelumeError):
     """Who calls calls too often; `wait_s` from now there is room."""
 
@@ -101,6 +106,7 @@ class Row:
 TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
     (PreconditionFailedError, Row(412, "changed", "Changed in the meantime", CLOSE_POLICY)),

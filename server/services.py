@@ -35,6 +35,7 @@ from server.queues.work_queue import Quota
 from server.records import tables  # noqa: F401  its tables must be known before the database is opened
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
+from server.running.leave import Leave
 from server.settings import Settings
 from worker.executor import num_cores
 from worker.scenes import get_scene
@@ -47,13 +48,14 @@ class Services:
     """What routes use.
 
     Attributes:
-        access: who may do what, how much of it, and the audit.
+        leave: whether the server is taking it. access: who may do what, how much of it, and the audit.
         importers: read files.
         import_slots: one is held by each import that runs.
     """
 
     settings: Settings
     metrics: Metrics
+    leave: Leave
     access: Access
     bakes: BakeService
     looks: LookStore
@@ -93,6 +95,7 @@ def open_batches(settings: Settings, library: Library) -> Batches:
 async def open_services(
     settings: Settings,
     metrics: Metrics,
+    leave: Leave,
     open_library: OpenLibrary,
     bakes: OpenBakes,
     batches: OpenBatches,
@@ -121,7 +124,9 @@ async def open_services(
         resumes=ResumeStore(settings.resume_seconds),
         bake_news=BakeNews(service.bakes),
         access=access,
+        leave=leave,
         ack_seconds=settings.ack_seconds,
+        drain_seconds=settings.drain_seconds,
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
@@ -147,6 +152,7 @@ async def open_services(
         yield Services(
             settings=settings,
             metrics=metrics,
+            leave=leave,
             access=access,
             bakes=service,
             looks=looks,

@@ -82,6 +82,12 @@ class Settings(BaseSettings):
     )
     requests_at_once: int = Field(default=200, ge=1, description="calls of one user after a rest")
     audit_lines: int = Field(default=100_000, ge=1, description="changes that the audit keeps")
+    log_format: Literal["plain", "json"] = Field(default="plain", description="lines of the log: text, or JSON")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="warning", description="least level that is logged; info has a line for each request"
+    )
+    drain_seconds: float = Field(default=10.0, ge=0, description="how long sessions may take to leave after SIGTERM")
+    stop_seconds: float = Field(default=30.0, gt=0, description="how long all else may take to stop after that")
     allowed_origins: list[str] = Field(default=[], description="origins besides the server's own, as JSON list")
     allowed_hosts: list[str] = Field(
         default=["localhost", "127.0.0.1", "::1"],

@@ -45,6 +45,7 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.ProbeAnswer,
     protocol.CurveMessage,
     protocol.BakeMessage,
+    protocol.LeavingMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
     protocol.PatchOperation,

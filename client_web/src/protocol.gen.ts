@@ -409,6 +409,12 @@ export interface LadderBody {
   c: number[];
 }
 
+/** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
+export interface LeavingMessage {
+  type: "leaving";
+  seconds: number;
+}
+
 /** A saved look in the list of them. */
 export interface LookEntry {
   name: string;
@@ -722,4 +728,5 @@ export type ServerMessage =
   | ProblemMessage
   | ProbeAnswer
   | CurveMessage
-  | BakeMessage;
+  | BakeMessage
+  | LeavingMessage;

@@ -135,6 +135,22 @@ test("who may only look sends no edits and takes hold of nothing", () => {
   ]);
 });
 
+test("a server that is being stopped is left, and the look goes to the one that comes", () => {
+  greet();
+  const left = socket();
+  left.says({ type: "leaving", seconds: 10 });
+  expect(handlers.connection).toHaveBeenLastCalledWith("reconnecting", expect.any(Number));
+  const look = edit(LOOK, SIGMA, 0.3);
+  left.onclose({ code: 1000, reason: "" });
+  vi.advanceTimersByTime(1000);
+  expect(FakeSocket.opened).toHaveLength(2);
+  socket().hello(LOOK, 0);
+  session.want({ look, hand: null, solo: null, inputTime: 0 });
+  animate();
+  expect(socket().edits.at(-1)).toMatchObject({ patch: [{ op: "replace", path: SIGMA, value: 0.3 }] });
+  expect(left.edits).toEqual([]);
+});
+
 test("a session begins with what it is asked to, each time it connects", () => {
   new Session("b1", handlers, { look: "Red & blue" }).connect();
   expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?look=Red+%26+blue");

@@ -37,6 +37,11 @@ class Quotas:
         self._lock, self._open = threading.Lock(), Counter[str]()
         self.deciding = threading.Lock()
 
+    @property
+    def num_sessions(self) -> int:
+        """Live sessions of all."""
+        return self._open.total()
+
     @contextmanager
     def session(self, who: str) -> Iterator[None]:
         """One live session of somebody. Raises BusyError, QuotaError: enough are open."""

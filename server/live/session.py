@@ -32,8 +32,10 @@ from server.live.state.resume import ResumeStore
 from server.live.state.session_state import SessionState
 from server.live.state.shown_views import ShownViews
 from server.live.state.visit import Visit
+from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
-from server.wire.protocol import CameraInfo, HelloMessage, ViewInfo
+from server.running.leave import Leave
+from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, ViewInfo
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
@@ -51,7 +53,9 @@ class SessionServices:
     resumes: ResumeStore
     bake_news: BakeNews
     access: Access
+    leave: Leave
     ack_seconds: float
+    drain_seconds: float
 
 
 async def serve(services: SessionServices, websocket: WebSocket, bake: str, transfer: Opened, visit: Visit) -> None:
@@ -66,10 +70,12 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
     window = FrameWindow(services.ack_seconds)
     pending = PendingRequests(look.target())
     state = SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller)
-    token = services.resumes.open(bake, look, shown)
+    token, session = services.resumes.open(bake, look, shown), secrets.token_hex(8)
+    SESSION.set(session)
+    BAKE.set(bake)
     services.metrics.sessions.inc()
     try:
-        await socket.send(_hello(bake, state, token, kept is not None))
+        await socket.send(_hello(session, bake, state, token, kept is not None))
         await _run(services, websocket, bake, state)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
@@ -91,11 +97,11 @@ async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -
         await asyncio.shield(run_sync(audit.add, change))
 
 
-def _hello(bake: str, state: SessionState, token: str, resumed: bool) -> HelloMessage:
+def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bool) -> HelloMessage:
     transfer, look, shown = state.transfer, state.look, state.shown
     views = [_view_info(view, transfer) for view in transfer.views.values()]
     return HelloMessage(
-        session=secrets.token_hex(8),
+        session=session,
         bake=bake,
         method=transfer.method,
         axes=sorted(axis.value for axis in transfer.axes),
@@ -124,12 +130,13 @@ def _view_info(view: AnyView, transfer: Opened) -> ViewInfo:
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:
-    """Run reception, frame loop, bake news and a watch on the token until one of them ends; raise what ended it."""
+    """Run all parts, and a watch on the token, until one of them ends; raise what ended it."""
     tasks = [
         asyncio.create_task(Reception(websocket, state).run()),
         asyncio.create_task(FrameLoop(state, services.library, services.threads).run()),
         asyncio.create_task(services.bake_news.tell(state.socket, bake, state.transfer.scene_id)),
         asyncio.create_task(services.access.until_revoked(state.caller)),
+        asyncio.create_task(_say_goodbye(services, state.socket)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -137,6 +144,13 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
             task.result()
     finally:
         await _end(tasks)
+
+
+async def _say_goodbye(services: SessionServices, socket: ClientSocket) -> None:
+    """Tell the client when the server takes leave; it goes when it likes to."""
+    await services.leave.taken()
+    await socket.send(LeavingMessage(seconds=services.drain_seconds))
+    await asyncio.Event().wait()
 
 
 async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:

@@ -23,7 +23,8 @@ async def livez() -> dict[str, str]:
 
 @router.get("/readyz")
 def readyz(services: Shared) -> dict[str, str]:
-    """The database can be read, and the data directory has room."""
+    """The database can be read, the data directory has room, and the server is not being stopped."""
+    services.leave.check()
     with services.bakes.ledger.sessions() as session:
         session.execute(select(BakeRow.id).limit(1))
     free = shutil.disk_usage(services.settings.data).free

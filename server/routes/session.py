@@ -44,6 +44,7 @@ async def session(websocket: WebSocket, bake: str) -> None:
 
 
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
+    services.leave.check()
     caller = caller_of(websocket)
     with services.access.quotas.session(caller.name):
         status = await run_in_threadpool(ready_bake, services, bake)

@@ -307,7 +307,17 @@ class BakeMessage(Message):
     seconds_left: float | None
 
 
-ServerMessage = HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage
+class LeavingMessage(Message):
+    """server → client: the server is being stopped. Open the session again, there or on another server, within so many
+    seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
+
+    type: Literal["leaving"] = "leaving"
+    seconds: float
+
+
+ServerMessage = (
+    HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage | LeavingMessage
+)
 
 
 class FrameTimes(Message):

@@ -61,6 +61,7 @@ export class Session {
       probe: (message) => handlers.probe(message),
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
+      leaving: () => this.socket.moveOn(),
     };
   }
 

@@ -54,9 +54,10 @@ export class LiveSocket {
     this.resume = resume;
   }
 
-  private lost(socket: WebSocket, event: CloseEvent): void {
+  private lost(socket: WebSocket, event: Pick<CloseEvent, "code" | "reason">): void {
     if (this.closed || socket !== this.socket) return;
     this.greeted = false;
+    this.socket = null;
     if (FINAL_CODES.has(event.code)) {
       this.close();
       this.handlers.ended(event.reason || `code ${event.code}`, event.code);
@@ -66,6 +67,14 @@ export class LiveSocket {
     if (this.attempt > MAX_RESUMES) this.resume = null;
     this.handlers.connection("reconnecting", wait);
     this.retry = window.setTimeout(() => this.connect(), wait);
+  }
+
+  /** The server is being stopped: leave it, and try until it, or another in its place, is there. */
+  moveOn(): void {
+    const leaving = this.socket;
+    if (leaving === null || this.closed) return;
+    leaving.close(1000);
+    this.lost(leaving, { code: 1012, reason: "" });
   }
 
   /** Try at once instead of waiting for the backoff. */
