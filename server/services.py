@@ -21,6 +21,7 @@ from server.files.importers import Importers
 from server.files.importing import remove_stray_uploads
 from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
+from server.library.disk import free_bytes
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
@@ -30,6 +31,7 @@ from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
 from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
+from server.queues.counting import count_work
 from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
 from server.records import tables  # noqa: F401  its tables must be known before the database is opened
@@ -139,6 +141,8 @@ async def open_services(
             "environments": lambda: held_bytes(built_in),
         }
     )
+    metrics.watch_work(lambda: count_work(sessions))
+    metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)

@@ -13,7 +13,7 @@ from relume.errors import NotFoundError, RelumeError, VersionMismatchError
 from relume.look import complete
 from relume.picture.transfer import Opened
 from server.access.roles import caller_of
-from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of
+from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of, row_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
 from server.live.state.visit import Visit
@@ -40,6 +40,7 @@ async def session(websocket: WebSocket, bake: str) -> None:
     except WebSocketDisconnect:
         return
     except (RelumeError, OSError) as error:
+        services.metrics.refused_sessions.labels(row_of(error).slug).inc()
         await socket.close(close_code_of(error), problem_of(error).detail)
 
 
