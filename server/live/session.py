@@ -18,7 +18,7 @@ from relume.picture.transfer import AnyView, Eyes, Opened
 from server.access.access import Access
 from server.access.audit import Audit, Change
 from server.access.roles import Caller
-from server.errors import close_code_of, problem_of
+from server.errors import close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
@@ -36,6 +36,7 @@ from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
 from server.running.leave import Leave
 from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, ViewInfo
+from worker.database.faults import AWAY, told
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
@@ -79,7 +80,9 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
         await _run(services, websocket, bake, state)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
-    except RelumeError as error:
+    except (RelumeError, OSError, *AWAY) as error:
+        if row_of(error).status >= 500:
+            log.error("session of bake %s ends (%s)", bake, told(error))
         await socket.close(close_code_of(error), problem_of(error).detail)
     except Exception as error:
         log.exception("session of bake %s ends by a defect", bake)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import time
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from relume.errors import DatabaseDamagedError
 from server.access.access import Access
 from server.access.roles import Role
 from server.access.rules import RULES, SOCKET
@@ -183,3 +185,30 @@ def test_names_of_tokens_are_unique_while_they_open(access: Access) -> None:
         access.tokens.add("Bob", "root")
     with pytest.raises(Exception, match="no valid token 'Eve'"):
         access.tokens.revoke("Eve")
+
+
+def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
+    client: TestClient, bearer: Bearer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    headers = bearer("edit")
+
+    def damaged(*_: object) -> None:
+        raise DatabaseDamagedError("database disk image is malformed")
+
+    monkeypatch.setattr("server.access.tokens.TokenStore._known", damaged)
+    caplog.clear()
+    answer = client.get("/api/scenes", headers=headers)
+    assert answer.status_code == 503
+    assert answer.json()["type"] == "urn:relume:problem:database"
+    assert client.get("/livez").status_code == 200
+    (line,) = [record for record in caplog.records if record.name.startswith("server.access")]
+    assert "who calls cannot be told" in line.getMessage()
+    assert not line.exc_info
+
+
+def test_open_sessions_go_on_while_the_database_is_away(access: Access, monkeypatch: pytest.MonkeyPatch) -> None:
+    def away(*_: object) -> None:
+        raise DatabaseDamagedError("database disk image is malformed")
+
+    monkeypatch.setattr(access.tokens, "is_valid", away)
+    assert asyncio.run(access._is_valid("0123456789ab"))
