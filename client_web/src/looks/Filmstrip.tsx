@@ -75,10 +75,10 @@ function SavedTile({ saved }: { saved: SavedLook }) {
         <IconButton
           icon="save"
           label={`Save the live look over ${saved.name}`}
-          disabled={shown}
+          disabled={shown || !mayEdit.value}
           onClick={() => look.value && void updateLook(saved, look.value)}
         />
-        <IconButton icon="trash" label={`Delete ${saved.name}`} onClick={() => void deleteLook(saved)} />
+        <IconButton icon="trash" label={`Delete ${saved.name}`} disabled={!mayEdit.value} onClick={() => void deleteLook(saved)} />
       </span>
       <Name saved={saved} />
     </li>
