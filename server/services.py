@@ -132,18 +132,10 @@ async def open_services(
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
-    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
-    metrics.watch_holders(
-        {
-            "frozen_cache": library.cache_used_bytes,
-            "open_bakes": lambda: held_bytes(transfers.opened),
-            "bake_tasks": kept_bytes,
-            "environments": lambda: held_bytes(built_in),
-        }
-    )
+    _watch_memory(metrics, library, transfers)
+    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     metrics.watch_work(lambda: count_work(sessions))
     metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
-    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     importers = Importers(settings.waiting_importers)
@@ -180,6 +172,19 @@ async def open_services(
         await asyncio.to_thread(batch.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)
+
+
+def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
+    """Have it shown who holds memory in this process."""
+    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
+    metrics.watch_holders(
+        {
+            "frozen_cache": library.cache_used_bytes,
+            "open_bakes": lambda: held_bytes(transfers.opened),
+            "bake_tasks": kept_bytes,
+            "environments": lambda: held_bytes(built_in),
+        }
+    )
 
 
 def services(connection: HTTPConnection) -> Services:

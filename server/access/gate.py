@@ -82,11 +82,11 @@ class Gate:
 
     async def _known(self, scope: Scope) -> Caller:
         """Who calls, if not too often."""
+        access = self._access()
         try:
-            access = self._access()
             caller = await access.identity.caller(scope, access.tokens)
         except LoginError:
-            self._count(scope["client"][0] if scope.get("client") else "")
+            self._count(access.identity.address(scope))
             raise
         self._count(caller.shown)
         return caller

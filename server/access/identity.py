@@ -36,10 +36,7 @@ class Identity:
         Raises:
             LoginError: a token was sent in the header that opens nothing.
         """
-        headers = Headers(scope=scope)
-        peer = scope["client"][0] if scope.get("client") else ""
-        is_proxied = self._is_trusted(peer)
-        address = self._address(headers, peer) if is_proxied else peer
+        headers, address = Headers(scope=scope), self.address(scope)
         if not self._is_asked:
             return Caller("", Role.ADMIN, address, "open")
         scheme, _, sent = headers.get("authorization", "").partition(" ")
@@ -50,16 +47,21 @@ class Identity:
                     "this token opens nothing: it is misspelt, has run out or was revoked; ask for another"
                 )
             return found
-        if is_proxied and (named := self._by_proxy(headers, address)) is not None:
+        if self._is_trusted(_peer(scope)) and (named := self._by_proxy(headers, address)) is not None:
             return named
         if (cookie := cookie_of(headers)) and (found := await self._by_token(cookie, address, tokens)) is not None:
             return found
         return Caller("", Role.ANYONE, address, "nobody")
 
+    def address(self, scope: Scope) -> str:
+        """Of the client: who has connected, or where that is a trusted proxy whom it has added last."""
+        peer = _peer(scope)
+        told = Headers(scope=scope).get("x-forwarded-for", "") if self._is_trusted(peer) else ""
+        return told.split(",")[-1].strip()[:64] or peer
+
     def is_secure(self, scope: Scope) -> bool:
         """Whether the browser speaks TLS, to the server or to a trusted proxy."""
-        peer = scope["client"][0] if scope.get("client") else ""
-        told = Headers(scope=scope).get("x-forwarded-proto", "") if self._is_trusted(peer) else ""
+        told = Headers(scope=scope).get("x-forwarded-proto", "") if self._is_trusted(_peer(scope)) else ""
         return "https" in (scope["scheme"], told.split(",")[-1].strip())
 
     async def _by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
@@ -80,10 +82,10 @@ class Identity:
             return False
         return any(address in network for network in self._proxies)
 
-    def _address(self, headers: Headers, peer: str) -> str:
-        """Of the client: the last that was forwarded, which the proxy itself has added."""
-        last = headers.get("x-forwarded-for", "").split(",")[-1].strip()
-        return last[:64] or peer
+
+def _peer(scope: Scope) -> str:
+    """Address of whoever has connected; empty where it has none."""
+    return scope["client"][0] if scope.get("client") else ""
 
 
 def cookie_of(headers: Headers) -> str:

@@ -160,6 +160,12 @@ class TestProxy:
             told = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
             assert other.get("/api/scenes", headers=told).status_code == 401
 
+    def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: Access) -> None:
+        told = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
+        for each, name in ((self.at(client, "10.1.2.3"), "Red"), (client, "Blue")):
+            each.put(f"/api/looks/{name}", json={}, headers={**told, **bearer("edit", name)})
+        assert [line.address for line in access.audit.list()] == ["testclient", "192.0.2.7"]
+
     def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: Access) -> None:
         token = {"token": access.tokens.add("Ann", "edit")}
         told = {"X-Forwarded-Proto": "https"}

@@ -49,6 +49,15 @@ def test_of_lines_that_fit_the_strictest_counts() -> None:
     assert needed("POST", "/api/scenes/0123456789abcdef/finder") is Role.VIEW
 
 
+def test_an_answer_of_200_says_that_nothing_was_changed() -> None:
+    """Which is how the audit tells changes: each call that makes one has another answer for it."""
+    paths = create_app(Settings()).openapi()["paths"]
+    for path, each in paths.items():
+        for method, operation in each.items():
+            if is_change(method.upper(), path):
+                assert {"201", "202", "204"} & set(operation["responses"]), (method, path)
+
+
 def test_changes_are_what_others_see() -> None:
     assert is_change("PUT", "/api/looks/Red")
     assert not is_change("POST", "/api/models/albedo")
