@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable
@@ -41,6 +42,15 @@ class Process(uvicorn.Server):
         self._drain_seconds, self._stop_seconds = drain_seconds, stop_seconds
         self._until_s: float | None = None
         self._signal: int | None = None
+        self._timer = threading.Timer(stop_seconds, self._give_up)
+        self._timer.daemon = True
+
+    def run(self, sockets: list[socket.socket] | None = None) -> None:
+        """Run until it is stopped; blocks."""
+        try:
+            super().run(sockets)
+        finally:
+            self._timer.cancel()  # whoever ran it may go on
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal has come: the first SIGTERM is seen to by `on_tick`, on the event loop."""
@@ -50,7 +60,10 @@ class Process(uvicorn.Server):
             super().handle_exit(sig, frame)
 
     async def on_tick(self, counter: int) -> bool:
-        """Every tenth of a second: take leave where that is asked for, and end when all have left."""
+        """Every tenth of a second: take leave where that is asked for, and end when all have left.
+
+        What does not stop in time after that is left: the ledger knows what is finished.
+        """
         if self._signal is not None and not self.should_exit:
             if self._until_s is None:
                 self._until_s = time.monotonic() + self._drain_seconds
@@ -60,14 +73,8 @@ class Process(uvicorn.Server):
                 super().handle_exit(self._signal, None)
         should_exit = await super().on_tick(counter)
         if should_exit:
-            self._watch_the_end()
+            self._timer.start()
         return should_exit
-
-    def _watch_the_end(self) -> None:
-        """What does not stop in time is left: the ledger knows what is finished."""
-        timer = threading.Timer(self._stop_seconds, self._give_up)
-        timer.daemon = True
-        timer.start()
 
     def _give_up(self) -> None:
         text = "not stopped after %g s; ending all the same, what was under way goes on at the next start"

@@ -86,26 +86,44 @@ def test_a_second_signal_waits_for_nobody(running: Running) -> None:
         assert not running.thread.is_alive()
 
 
-def test_what_does_not_stop_is_ended(caplog: pytest.LogCaptureFixture) -> None:
-    ended, may_go = threading.Event(), threading.Event()
+class Stubborn:
+    """A process whose app stops when `may_stop` says so; `ended`: it was ended by force."""
 
-    async def stubborn(scope: Any, receive: Any, send: Any) -> None:
+    def __init__(self) -> None:
+        self.ended, self.may_stop = threading.Event(), threading.Event()
+        config = uvicorn.Config(self._app, port=0, interface="asgi3", lifespan="on", log_config=None)
+        limits = {"drain_seconds": 5.0, "stop_seconds": 0.2}
+        leave, end = Leave(), lambda _: self.ended.set()
+        self.process = Process(config, leave=leave, num_sessions=lambda: 0, end=end, **limits)
+        self.thread = threading.Thread(target=self.process.run)
+
+    def stop(self) -> None:
+        self.thread.start()
+        while not self.process.started:
+            time.sleep(0.01)
+        self.process.handle_exit(signal.SIGTERM, None)
+
+    async def _app(self, scope: Any, receive: Any, send: Any) -> None:
         await receive()
         await send({"type": "lifespan.startup.complete"})
         await receive()
-        while not may_go.is_set():
+        while not self.may_stop.is_set():
             await asyncio.sleep(0.01)
         await send({"type": "lifespan.shutdown.complete"})
 
-    config = uvicorn.Config(stubborn, port=0, log_config=None)
-    limits = {"drain_seconds": 5.0, "stop_seconds": 0.05}
-    process = Process(config, leave=Leave(), num_sessions=lambda: 0, end=lambda _: ended.set(), **limits)
-    thread = threading.Thread(target=process.run)
-    thread.start()
-    while not process.started:
-        time.sleep(0.01)
-    process.handle_exit(signal.SIGTERM, None)
-    assert ended.wait(30)
-    assert "not stopped after 0.05 s" in caplog.text
-    may_go.set()
-    thread.join()
+
+def test_what_does_not_stop_is_ended(caplog: pytest.LogCaptureFixture) -> None:
+    stubborn = Stubborn()
+    stubborn.stop()
+    assert stubborn.ended.wait(30)
+    assert "not stopped after 0.2 s" in caplog.text
+    stubborn.may_stop.set()
+    stubborn.thread.join()
+
+
+def test_what_stops_in_time_is_left_alone() -> None:
+    willing = Stubborn()
+    willing.may_stop.set()
+    willing.stop()
+    willing.thread.join()
+    assert not willing.ended.wait(0.4)
