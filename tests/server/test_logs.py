@@ -23,7 +23,8 @@ def _as_it_was() -> Iterator[None]:
     root = logging.getLogger()
     before = root.handlers, root.level
     yield
-    root.handlers, root.level = before
+    root.handlers = before[0]
+    root.setLevel(before[1])  # which forgets what loggers remember of it
 
 
 def logged(capsys: pytest.CaptureFixture[str], form: Format, say: Any) -> str:
