@@ -11,6 +11,7 @@ import typer
 from typer.exceptions import TyperException
 
 from cli import (
+    audit,
     bake,
     bench,
     demo,
@@ -20,6 +21,7 @@ from cli import (
     reference,
     render,
     serve,
+    tokens,
     worker,
 )
 from cli.keeping import backup, restore
@@ -47,6 +49,12 @@ app.command("backup")(backup.backup)
 app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
+app.command("audit")(audit.audit)
+token = typer.Typer(help="Who may do what, where the server asks.", no_args_is_help=True, rich_markup_mode=None)
+token.command("add")(tokens.token_add)
+token.command("list")(tokens.token_list)
+token.command("revoke")(tokens.token_revoke)
+app.add_typer(token, name="token")
 materials = typer.Typer(
     help="Measured materials, and textures that look different from every side.",
     no_args_is_help=True,

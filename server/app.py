@@ -14,10 +14,14 @@ from relume.btf.shelf import STORE as BTFS
 from relume.environments.asset_store import STORE as ENVIRONMENTS
 from relume.measured.asset_store import STORE as MATERIALS
 from server import errors
+from server.access.gate import Gate
 from server.guard import Guard
 from server.library.opening import open_library
+from server.logs.requests import RequestIds
+from server.logs.setting_up import set_up
 from server.metrics import Metrics
 from server.routes import (
+    access,
     bakes,
     btf_works,
     btfs,
@@ -38,6 +42,8 @@ from server.routes import (
     shares,
     surface,
 )
+from server.running.leave import Leave
+from server.running.process import Process
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
@@ -61,6 +67,7 @@ ROUTE_GROUPS = (
     looks,
     shares,
     session,
+    access,
     health,
 )
 
@@ -81,7 +88,7 @@ def create_app(
         clock: seconds, by which things that nobody uses grow old.
     """
     settings = settings or Settings()
-    metrics = Metrics()
+    metrics, leave = Metrics(), Leave()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -90,7 +97,8 @@ def create_app(
             BTFS.at(btfs_path(settings.data)),
             ENVIRONMENTS.at(environments_path(settings.data)),
         ):
-            async with open_services(settings, metrics, open_library, open_bakes, open_batches, clock) as services:
+            opening = open_services(settings, metrics, leave, open_library, open_bakes, open_batches, clock)
+            async with opening as services:
                 app.state.services = services
                 yield
                 del app.state.services
@@ -105,7 +113,10 @@ def create_app(
         lifespan=lifespan,
         responses=errors.OPENAPI_RESPONSES,
     )
+    app.state.leave = leave
     errors.install(app)
+    # the last that is added is the first that a request passes
+    app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(
         Guard,
         allowed_hosts=[*settings.allowed_hosts, settings.host],
@@ -114,6 +125,7 @@ def create_app(
         max_upload_bytes=settings.max_upload_bytes,
         count=metrics.count_request,
     )
+    app.add_middleware(RequestIds)
     for group in ROUTE_GROUPS:
         app.include_router(group.router)
     app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
@@ -122,7 +134,19 @@ def create_app(
 
 def serve(settings: Settings) -> None:
     """Run the server until it is stopped; blocks."""
-    uvicorn.Server(configure(create_app(settings), settings)).run()
+    set_up(settings.log_format, settings.log_level)
+    stoppable(create_app(settings), settings).run()
+
+
+def stoppable(app: FastAPI, settings: Settings) -> Process:
+    """The server that runs the app, and takes leave of its sessions before it ends."""
+    return Process(
+        configure(app, settings),
+        leave=app.state.leave,
+        num_sessions=lambda: app.state.services.access.quotas.num_sessions,
+        drain_seconds=settings.drain_seconds,
+        stop_seconds=settings.stop_seconds,
+    )
 
 
 def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
@@ -134,7 +158,9 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         loop="uvloop",
         ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
-        log_level="warning",  # the access log would show resume tokens
+        log_config=None,  # `server.logs` has set it up
+        access_log=False,  # it would show resume tokens
         server_header=False,
+        proxy_headers=False,  # `server.access.identity` reads them, of proxies that are trusted
         timeout_graceful_shutdown=5,
     )

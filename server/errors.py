@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -29,7 +30,10 @@ CLOSE_PROTOCOL = 1002
 CLOSE_POLICY = 1008
 CLOSE_TOO_BIG = 1009
 CLOSE_INTERNAL = 1011
+CLOSE_RESTART = 1012
 CLOSE_BUSY = 1013
+CLOSE_LOGIN = 4401
+CLOSE_FORBIDDEN = 4403
 CLOSE_NOT_FOUND = 4404
 CLOSE_NO_ACKNOWLEDGEMENT = 4408
 CLOSE_NOT_READY = 4409
@@ -60,6 +64,30 @@ class ForbiddenOriginError(RelumeError):
     """A page of another site called."""
 
 
+class LoginError(RelumeError):
+    """Who calls has to say who they are."""
+
+
+class ForbiddenError(RelumeError):
+    """Who calls may not do that."""
+
+
+class QuotaError(RelumeError):
+    """Who calls has as much as one may."""
+
+
+class LeavingError(RelumeError):
+    """The server is being stopped; another, or it itself in a while, serves what was asked."""
+
+
+class RateError(RelumeError):
+    """Who calls calls too often; `wait_s` from now there is room."""
+
+    def __init__(self, message: str, wait_s: float) -> None:
+        super().__init__(message)
+        self.wait_s = wait_s
+
+
 @dataclass(frozen=True)
 class Row:
     """What a client is told about one kind of exception.
@@ -79,11 +107,16 @@ class Row:
 TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
     (PreconditionFailedError, Row(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
     (PreconditionRequiredError, Row(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
     (ForbiddenOriginError, Row(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
+    (LoginError, Row(401, "login", "Log in first", CLOSE_LOGIN)),
+    (ForbiddenError, Row(403, "forbidden", "Not allowed to you", CLOSE_FORBIDDEN)),
+    (QuotaError, Row(429, "quota", "As much as one may have", CLOSE_BUSY)),
+    (RateError, Row(429, "rate", "Too many calls", CLOSE_BUSY)),
     (relume_errors.SceneError, Row(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
     (relume_errors.MaterialError, Row(422, "material", "Measured material cannot be used", CLOSE_INTERNAL)),
     (relume_errors.ParameterError, Row(422, "parameter", "Value not allowed", CLOSE_POLICY)),
@@ -134,6 +167,13 @@ def problem_of(error: Exception) -> Problem:
     return Problem(type=f"urn:relume:problem:{row.slug}", title=row.title, status=row.status, detail=detail, **extra)
 
 
+def headers_of(error: Exception) -> dict[str, str]:
+    """What HTTP wants said beside the body."""
+    if isinstance(error, LoginError):
+        return {"WWW-Authenticate": "Bearer"}
+    return {"Retry-After": str(math.ceil(error.wait_s))} if isinstance(error, RateError) else {}
+
+
 def validation_problem(errors: Sequence[Any], status: int = 422) -> Problem:
     """The body for a request or message that does not have the declared form."""
     places = [
@@ -170,7 +210,7 @@ def install(app: FastAPI) -> None:
             database_away.meet(error)
         elif row_of(error).status >= 500:
             log.error("%s: %s", type(error).__name__, told(error))
-        return problem_response(problem_of(error))
+        return problem_response(problem_of(error), headers_of(error))
 
     async def on_defect(_: Request, error: Exception) -> JSONResponse:
         return problem_response(problem_of(error))

@@ -10,6 +10,7 @@ request and its WebSocket through. None counts the bytes of a body.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from urllib.parse import urlsplit
 
@@ -60,7 +61,7 @@ class Guard:
         allowed_origins: Sequence[str],
         max_body_bytes: int,
         max_upload_bytes: int,
-        count: Callable[[str, int], None],
+        count: Callable[[str, int, float], None],
     ) -> None:
         self._app, self._count = app, count
         self._allowed_hosts, self._allowed_origins = allowed_hosts, allowed_origins
@@ -99,9 +100,11 @@ class Guard:
     def _dressed(self, scope: Scope, send: Send) -> Send:
         """Adds the safe headers to whatever is answered, and counts it."""
 
+        start_s = time.perf_counter()
+
         async def dressed(message: Message) -> None:
             if message["type"] == "http.response.start":
-                self._count(scope["method"], message["status"])
+                self._count(scope["method"], message["status"], time.perf_counter() - start_s)
                 headers = MutableHeaders(scope=message)
                 for name, value in SECURITY_HEADERS.items():
                     headers.setdefault(name, value)

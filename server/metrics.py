@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.registry import Collector
 
 from relume.memory import Holder
+from worker.database.faults import AWAY
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"})
 LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.060, 0.100, 0.250, 1.0, 4.0)
@@ -28,8 +30,23 @@ class _MemoryCollector(Collector):
         yield found
 
 
+class _WorkCollector(Collector):
+    """How much long work waits and runs; nothing while the database is away."""
+
+    def __init__(self, counted: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+        self._counted = counted
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """One gauge."""
+        found = GaugeMetricFamily("relume_work", "Long work by kind and state", labels=["kind", "state"])
+        with suppress(*AWAY):
+            for labels, count in self._counted().items():
+                found.add_metric(labels, count)
+        yield found
+
+
 class Metrics:
-    """The figures by name."""
+    """The figures by name, as Prometheus wants names: units are seconds and bytes, counters end in _total."""
 
     def __init__(self) -> None:
         self.registry = registry = CollectorRegistry()
@@ -39,6 +56,13 @@ class Metrics:
         self.edits = Counter("relume_edits", "Edits received", ["outcome"], registry=registry)
         self.bakes = Counter("relume_bakes", "Bakes submitted", registry=registry)
         self.requests = Counter("relume_http_requests", "HTTP requests", ["method", "status"], registry=registry)
+        self.refused_sessions = Counter(
+            "relume_refused_sessions", "Sessions that were not opened", ["reason"], registry=registry
+        )
+        self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
+        self._leaving = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
+        self._free = Gauge("relume_disk_free_bytes", "Room on the disk of the data directory", registry=registry)
+        self._least_free = Gauge("relume_disk_floor_bytes", "Room below which /readyz says no", registry=registry)
         self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame handed over")
         self.update = self._histogram("relume_frame_update_seconds", "Updating the picture")
         self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
@@ -64,8 +88,19 @@ class Metrics:
         """Where the memory of the server's own worker processes is read from."""
         self._workers.set_function(resident_bytes)
 
-    def count_request(self, method: str, status: int) -> None:
+    def watch_work(self, counted: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+        """Where it is read from how much long work there is, by kind and state."""
+        self.registry.register(_WorkCollector(counted))
+
+    def watch_readiness(self, is_leaving: Callable[[], bool], free_bytes: Callable[[], int], least_bytes: int) -> None:
+        """Where it is read from what /readyz asks."""
+        self._leaving.set_function(is_leaving)
+        self._free.set_function(free_bytes)
+        self._least_free.set(least_bytes)
+
+    def count_request(self, method: str, status: int, seconds: float) -> None:
         """One HTTP response; a method that nobody knows must not become a label of its own."""
+        self.request_seconds.observe(seconds)
         self.requests.labels(method if method in METHODS else "other", str(status)).inc()
 
     def _histogram(self, name: str, text: str) -> Histogram:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -14,12 +13,15 @@ from starlette.requests import HTTPConnection
 
 from relume.environments.built_in import built_in
 from relume.resident import held_bytes
+from server.access import tables as access_tables  # noqa: F401  like those of the records
+from server.access.access import Access
 from server.apart.pool import Pool
 from server.apart.step import Batches
 from server.files.importers import Importers
 from server.files.importing import remove_stray_uploads
 from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
+from server.library.disk import free_bytes
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
@@ -29,10 +31,12 @@ from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
 from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
+from server.queues.counting import count_work
 from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
+from server.running.leave import Leave
 from server.settings import Settings
 from worker.executor import num_cores
 from worker.scenes import get_scene
@@ -45,12 +49,15 @@ class Services:
     """What routes use.
 
     Attributes:
+        leave: whether the server is taking it. access: who may do what, how much of it, and the audit.
         importers: read files.
-        session_slots: one is held by each live session. import_slots: one by each import that runs.
+        import_slots: one is held by each import that runs.
     """
 
     settings: Settings
     metrics: Metrics
+    leave: Leave
+    access: Access
     bakes: BakeService
     looks: LookStore
     shares: ShareStore
@@ -63,7 +70,6 @@ class Services:
     thumbnails: Thumbnails
     live: SessionServices
     importers: Importers
-    session_slots: threading.BoundedSemaphore
     import_slots: asyncio.Semaphore
 
 
@@ -90,6 +96,7 @@ def open_batches(settings: Settings, library: Library) -> Batches:
 async def open_services(
     settings: Settings,
     metrics: Metrics,
+    leave: Leave,
     open_library: OpenLibrary,
     bakes: OpenBakes,
     batches: OpenBatches,
@@ -110,26 +117,24 @@ async def open_services(
     renders = RenderQueue(sessions, settings.data, batch.run, quota, scene_name)
     comparisons = ComparisonQueue(sessions, settings.data, batch.run, quota)
     btfs = BtfQueue(sessions, settings.data, batch.run, quota)
+    access = Access(sessions, settings)
     live = SessionServices(
         library=library,
         threads=threads,
         metrics=metrics,
         resumes=ResumeStore(settings.resume_seconds),
         bake_news=BakeNews(service.bakes),
+        access=access,
+        leave=leave,
         ack_seconds=settings.ack_seconds,
+        drain_seconds=settings.drain_seconds,
     )
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
-    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
-    metrics.watch_holders(
-        {
-            "frozen_cache": library.cache_used_bytes,
-            "open_bakes": lambda: held_bytes(transfers.opened),
-            "bake_tasks": kept_bytes,
-            "environments": lambda: held_bytes(built_in),
-        }
-    )
+    _watch_memory(metrics, library, transfers)
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
+    metrics.watch_work(lambda: count_work(sessions))
+    metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
     looks = LookStore(service.ledger.sessions)
     await asyncio.to_thread(service.start)
     importers = Importers(settings.waiting_importers)
@@ -142,6 +147,8 @@ async def open_services(
         yield Services(
             settings=settings,
             metrics=metrics,
+            leave=leave,
+            access=access,
             bakes=service,
             looks=looks,
             shares=ShareStore(service.ledger.sessions),
@@ -154,7 +161,6 @@ async def open_services(
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
             live=live,
             importers=importers,
-            session_slots=threading.BoundedSemaphore(settings.max_sessions),
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
@@ -165,6 +171,19 @@ async def open_services(
         await asyncio.to_thread(batch.close)
         await asyncio.to_thread(service.close)
         await asyncio.to_thread(threads.close)
+
+
+def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
+    """Have it shown who holds memory in this process."""
+    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
+    metrics.watch_holders(
+        {
+            "frozen_cache": library.cache_used_bytes,
+            "open_bakes": lambda: held_bytes(transfers.opened),
+            "bake_tasks": kept_bytes,
+            "environments": lambda: held_bytes(built_in),
+        }
+    )
 
 
 def services(connection: HTTPConnection) -> Services:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+from ipaddress import ip_network
 from pathlib import Path
+from typing import Annotated, Literal
 
 from platformdirs import user_data_dir
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from worker.idle import DEFAULT_IDLE_S
 
 GIB = 1024**3
+RoleName = Literal["view", "edit", "admin"]
 
 
 def _quarter_of_memory() -> int:
@@ -21,6 +24,15 @@ def _quarter_of_memory() -> int:
     except (ValueError, OSError, AttributeError):  # not every system tells
         total_bytes = 4 * GIB
     return min(total_bytes // 4, 6 * GIB)
+
+
+def _check_network(text: str) -> str:
+    ip_network(text, strict=False)
+    return text
+
+
+Network = Annotated[str, AfterValidator(_check_network)]
+"""An IP address, or a network as 10.0.0.0/8."""
 
 
 class Settings(BaseSettings):
@@ -55,6 +67,27 @@ class Settings(BaseSettings):
     waiting_importers: int = Field(default=1, ge=0, le=8, description="processes that wait for files to import")
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
     resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")
+    login: bool = Field(default=False, description="whether people log in; without it, whoever reaches the port is in")
+    trusted_proxies: list[Network] = Field(
+        default=[], description="addresses or networks of proxies that say who calls, as JSON list"
+    )
+    user_header: str = Field(default="X-Forwarded-User", min_length=1, description="in which they say it")
+    proxy_role: RoleName = Field(default="view", description="role of those whom a proxy names")
+    proxy_roles: dict[str, RoleName] = Field(default={}, description="roles of some of them by name, as JSON object")
+    max_sessions_each: int | None = Field(default=None, ge=1, description="live sessions of one user")
+    max_bakes_each: int | None = Field(default=None, ge=1, description="bakes of one user that wait or run")
+    max_bytes_each: int | None = Field(default=None, ge=0, description="uploads and bakes of one user")
+    requests_per_second: float | None = Field(
+        default=None, gt=0, description="calls of one user on the mean; of who is not known, of one address"
+    )
+    requests_at_once: int = Field(default=200, ge=1, description="calls of one user after a rest")
+    audit_lines: int = Field(default=100_000, ge=1, description="changes that the audit keeps")
+    log_format: Literal["plain", "json"] = Field(default="plain", description="lines of the log: text, or JSON")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="warning", description="least level that is logged; info has a line for each request"
+    )
+    drain_seconds: float = Field(default=10.0, ge=0, description="how long sessions may take to leave after SIGTERM")
+    stop_seconds: float = Field(default=30.0, gt=0, description="how long all else may take to stop after that")
     allowed_origins: list[str] = Field(default=[], description="origins besides the server's own, as JSON list")
     allowed_hosts: list[str] = Field(
         default=["localhost", "127.0.0.1", "::1"],

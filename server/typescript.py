@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import bodies, btfs, cameras, models, protocol, renders, surface
+from server.wire import access, bodies, btfs, cameras, models, protocol, renders, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -45,6 +45,7 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.ProbeAnswer,
     protocol.CurveMessage,
     protocol.BakeMessage,
+    protocol.LeavingMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
     protocol.PatchOperation,
@@ -83,6 +84,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     renders.RenderBody,
     bodies.TruthBody,
     bodies.TruthPlanBody,
+    access.MeBody,
     bodies.LookEntry,
     bodies.ShareEntry,
     bodies.ShareBody,

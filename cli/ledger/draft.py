@@ -12,7 +12,8 @@ def ledger_draft(
     message: Annotated[str, typer.Argument(metavar="MESSAGE", help="What the revision does, in a few words.")],
 ) -> None:
     """For developers: write the revision that the tables of the code need beyond the newest; look it through."""
-    from server.records import tables  # noqa: F401  the server's, beside the worker's
+    import server.access.tables  # the server's, beside the worker's
+    import server.records.tables  # noqa: F401
     from worker.database import open_database
     from worker.database.models import Base
     from worker.database.upgrading import draft

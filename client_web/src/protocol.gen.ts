@@ -370,7 +370,7 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. */
 export interface HelloMessage {
   type: "hello";
   session: string;
@@ -387,6 +387,7 @@ export interface HelloMessage {
   views: ViewInfo[];
   materials: string[];
   resume: string;
+  role: "view" | "edit" | "admin";
 }
 
 /** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
@@ -406,6 +407,12 @@ export interface LadderBody {
   a: number[];
   b: number[];
   c: number[];
+}
+
+/** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
+export interface LeavingMessage {
+  type: "leaving";
+  seconds: number;
 }
 
 /** A saved look in the list of them. */
@@ -443,6 +450,14 @@ export interface MaterialBody {
 export interface MaterialMapBody {
   points: MapPoint[];
   triangles: [number, number, number][];
+}
+
+/** Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked). */
+export interface MeBody {
+  login: boolean;
+  name: string;
+  role: "anyone" | "view" | "edit" | "admin";
+  by: "open" | "nobody" | "token" | "proxy";
 }
 
 /** A measured material; looks name it by `data`, `terms` is how it begins. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
@@ -713,4 +728,5 @@ export type ServerMessage =
   | ProblemMessage
   | ProbeAnswer
   | CurveMessage
-  | BakeMessage;
+  | BakeMessage
+  | LeavingMessage;

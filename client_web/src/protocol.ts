@@ -24,6 +24,7 @@ export type {
   LookEntry,
   LooksBody,
   MaterialMapBody,
+  MeBody,
   ModelBody,
   ParameterBody,
   PlaceBody,

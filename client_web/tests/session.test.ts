@@ -13,6 +13,7 @@ class FakeSocket {
   readyState = FakeSocket.OPEN;
   bufferedAmount = 0;
   sent: ClientMessage[] = [];
+  role: "view" | "edit" = "edit";
   onmessage: (event: { data: string | ArrayBuffer }) => void = () => undefined;
   onclose: (event: { code: number; reason: string }) => void = () => undefined;
 
@@ -34,7 +35,7 @@ class FakeSocket {
   }
 
   hello(look: Look, revision: number, resume = "token"): void {
-    this.says({ type: "hello", look, revision, resume, solo: null });
+    this.says({ type: "hello", look, revision, resume, solo: null, role: this.role });
   }
 
   get edits() {
@@ -52,6 +53,7 @@ const handlers = {
   curve: vi.fn(),
   bake: vi.fn(),
   sent: vi.fn(),
+  readOnly: vi.fn(),
   ended: vi.fn(),
   broken: vi.fn(),
 } satisfies SessionHandlers;
@@ -115,6 +117,45 @@ test("the first edit goes at once, more of them once in an animation frame", () 
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
 });
 
+test("who may only look sends no edits and takes hold of nothing", () => {
+  socket().role = "view";
+  socket().hello(LOOK, 0);
+  const [{ look }] = handlers.hello.mock.lastCall as unknown as [{ look: Look }];
+  edit(look, SIGMA, 0.3);
+  animate();
+  expect(handlers.readOnly).toHaveBeenCalledTimes(1);
+  expect(session.pending).toBe(false);
+  expect(session.send({ type: "touch", parameter: SIGMA })).toBe(false);
+  session.want({ look, hand: null, solo: ["environment"], inputTime: 0 });
+  expect(session.send({ type: "probe", x: 1, y: 2 })).toBe(true);
+  animate();
+  expect(socket().sent).toEqual([
+    { type: "edit", revision: 1, patch: [], hand: null, solo: ["environment"] },
+    { type: "probe", x: 1, y: 2 },
+  ]);
+});
+
+test("a server that is being stopped is left, and the look goes to the one that comes", () => {
+  greet();
+  const left = socket();
+  left.says({ type: "leaving", seconds: 10 });
+  expect(handlers.connection).toHaveBeenLastCalledWith("reconnecting", expect.any(Number));
+  const look = edit(LOOK, SIGMA, 0.3);
+  left.onclose({ code: 1000, reason: "" });
+  vi.advanceTimersByTime(1000);
+  expect(FakeSocket.opened).toHaveLength(2);
+  socket().hello(LOOK, 0);
+  session.want({ look, hand: null, solo: null, inputTime: 0 });
+  animate();
+  expect(socket().edits.at(-1)).toMatchObject({ patch: [{ op: "replace", path: SIGMA, value: 0.3 }] });
+  expect(left.edits).toEqual([]);
+});
+
+test("a session begins with what it is asked to, each time it connects", () => {
+  new Session("b1", handlers, { look: "Red & blue" }).connect();
+  expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?look=Red+%26+blue");
+});
+
 test("a frame is acknowledged when it is on the screen", async () => {
   let drawn: () => void = () => undefined;
   handlers.frame.mockReturnValueOnce(new Promise((done) => (drawn = done)));
@@ -157,7 +198,7 @@ describe("a connection that is lost", () => {
     socket().onclose({ code: 4404, reason: "no such bake" });
     vi.advanceTimersByTime(60_000);
     expect(FakeSocket.opened).toHaveLength(1);
-    expect(handlers.ended).toHaveBeenCalledWith("no such bake");
+    expect(handlers.ended).toHaveBeenCalledWith("no such bake", 4404);
   });
 
   test("loses its token after some tries that failed", () => {

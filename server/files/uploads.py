@@ -17,6 +17,11 @@ def keep_upload(upload: UploadFile, path: Path) -> Path:
     return path
 
 
+def upload_bytes(*uploads: UploadFile | None) -> int:
+    """Size of what was sent."""
+    return sum(upload.size or 0 for upload in uploads if upload is not None)
+
+
 def plain_stem(filename: str | None) -> str:
     """A name from the uploaded file's; empty where nothing printable is left."""
     stem = (filename or "").replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from relume.errors import ParameterError, ProtocolError, RelumeError
 from relume.picture.transfer import Eyes
 from relume.scene.placed_camera import placed_camera
+from server.access.rules import check_message
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.session_state import SessionState
@@ -28,7 +29,7 @@ class Reception:
     def __init__(self, websocket: WebSocket, state: SessionState) -> None:
         self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
         self._window, self._look, self._transfer = state.window, state.look, state.transfer
-        self._metrics = state.metrics
+        self._metrics, self._caller = state.metrics, state.caller
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -65,6 +66,8 @@ class Reception:
         await self._socket.refuse(problem)
 
     def _take(self, message: protocol.ClientMessage, received_s: float) -> None:
+        is_solo = isinstance(message, protocol.EditMessage) and not message.patch
+        check_message(self._caller, "solo" if is_solo else message.type)
         match message:
             case protocol.EditMessage():
                 self._edit(message, received_s)

@@ -10,11 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
+from anyio.to_thread import run_sync
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import RelumeError
 from relume.picture.transfer import AnyView, Eyes, Opened
-from server.errors import close_code_of, problem_of
+from server.access.access import Access
+from server.access.audit import Audit, Change
+from server.access.roles import Caller
+from server.errors import close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
@@ -27,8 +31,12 @@ from server.live.state.pending_requests import PendingRequests
 from server.live.state.resume import ResumeStore
 from server.live.state.session_state import SessionState
 from server.live.state.shown_views import ShownViews
+from server.live.state.visit import Visit
+from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
-from server.wire.protocol import CameraInfo, HelloMessage, ViewInfo
+from server.running.leave import Leave
+from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, ViewInfo
+from worker.database.faults import AWAY, told
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
@@ -45,29 +53,36 @@ class SessionServices:
     metrics: Metrics
     resumes: ResumeStore
     bake_news: BakeNews
+    access: Access
+    leave: Leave
     ack_seconds: float
+    drain_seconds: float
 
 
-async def serve(
-    services: SessionServices, websocket: WebSocket, bake: str, transfer: Opened, resume: str | None
-) -> None:
+async def serve(services: SessionServices, websocket: WebSocket, bake: str, transfer: Opened, visit: Visit) -> None:
     """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
-    kept = services.resumes.take(resume, bake, time.monotonic()) if resume else None
+    kept = services.resumes.take(visit.resume, bake, time.monotonic()) if visit.resume else None
     default: dict[str, Any] = transfer.default_look
-    look = LookState(default, kept.document, kept.revision, kept.solo) if kept else LookState(default, default, 0)
+    begun = visit.look or default
+    look = LookState(default, kept.document, kept.revision, kept.solo) if kept else LookState(default, begun, 0)
     first = next(iter(transfer.views))
     shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
     socket = ClientSocket(websocket, services.ack_seconds)
     window = FrameWindow(services.ack_seconds)
-    state = SessionState(socket, PendingRequests(look.target()), shown, window, look, transfer, services.metrics)
-    token = services.resumes.open(bake, look, shown)
+    pending = PendingRequests(look.target())
+    state = SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller)
+    token, session = services.resumes.open(bake, look, shown), secrets.token_hex(8)
+    SESSION.set(session)
+    BAKE.set(bake)
     services.metrics.sessions.inc()
     try:
-        await socket.send(_hello(bake, transfer, look, shown, token, kept is not None))
+        await socket.send(_hello(session, bake, state, token, kept is not None))
         await _run(services, websocket, bake, state)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
-    except RelumeError as error:
+    except (RelumeError, OSError, *AWAY) as error:
+        if row_of(error).status >= 500:
+            log.error("session of bake %s ends (%s)", bake, told(error))
         await socket.close(close_code_of(error), problem_of(error).detail)
     except Exception as error:
         log.exception("session of bake %s ends by a defect", bake)
@@ -75,12 +90,21 @@ async def serve(
     finally:
         services.metrics.sessions.dec()
         services.resumes.close(token, time.monotonic())
+        await _write_down(services.access.audit, visit.caller, bake, look.num_edits)
 
 
-def _hello(bake: str, transfer: Opened, look: LookState, shown: ShownViews, token: str, resumed: bool) -> HelloMessage:
+async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -> None:
+    """A line of the audit where anything was edited."""
+    if num_edits:
+        change = Change.by(caller, f"{num_edits} edits in a session", f"/api/bakes/{bake}/session", 101)
+        await asyncio.shield(run_sync(audit.add, change))
+
+
+def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bool) -> HelloMessage:
+    transfer, look, shown = state.transfer, state.look, state.shown
     views = [_view_info(view, transfer) for view in transfer.views.values()]
     return HelloMessage(
-        session=secrets.token_hex(8),
+        session=session,
         bake=bake,
         method=transfer.method,
         axes=sorted(axis.value for axis in transfer.axes),
@@ -94,6 +118,7 @@ def _hello(bake: str, transfer: Opened, look: LookState, shown: ShownViews, toke
         views=views,
         materials=list(transfer.material_names),
         resume=token,
+        role=state.caller.role.word,
     )
 
 
@@ -108,11 +133,13 @@ def _view_info(view: AnyView, transfer: Opened) -> ViewInfo:
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:
-    """Run reception, frame loop and bake news until the first of them ends; raise what ended it."""
+    """Run all parts, and a watch on the token, until one of them ends; raise what ended it."""
     tasks = [
         asyncio.create_task(Reception(websocket, state).run()),
         asyncio.create_task(FrameLoop(state, services.library, services.threads).run()),
         asyncio.create_task(services.bake_news.tell(state.socket, bake, state.transfer.scene_id)),
+        asyncio.create_task(services.access.until_revoked(state.caller)),
+        asyncio.create_task(_say_goodbye(services, state.socket)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -120,6 +147,13 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
             task.result()
     finally:
         await _end(tasks)
+
+
+async def _say_goodbye(services: SessionServices, socket: ClientSocket) -> None:
+    """Tell the client when the server takes leave; it goes when it likes to."""
+    await services.leave.taken()
+    await socket.send(LeavingMessage(seconds=services.drain_seconds))
+    await asyncio.Event().wait()
 
 
 async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from typing import Annotated, cast
 
 from fastapi import APIRouter, Path, Query, Response
@@ -18,6 +19,7 @@ from relume.errors import NotFoundError
 from relume.imageio.files import png_bytes
 from relume.picture.transfer import Eyes, Transfer
 from relume.scene.placed_camera import placed_camera
+from server.access.roles import Caller, Who
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
 from server.services import Services, Shared
@@ -35,17 +37,32 @@ EVENT_POLL_S = 0.5
 
 
 @router.post("", status_code=202, responses={200: {"model": DryRunBody}, 202: {"model": BakeBody}})
-def submit_bake(request: BakeRequest, services: Shared) -> JSONResponse:
+def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResponse:
     """Queue a bake, or with `dry_run` only say what it would cost; the same recipe twice is the same bake."""
     recipe = _recipe(request, services)
     if request.dry_run:
         plan = services.bakes.plan(request.scene, recipe)
         dry = DryRunBody(id=bake_id(request.scene, recipe), recipe=_recipe_body(recipe), plan=_plan(plan, services))
         return JSONResponse(dry.model_dump())
-    identity = services.bakes.submit(request.scene, recipe)
+    with services.access.quotas.deciding:
+        _check_quotas(request.scene, recipe, caller, services)
+        identity = services.bakes.submit(request.scene, recipe)
+        status = services.bakes.get(identity)
+        services.access.quotas.own(caller.name, "bake", identity, status.plan.store_bytes)
     services.metrics.bakes.inc()
-    body = bake_body(services.bakes.get(identity), services)
+    body = bake_body(status, services)
     return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{identity}"})
+
+
+def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services) -> None:
+    """Whether somebody may queue one more; what is here or under way takes nothing. Raises QuotaError."""
+    with suppress(NotFoundError):
+        if services.bakes.get(bake_id(scene, recipe)).state in ("queued", "running", "ready"):
+            return
+    quotas = services.access.quotas
+    quotas.check_bakes(caller.name)
+    if quotas.counts_bytes:
+        quotas.check_bytes(caller.name, services.bakes.plan(scene, recipe).store_bytes)
 
 
 @router.get("")

@@ -11,9 +11,10 @@ from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
 from relume.asset_store import check_name
+from server.access.roles import Caller, Who
 from server.apart.btfs import IMAGES
 from server.files.importing import UPLOAD_PREFIX
-from server.files.uploads import keep_upload, plain_stem
+from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
 from server.services import Services, Shared
 from server.wire.body import Id
@@ -28,27 +29,37 @@ BoundField = Annotated[Bound, Form()]
 
 @router.post("", status_code=202)
 async def import_btf(
-    images: ImagesFile, services: Shared, response: Response, name: BtfName = "", error: BoundField = BOUND
+    images: ImagesFile,
+    services: Shared,
+    caller: Who,
+    response: Response,
+    name: BtfName = "",
+    error: BoundField = BOUND,
 ) -> BtfWorkBody:
     """Queue the import of a zip of images; what is wrong with it the work says."""
+    quotas, sent_bytes = services.access.quotas, upload_bytes(images)
+    await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
     async with services.import_slots:
-        identity = await run_in_threadpool(_submit_images, images, name, error, services)
+        identity = await run_in_threadpool(_submit_images, images, name, error, caller, services)
+    await run_in_threadpool(quotas.own, caller.name, "btf-work", identity, sent_bytes)
     return _answer(identity, services, response)
 
 
-def _submit_images(images: UploadFile, name: str, error: float, services: Services) -> str:
+def _submit_images(images: UploadFile, name: str, error: float, caller: Caller, services: Services) -> str:
     request = BtfRequest(name=check_name(name or plain_stem(images.filename) or "BTF"), error=error)
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(images, Path(folder) / IMAGES)
-        return services.btfs.submit(request, prepare=lambda into: shutil.move(path, into / IMAGES))
+        return services.btfs.submit(request, caller.name, prepare=lambda into: shutil.move(path, into / IMAGES))
 
 
 @router.post("/synthetic", status_code=202)
-async def make_synthetic_btf(request: SyntheticBtfRequest, services: Shared, response: Response) -> BtfWorkBody:
+async def make_synthetic_btf(
+    request: SyntheticBtfRequest, services: Shared, caller: Who, response: Response
+) -> BtfWorkBody:
     """Queue the rendering of a small geometry from all sides in light from all sides."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     wanted = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    return _answer(await run_in_threadpool(services.btfs.submit, wanted), services, response)
+    return _answer(await run_in_threadpool(services.btfs.submit, wanted, caller.name), services, response)
 
 
 def _answer(identity: str, services: Services, response: Response) -> BtfWorkBody:
@@ -72,6 +83,8 @@ def get_btf_work(work: Id, services: Shared) -> BtfWorkBody:
 def stop_btf_work(work: Id, services: Shared, forget: bool = False) -> Response:
     """Stop it; what was found so far is kept, unless `forget` says that nobody needs it. A BTF that is ready stays."""
     (services.btfs.delete if forget else services.btfs.stop)(work)
+    if forget:
+        services.access.quotas.disown("btf-work", work)
     return Response(status_code=204)
 
 

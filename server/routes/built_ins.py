@@ -9,12 +9,14 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.scene.built_in import BUILT_IN
+from server.access.roles import Who
 from server.files.importing import ImportRequest
-from server.routes.scenes import get_one
+from server.routes.scenes import get_one, own_scene
 from server.services import Shared
 from server.wire.bodies import BuiltInBody, SceneBody
 
 router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
+BuiltInName = Annotated[str, Path(max_length=256)]
 
 
 @router.get("")
@@ -27,12 +29,16 @@ def get_all() -> list[BuiltInBody]:
 
 
 @router.post("/{name}", status_code=201)
-async def take_one(name: Annotated[str, Path(max_length=256)], services: Shared, response: Response) -> SceneBody:
+async def take_one(
+    name: Annotated[str, Path(max_length=256)], services: Shared, caller: Who, response: Response
+) -> SceneBody:
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
+    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, 0)
     order = ImportRequest.of(services.settings, "built_in", None, name)
     async with services.import_slots:
         identity = await run_in_threadpool(services.importers.run, order)
+    await run_in_threadpool(own_scene, caller, identity, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)

@@ -10,6 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.picture.transfer import Opened
+from server.access.roles import Who
 from server.errors import NotReadyError
 from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
@@ -22,7 +23,9 @@ router = APIRouter(prefix="/api/truths", tags=["truths"])
 
 
 @router.post("", status_code=202, responses={200: {"model": TruthPlanBody, "description": "A dry run's answer"}})
-async def submit_comparison(request: TruthRequest, services: Shared, response: Response) -> TruthBody | TruthPlanBody:
+async def submit_comparison(
+    request: TruthRequest, services: Shared, caller: Who, response: Response
+) -> TruthBody | TruthPlanBody:
     """Queue a comparison, or say how long it would take; the look is checked first."""
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
@@ -31,7 +34,7 @@ async def submit_comparison(request: TruthRequest, services: Shared, response: R
             response.status_code = 200
             seconds = await run_in_threadpool(services.comparisons.seconds, request)
             return TruthPlanBody(passes=request.passes, seconds=seconds)
-    identity = await run_in_threadpool(services.comparisons.submit, request)
+    identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
     response.headers["Location"] = f"/api/truths/{identity}"
     return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
 

@@ -15,9 +15,11 @@ from relume.asset_store import check_name
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
+from server.access.quotas import folder_bytes
+from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.png import A_DAY, PngResponse
-from server.files.uploads import keep_upload, plain_stem
+from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.services import Services, Shared
 from server.wire.bodies import EnvironmentBody, moment
 from server.wire.body import Id
@@ -31,11 +33,15 @@ AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported en
 
 @router.post("", status_code=201)
 async def import_environment(
-    environment: MapFile, services: Shared, response: Response, name: MapName = ""
+    environment: MapFile, services: Shared, caller: Who, response: Response, name: MapName = ""
 ) -> EnvironmentBody:
     """Import an environment, in a process of its own; the body says how look documents name it."""
+    quotas = services.access.quotas
+    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(environment))
     async with services.import_slots:
         identity = await run_in_threadpool(_import, environment, name, services)
+    num_bytes = await run_in_threadpool(folder_bytes, environments_path(services.settings.data) / identity)
+    await run_in_threadpool(quotas.own, caller.name, "environment", identity, num_bytes)
     response.headers["Location"] = f"/api/environments/{identity}"
     return await run_in_threadpool(get_environment, identity, services)
 
@@ -78,6 +84,7 @@ def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
 def delete_environment(environment: Id, services: Shared) -> Response:
     """Delete an imported environment; looks that name it are refused from then on."""
     STORE.remove(environments_path(services.settings.data), environment)
+    services.access.quotas.disown("environment", environment)
     return Response(status_code=204)
 
 

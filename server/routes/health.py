@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
-
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
 from server.errors import BusyError
+from server.library.disk import free_bytes
 from server.services import Shared
 from worker.database.models import BakeRow
 
@@ -23,10 +22,11 @@ async def livez() -> dict[str, str]:
 
 @router.get("/readyz")
 def readyz(services: Shared) -> dict[str, str]:
-    """The database can be read, and the data directory has room."""
+    """The database can be read, the data directory has room, and the server is not being stopped."""
+    services.leave.check()
     with services.bakes.ledger.sessions() as session:
         session.execute(select(BakeRow.id).limit(1))
-    free = shutil.disk_usage(services.settings.data).free
+    free = free_bytes(services.settings.data)
     if free < services.settings.least_free_bytes:
         raise BusyError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
     return {"status": "ready"}

@@ -14,9 +14,11 @@ from relume.asset_store import check_name
 from relume.brdf.document import complete_term
 from relume.btf.shelf import BtfRecord
 from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
+from server.access.quotas import folder_bytes
+from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
-from server.files.uploads import keep_upload, plain_stem
+from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.services import Services, Shared
 from server.wire.bodies import MeasuredBody, moment
 from server.wire.body import Id
@@ -29,11 +31,15 @@ MaterialName = Annotated[str, Form(max_length=200)]
 
 @router.post("", status_code=201)
 async def import_measured(
-    material: MaterialFile, services: Shared, response: Response, name: MaterialName = ""
+    material: MaterialFile, services: Shared, caller: Who, response: Response, name: MaterialName = ""
 ) -> MeasuredBody:
     """Import a MERL file; the body says how look documents name it."""
+    quotas = services.access.quotas
+    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(material))
     async with services.import_slots:
         record = await run_in_threadpool(_import, material, name, services)
+    num_bytes = await run_in_threadpool(folder_bytes, materials_path(services.settings.data) / record.id)
+    await run_in_threadpool(quotas.own, caller.name, "material", record.id, num_bytes)
     response.headers["Location"] = f"/api/materials/measured/{record.id}"
     return _body(record)
 
@@ -77,6 +83,7 @@ def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
 def delete_measured(material: Id, services: Shared) -> Response:
     """Delete a measured material; looks that name it are refused from then on."""
     STORE.remove(materials_path(services.settings.data), material)
+    services.access.quotas.disown("material", material)
     return Response(status_code=204)
 
 

@@ -12,6 +12,7 @@ from fastapi.responses import FileResponse
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
 from relume.picture.transfer import Eyes, Opened
+from server.access.roles import Who
 from server.apart.animation import check_animation, document_of
 from server.errors import NotReadyError
 from server.files.video import check_encoder
@@ -36,7 +37,7 @@ MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "we
 
 
 @router.post("", status_code=202)
-async def submit_render(request: RenderRequest, services: Shared, response: Response) -> RenderBody:
+async def submit_render(request: RenderRequest, services: Shared, caller: Who, response: Response) -> RenderBody:
     """Queue a batch; every look is checked first."""
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
@@ -44,7 +45,7 @@ async def submit_render(request: RenderRequest, services: Shared, response: Resp
         if request.name is None:
             scene = await run_in_threadpool(get_scene, services.bakes.ledger, transfer.scene_id)
             request.name = f"{scene.name} {request.view}"[:MAX_NAME]
-    identity = await run_in_threadpool(services.renders.submit, request)
+    identity = await run_in_threadpool(services.renders.submit, request, caller.name)
     response.headers["Location"] = f"/api/renders/{identity}"
     return _body(await run_in_threadpool(services.renders.get, identity))
 

@@ -14,9 +14,11 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
+from server.access.quotas import folder_bytes
+from server.access.roles import Caller, Who
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.thumbnails import MAX_WIDTH
-from server.files.uploads import keep_upload, plain_stem
+from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.services import Services, Shared
 from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
 from server.wire.body import Id
@@ -46,6 +48,7 @@ MAX_COMPANIONS, MAX_PATH = 900, 1_024
 async def import_scene(
     scene: SceneFile,
     services: Shared,
+    caller: Who,
     response: Response,
     environment: EnvironmentFile = None,
     name: SceneName = "",
@@ -53,8 +56,11 @@ async def import_scene(
     ground: Ground = False,
 ) -> SceneBody:
     """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
+    sent_bytes = upload_bytes(scene, environment, *companions)
+    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, sent_bytes)
     async with services.import_slots:
         identity = await run_in_threadpool(_import, scene, environment, name, companions, ground, services)
+    await run_in_threadpool(own_scene, caller, identity, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 
@@ -85,15 +91,24 @@ def _import(
         return services.importers.run(replace(order, ground=ground))
 
 
+def own_scene(caller: Caller, scene: str, services: Services) -> None:
+    """What was imported takes room of whoever did."""
+    num_bytes = folder_bytes(scene_path(services.settings.data, scene))
+    services.access.quotas.own(caller.name, "scene", scene, num_bytes)
+
+
 @router.post("/{scene}/ground", status_code=201)
-async def add_ground(scene: Id, services: Shared, response: Response) -> SceneBody:
+async def add_ground(scene: Id, services: Shared, caller: Who, response: Response) -> SceneBody:
     """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     settings = services.settings
     folder = await run_in_threadpool(fetched, scene_path(settings.data, scene))
+    more_bytes = await run_in_threadpool(folder_bytes, folder)
+    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, more_bytes)
     order = ImportRequest.of(settings, "grounded", folder, f"{record.name[:185]} on a ground")
     async with services.import_slots:
         identity = await run_in_threadpool(services.importers.run, order)
+    await run_in_threadpool(own_scene, caller, identity, services)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 
@@ -118,7 +133,10 @@ def get_one(scene: Id, services: Shared) -> SceneBody:
 @router.delete("/{scene}", status_code=204)
 def delete_one(scene: Id, services: Shared) -> Response:
     """Delete a scene and its bakes."""
+    bakes = [status.id for status in services.bakes.bakes(scene)]
     delete_scene(services.settings.data, services.bakes.ledger, scene)
+    services.access.quotas.disown("scene", scene)
+    services.access.quotas.disown("bake", *bakes)
     return Response(status_code=204)
 
 

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 from fastapi import APIRouter
 from fastapi.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import NotFoundError, RelumeError, VersionMismatchError
-from server.errors import CLOSE_PROTOCOL, BusyError, close_code_of, problem_of
+from relume.look import complete
+from relume.picture.transfer import Opened
+from server.access.roles import caller_of
+from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of, row_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
+from server.live.state.visit import Visit
+from server.records.looks import check_name
+from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
 from server.services import Services
 from server.wire.protocol import SUBPROTOCOL
@@ -31,17 +40,28 @@ async def session(websocket: WebSocket, bake: str) -> None:
     except WebSocketDisconnect:
         return
     except (RelumeError, OSError) as error:
+        services.metrics.refused_sessions.labels(row_of(error).slug).inc()
         await socket.close(close_code_of(error), problem_of(error).detail)
 
 
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
-    if not services.session_slots.acquire(blocking=False):
-        raise BusyError(f"{services.settings.max_sessions} sessions are open; close one and try again")
-    try:
+    services.leave.check()
+    caller = caller_of(websocket)
+    with services.access.quotas.session(caller.name):
         status = await run_in_threadpool(ready_bake, services, bake)
         async with services.transfers.using(status.id, services.bakes.store_path(status.id)) as transfer:
             if not transfer.views:
                 raise NotFoundError("this bake has no views; bake again")
-            await serve(services.live, websocket, status.id, transfer, websocket.query_params.get("resume"))
-    finally:
-        services.session_slots.release()
+            asked = websocket.query_params
+            look = await run_in_threadpool(_look, services, transfer, asked.get("look"), asked.get("share"))
+            visit = Visit(caller, asked.get("resume"), look)
+            await serve(services.live, websocket, status.id, transfer, visit)
+
+
+def _look(services: Services, transfer: Opened, name: str | None, share: str | None) -> dict[str, Any] | None:
+    """The saved or shared look that a session is to begin with; who may only look sees those, too."""
+    if name is not None:
+        return complete(json.loads(services.looks.get(check_name(name)).document), transfer.default_look)
+    if share is not None:
+        return complete(services.shares.get(share[:MAX_ID_LENGTH]).document["look"], transfer.default_look)
+    return None

@@ -226,7 +226,7 @@ class HelloMessage(Message):
     """server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null.
 
     `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
-    light of the bake; `axes`: what can be changed in its pictures.
+    light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits.
     """
 
     type: Literal["hello"] = "hello"
@@ -244,6 +244,7 @@ class HelloMessage(Message):
     views: list[ViewInfo]
     materials: list[str]
     resume: str
+    role: Literal["view", "edit", "admin"]
 
 
 class StatusMessage(Message):
@@ -306,7 +307,17 @@ class BakeMessage(Message):
     seconds_left: float | None
 
 
-ServerMessage = HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage
+class LeavingMessage(Message):
+    """server → client: the server is being stopped. Open the session again, there or on another server, within so many
+    seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
+
+    type: Literal["leaving"] = "leaving"
+    seconds: float
+
+
+ServerMessage = (
+    HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage | LeavingMessage
+)
 
 
 class FrameTimes(Message):

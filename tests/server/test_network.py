@@ -1,45 +1,24 @@
 """The server as uvicorn runs it, over a real socket."""
 
 import json
-import socket
 import struct
-import threading
-import time
 from collections.abc import Iterator
 
 import pytest
-import uvicorn
-from server_fakes import SIZE, BatchesHere, Control, tiny_scene
-from server_fixtures import open_fake_bakes
+from running_server import running_server
+from server_fakes import Control
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from relume.bake import Recipe
-from server.app import configure, create_app
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
-from worker.scenes import register_scene
 
 
 @pytest.fixture
 def url(settings: Settings, control: Control) -> Iterator[str]:
     """Address of the session of a bake that is ready."""
-    settings.allowed_hosts = ["127.0.0.1"]
-    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
-    server = uvicorn.Server(configure(app, settings))
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-        thread.start()
-        while not server.started:
-            time.sleep(0.01)
-        bakes = app.state.services.bakes
-        scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
-        bake = bakes.submit(scene, Recipe("direct", ("front",), SIZE, 10))
-        with bakes.subscribe(bake) as changes:
-            assert list(changes)[-1].state == "ready"
-        yield f"ws://127.0.0.1:{listening.getsockname()[1]}/api/bakes/{bake}/session"
-        server.should_exit = True
-        thread.join()
+    with running_server(settings, control) as running:
+        yield running.baked_url()
 
 
 def open_socket(url: str) -> ClientConnection:

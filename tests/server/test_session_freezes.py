@@ -114,7 +114,9 @@ def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked
         session.exact(1)
 
 
-def test_moving_on_to_another_curve_cancels_the_freeze(client: TestClient, baked: Baked, control: Control) -> None:
+def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
+    client: TestClient, baked: Baked, control: Control, caplog: pytest.LogCaptureFixture
+) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send(type="touch", curve=THETA_D)
@@ -123,6 +125,7 @@ def test_moving_on_to_another_curve_cancels_the_freeze(client: TestClient, baked
         while session.text("status")["state"] != "ready":
             pass
         assert control.num_cancelled == 1
+    assert [line for line in caplog.records if line.name.startswith("server.live")] == []
 
 
 def test_edits_that_need_no_freeze_are_painted_while_one_runs(

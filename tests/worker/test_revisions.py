@@ -16,6 +16,7 @@ from alembic.migration import MigrationContext
 from sqlalchemy import Engine, inspect, select, text
 
 from relume.errors import LedgerVersionError, ParameterError
+from server.access.tables import AuditRow, OwnedRow, TokenRow
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
 from server.records.tables import BtfRow, ComparisonRow, LookRow, RenderRow, ShareRow, WorkRow
@@ -28,7 +29,7 @@ from worker.ledger import Ledger
 from worker.scenes import list_scenes
 
 BEFORE = Path(__file__).with_name("before_revisions.sql").read_text(encoding="utf-8")
-TABLES = (LookRow, ShareRow, RenderRow, BtfRow, ComparisonRow)
+TABLES = (LookRow, ShareRow, RenderRow, BtfRow, ComparisonRow, TokenRow, OwnedRow, AuditRow)
 
 
 @pytest.fixture
@@ -59,8 +60,10 @@ def rows(engine: Engine) -> dict[str, list[Any]]:
 
 
 def pairs(now: dict[str, list[Any]], before: dict[str, list[Any]]) -> list[tuple[Any, Any]]:
-    """Rows as they are and as they were; columns that were added are the last."""
-    assert {table: len(rows) for table, rows in now.items()} == {table: len(rows) for table, rows in before.items()}
+    """Rows as they are and as they were; columns that were added are the last, and tables that were are empty."""
+    expected = {table: len(before.get(table, [])) for table in now}
+    assert {table: len(rows) for table, rows in now.items()} == expected
+    assert before.keys() <= now.keys()
     return [(row, old) for table in before for row, old in zip(now[table], before[table], strict=True)]
 
 

@@ -1,4 +1,5 @@
 /** The editor's layout: what stands where. Everything but the picture collapses. */
+import { ReadOnly } from "../account/Account";
 import { Inspector } from "../inspector/Inspector";
 import { LibraryPanel } from "../library/LibraryPanel";
 import { Filmstrip } from "../looks/Filmstrip";
@@ -6,6 +7,7 @@ import { Outline } from "../outline/Outline";
 import { take } from "../outline/environments";
 import { useFileDrop } from "../start/useFileDrop";
 import { filmstripOpen, helpOpen, timelineOpen } from "../state/panels";
+import { mayEdit } from "../state/me";
 import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/room";
 import { Timeline } from "../timeline/Timeline";
 import { TruthPanel } from "../truth/TruthPanel";
@@ -29,16 +31,21 @@ export function Editor() {
       <div class="middle">
         {shown("outline") && <Outline />}
         <PictureView />
-        {shown("library") && <LibraryPanel />}
+        {shown("library") && mayEdit.value && <LibraryPanel />}
         {shown("truth") && <TruthPanel />}
         {shown("inspector") && (
           <aside class="side" aria-label="Inspector">
             <Splitter />
-            <Inspector />
+            <div class="inspected">
+              <ReadOnly />
+              <div inert={!mayEdit.value}>
+                <Inspector />
+              </div>
+            </div>
           </aside>
         )}
       </div>
-      {timelineOpen.value && <Timeline />}
+      {timelineOpen.value && mayEdit.value && <Timeline />}
       {filmstripOpen.value && <Filmstrip />}
       <StatusBar />
       {helpOpen.value && <Help />}

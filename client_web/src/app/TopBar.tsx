@@ -1,4 +1,5 @@
 /** Scene, views, undo, comparison, display, export. */
+import { Account } from "../account/Account";
 import { TONE_MAPS } from "../color/tonemap";
 import { edit } from "../edit/edit";
 import { history } from "../edit/history";
@@ -7,6 +8,7 @@ import { redo, undo } from "../looks/undo";
 import { leave } from "../scene/open";
 import { showBefore, wipe } from "../state/display";
 import { look } from "../state/look";
+import { mayEdit } from "../state/me";
 import { filmstripOpen, helpOpen } from "../state/panels";
 import { shownPanels, togglePanel, type SidePanel } from "../state/room";
 import { scene } from "../state/scene";
@@ -149,15 +151,20 @@ const CONTROLS = [
   { name: "share", rank: 0, Content: ShareButton },
 ];
 
+/** What is of no use to one who only looks. */
+const OF_EDITORS = new Set(["steps", "display", "share"]);
+
 export function TopBar() {
+  const controls = mayEdit.value ? CONTROLS : CONTROLS.filter(({ name }) => !OF_EDITORS.has(name));
   return (
     <header class="top-bar">
       <IconButton icon="back" label="All scenes" onClick={leave} />
       <h1 title={scene.value?.name}>{scene.value?.name ?? "…"}</h1>
       <RemarksMenu />
       <BakeMenu />
-      <Overflow controls={CONTROLS} />
+      <Overflow controls={controls} />
       <Panels />
+      <Account />
       <IconButton
         icon="help"
         label="Keyboard map"

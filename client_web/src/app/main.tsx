@@ -1,4 +1,6 @@
 import { render } from "preact";
+import { arrive } from "../account/account";
+import { Login } from "../account/Login";
 import { history } from "../edit/history";
 import { openShare } from "../looks/share";
 import { followThumbnails } from "../looks/thumbnails";
@@ -9,6 +11,7 @@ import { StartPage } from "../start/StartPage";
 import { followPanels } from "../state/panels";
 import { followTimeline } from "../looks/keyframes";
 import { followRoom } from "../state/room";
+import { me } from "../state/me";
 import { page } from "../state/scene";
 import { Toasts } from "../ui/toasts";
 import { Editor } from "./Editor";
@@ -25,19 +28,27 @@ import "../library/library.css";
 import "../lights/lights.css";
 import "../timeline/timeline.css";
 import "../truth/truth.css";
+import "../account/account.css";
 import "./layout.css";
 import "./bars.css";
 
 function App() {
   return (
     <>
-      {page.value === "editor" ? <Editor /> : <StartPage />}
+      {me.value.role !== "anyone" && (page.value === "editor" ? <Editor /> : <StartPage />)}
       <Toasts />
+      <Login />
     </>
   );
 }
 
-function start(): void {
+async function start(): Promise<void> {
+  const isIn = await arrive().catch(() => true); // where the server cannot be reached all else says so
+  if (isIn) open();
+  render(<App />, document.getElementById("app") as HTMLElement);
+}
+
+function open(): void {
   const place = placeFromUrl(location.search);
   const shared = new URLSearchParams(location.search).get("share");
   if (shared !== null) void openShare(shared);
@@ -51,7 +62,6 @@ function start(): void {
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());
   window.addEventListener("popstate", () => location.reload());
-  render(<App />, document.getElementById("app") as HTMLElement);
 }
 
-start();
+void start();

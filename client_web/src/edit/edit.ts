@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 import { changeAt, changeTo, type Change } from "../document/change";
 import type { Look } from "../protocol";
 import { look } from "../state/look";
+import { mayEdit, refusals } from "../state/me";
 import { models } from "../state/scene";
 import { hand, heldAt } from "./hand";
 import { history } from "./history";
@@ -35,6 +36,7 @@ export const passing = signal<{ before: Look; label: string } | null>(null);
 
 /** Show a look in passing. */
 export function showPassing(label: string, next: Look): void {
+  if (isRefused()) return;
   const current = look.peek();
   if (current === null) return;
   passing.value = { before: passing.peek()?.before ?? current, label };
@@ -58,8 +60,14 @@ export function keepPassing(): void {
   history.seal();
 }
 
+/** Whoever may not edit is told so. */
+function isRefused(): boolean {
+  if (!mayEdit.peek()) refusals.value += 1;
+  return !mayEdit.peek();
+}
+
 function commit(label: string, change: Change, key?: string): void {
-  if (change.patch.length === 0) return;
+  if (change.patch.length === 0 || isRefused()) return;
   keepPassing();
   show(change, key === undefined ? null : heldAt(key, change.after));
   history.record({ of: "look", label, ...(key === undefined ? {} : { key }), ...change });

@@ -2,6 +2,14 @@
 import { Session, type SessionHandlers } from "../net/session";
 import { Arrivals } from "../picture/arrival";
 import type { ClientMessage, HelloMessage } from "../protocol";
+import { watched } from "../state/me";
+import { scene } from "../state/scene";
+
+/** Of one who only looks: with what a session begins. */
+function begins(): Record<string, string> {
+  const { scene: of, ...look } = watched.peek() ?? { scene: null };
+  return of !== null && of === scene.peek()?.id ? look : {};
+}
 
 /** A session with a bake, and what is on its way from it. */
 export class BakeConnection {
@@ -19,7 +27,7 @@ export class BakeConnection {
     readonly bake: string,
     handlersOf: (self: BakeConnection) => SessionHandlers,
   ) {
-    this.session = new Session(bake, handlersOf(this));
+    this.session = new Session(bake, handlersOf(this), begins());
   }
 
   /** The server is there, perhaps again: it knows of no views yet, and nothing of it has come. */

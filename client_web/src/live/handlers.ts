@@ -3,6 +3,7 @@ import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import { problemText } from "../net/api";
 import type { SessionHandlers } from "../net/session";
+import { LOGIN_CODE } from "../net/socket";
 import type { HelloMessage, Look } from "../protocol";
 import { wholeOf } from "../seen/paths";
 import { coming } from "../state/bakes";
@@ -11,6 +12,7 @@ import { showShape } from "../state/curveShape";
 import { exact } from "../state/fidelity";
 import { editSent } from "../state/latency";
 import { defaultLook, look } from "../state/look";
+import { loginWords, mayEdit, readOnlyWords } from "../state/me";
 import { probe } from "../state/probe";
 import { curvePath } from "../state/selection";
 import { focusedView } from "../state/views";
@@ -32,6 +34,7 @@ export function whenBakeIsReady(take: typeof onBakeReady): void {
 /** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. */
 function takeUp(own: Look): Look {
   defaultLook.value ??= own;
+  if (!mayEdit.peek()) return (look.value = own);
   const kept = look.peek();
   if (kept !== null && Object.keys(own).every((section) => section in kept)) return kept;
   return (look.value = { ...own, ...kept });
@@ -94,10 +97,12 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       exact.value = false;
       editSent(revision, inputTime);
     },
-    ended(reason) {
+    readOnly: () => showError(readOnlyWords.value),
+    ended(reason, code) {
       if (self === connections.incoming) connections.incoming = null;
       if (coming.peek()?.id === self.bake) coming.value = null;
-      showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
+      if (code === LOGIN_CODE) loginWords.value = `${reason}. What you have edited is kept in this tab.`;
+      else showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
     },
     broken: (text) =>
       showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),

@@ -94,5 +94,5 @@ async function swap(to: BakeConnection): Promise<void> {
   nothingIsExact(shown);
   const whole = shown.filter((view) => to.arrivals.get(view)?.isWhole);
   await Promise.all(whole.map((view) => showArrived(to, view)));
-  note("The new bake is in place.");
+  if (to.bake !== old?.bake) note("The new bake is in place.");
 }

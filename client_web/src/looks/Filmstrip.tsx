@@ -3,8 +3,11 @@ import { useEffect, useRef } from "preact/hooks";
 import { isSame } from "../document/difference";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
+import { connect } from "../live/connect";
 import type { Look } from "../protocol";
+import { bake } from "../state/bakes";
 import { defaultLook, look } from "../state/look";
+import { mayEdit, watched } from "../state/me";
 import { timelineOpen } from "../state/panels";
 import { scene } from "../state/scene";
 import { lookThumbnail, thumbnailsMade } from "../state/thumbnails";
@@ -37,6 +40,14 @@ function Picture({ image, text }: { image: string | null; text: string }) {
   return image === null ? <span class="blank">{text.slice(0, 2)}</span> : <img src={image} alt="" draggable={false} />;
 }
 
+/** Take a saved look over; for one who only looks the session begins again with it. */
+function showSaved(name: string, whole: Look): void {
+  const [of, current] = [scene.value, bake.value];
+  if (mayEdit.value || of === null || current === null) return replaceLook(`Show ${name}`, whole);
+  watched.value = { scene: of.id, look: name };
+  connect(current);
+}
+
 function SavedTile({ saved }: { saved: SavedLook }) {
   thumbnailsMade.value;
   const whole = completed(saved.look);
@@ -47,7 +58,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
         class="tile-picture"
         aria-label={`Show ${saved.name}`}
         aria-pressed={shown}
-        onClick={() => replaceLook(`Show ${saved.name}`, whole)}
+        onClick={() => showSaved(saved.name, whole)}
       >
         <Picture image={thumbnailOf(saved.name)} text={saved.name} />
         {sideA.value?.label === saved.name && <span class="mark">A</span>}
@@ -64,10 +75,10 @@ function SavedTile({ saved }: { saved: SavedLook }) {
         <IconButton
           icon="save"
           label={`Save the live look over ${saved.name}`}
-          disabled={shown}
+          disabled={shown || !mayEdit.value}
           onClick={() => look.value && void updateLook(saved, look.value)}
         />
-        <IconButton icon="trash" label={`Delete ${saved.name}`} onClick={() => void deleteLook(saved)} />
+        <IconButton icon="trash" label={`Delete ${saved.name}`} disabled={!mayEdit.value} onClick={() => void deleteLook(saved)} />
       </span>
       <Name saved={saved} />
     </li>
@@ -174,7 +185,7 @@ export function Filmstrip() {
       <button
         class="save"
         onClick={() => void saveLook()}
-        disabled={look.value === null}
+        disabled={look.value === null || !mayEdit.value}
         title="Save the live look (Ctrl+S)"
       >
         <Icon name="plus" />
@@ -182,6 +193,7 @@ export function Filmstrip() {
       </button>
       <button
         class="save"
+        disabled={!mayEdit.value}
         aria-expanded={timelineOpen.value}
         onClick={() => (timelineOpen.value = !timelineOpen.value)}
         title="Play looks one after another, and render what lies between (M)"

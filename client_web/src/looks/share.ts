@@ -10,6 +10,7 @@ import { seenPaths } from "../seen/paths";
 import { solo, soloLight } from "../seen/solo";
 import { bake, bakes } from "../state/bakes";
 import { look } from "../state/look";
+import { mayEdit, watched } from "../state/me";
 import { shownViews, viewName } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 
@@ -59,7 +60,8 @@ export async function openShare(id: string): Promise<void> {
   await attempt(async () => {
     const shared = await getShare(id);
     if (shared.lacking.length > 0) throw new Error(shared.lacking.join(" "));
-    await openScene(shared.scene, placeOf(shared), undefined, () => takeOver(shared));
+    watched.value = mayEdit.value ? null : { scene: shared.scene, share: id };
+    await openScene(shared.scene, placeOf(shared), undefined, () => mayEdit.value && takeOver(shared));
     if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
       note("The bake of this link is gone. Its look is shown in another bake of the scene.");
   });

@@ -56,6 +56,13 @@ async function failure(response: Response): Promise<ApiError> {
   return new ApiError(detail ?? fallback, response.status);
 }
 
+let refused: (words: string) => void = () => undefined;
+
+/** Who is told that the server asks for a login. */
+export function whenRefused(take: typeof refused): void {
+  refused = take;
+}
+
 export async function request(path: string, init: RequestInit = {}): Promise<Response> {
   let response: Response;
   try {
@@ -63,8 +70,10 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
   } catch {
     throw new ApiError("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
   }
-  if (!response.ok) throw await failure(response);
-  return response;
+  if (response.ok) return response;
+  const error = await failure(response);
+  if (error.status === 401) refused(error.message);
+  throw error;
 }
 
 export function json(method: string, body: unknown, headers: Record<string, string> = {}): RequestInit {

@@ -28,8 +28,10 @@ export interface SessionHandlers {
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
   sent(revision: number, inputTime: number): void;
+  /** The look cannot be changed: the server lets this one only look. */
+  readOnly(): void;
   /** The server will not have this session again; no use in trying. */
-  ended(reason: string): void;
+  ended(reason: string, code: number): void;
   broken(message: string): void;
 }
 
@@ -39,16 +41,19 @@ export class Session {
   private readonly messages: MessageHandlers;
   private scheduled = false;
   private sentThisFrame = false;
+  /** The only look that there is for one who may not edit; null for who may. */
+  private fixed: Look | null = null;
 
   constructor(
     readonly bake: string,
     private readonly handlers: SessionHandlers,
+    asked: Readonly<Record<string, string>> = {},
   ) {
     this.socket = new LiveSocket(bake, {
       connection: (state, retryInMs) => handlers.connection(state, retryInMs),
       received: (data) => this.receive(data),
-      ended: (reason) => handlers.ended(reason),
-    });
+      ended: (reason, code) => handlers.ended(reason, code),
+    }, asked);
     this.messages = {
       hello: (message) => this.welcome(message),
       status: (message) => handlers.status(message),
@@ -56,6 +61,7 @@ export class Session {
       probe: (message) => handlers.probe(message),
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
+      leaving: () => this.socket.moveOn(),
     };
   }
 
@@ -104,7 +110,9 @@ export class Session {
 
   private welcome(message: HelloMessage): void {
     this.socket.greet(message.resume);
-    this.queue.reset(message.look as unknown as Look, message.revision, message.solo);
+    const look = message.look as unknown as Look;
+    this.fixed = message.role === "view" ? look : null;
+    this.queue.reset(look, message.revision, message.solo);
     this.handlers.hello(message);
     this.handlers.connection("open", 0);
     this.flush();
@@ -112,6 +120,7 @@ export class Session {
 
   /** What to show from now on, and the edit that made it; sent at once, then at most once per animation frame. */
   want(wanted: Wanted, change: Change | null = null): void {
+    if (this.fixed !== null && wanted.look !== this.fixed) return this.handlers.readOnly();
     this.queue.want(wanted, change);
     if (this.sentThisFrame) this.schedule();
     else this.flush();
@@ -147,6 +156,7 @@ export class Session {
 
   /** Whether the message went. */
   send(message: ClientMessage): boolean {
+    if (this.fixed !== null && message.type === "touch") return false; // nothing of it is edited
     return this.socket.send(message);
   }
 }

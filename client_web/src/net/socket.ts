@@ -2,8 +2,10 @@
 import { SUBPROTOCOL, type ClientMessage } from "../protocol";
 import { backoffMs } from "./backoff";
 
+/** Nobody has logged in, or may no longer be here. */
+export const LOGIN_CODE = 4401;
 /** Another version of the protocol, no such bake, not ready, damaged: trying again gives the same. */
-const FINAL_CODES = new Set([1002, 4404, 4409, 4410]);
+const FINAL_CODES = new Set([1002, LOGIN_CODE, 4403, 4404, 4409, 4410]);
 /** A token that was refused so often is not tried for ever. */
 const MAX_RESUMES = 3;
 
@@ -13,7 +15,7 @@ export interface SocketHandlers {
   connection(state: Connection, retryInMs: number): void;
   received(data: string | ArrayBuffer): void;
   /** The server will not have this session again; no use in trying. */
-  ended(reason: string): void;
+  ended(reason: string, code: number): void;
 }
 
 export class LiveSocket {
@@ -28,12 +30,15 @@ export class LiveSocket {
   constructor(
     readonly bake: string,
     private readonly handlers: SocketHandlers,
+    /** What the session is to begin with, as the address says it. */
+    private readonly asked: Readonly<Record<string, string>> = {},
   ) {}
 
   connect(): void {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
     url.protocol = url.protocol.replace("http", "ws");
+    for (const [name, value] of Object.entries(this.asked)) url.searchParams.set(name, value);
     if (this.resume !== null) url.searchParams.set("resume", this.resume);
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
@@ -49,18 +54,27 @@ export class LiveSocket {
     this.resume = resume;
   }
 
-  private lost(socket: WebSocket, event: CloseEvent): void {
+  private lost(socket: WebSocket, event: Pick<CloseEvent, "code" | "reason">): void {
     if (this.closed || socket !== this.socket) return;
     this.greeted = false;
+    this.socket = null;
     if (FINAL_CODES.has(event.code)) {
       this.close();
-      this.handlers.ended(event.reason || `code ${event.code}`);
+      this.handlers.ended(event.reason || `code ${event.code}`, event.code);
       return;
     }
     const wait = backoffMs(this.attempt++);
     if (this.attempt > MAX_RESUMES) this.resume = null;
     this.handlers.connection("reconnecting", wait);
     this.retry = window.setTimeout(() => this.connect(), wait);
+  }
+
+  /** The server is being stopped: leave it, and try until it, or another in its place, is there. */
+  moveOn(): void {
+    const leaving = this.socket;
+    if (leaving === null || this.closed) return;
+    leaving.close(1000);
+    this.lost(leaving, { code: 1012, reason: "" });
   }
 
   /** Try at once instead of waiting for the backoff. */

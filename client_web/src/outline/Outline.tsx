@@ -7,6 +7,7 @@ import type { MaterialLook } from "../protocol";
 import { solo, toggleMaterialSolo } from "../seen/solo";
 import { defaultLook, look } from "../state/look";
 import { materialNames, modelOf } from "../state/scene";
+import { mayEdit } from "../state/me";
 import { hoveredMaterial, select, selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { Section } from "../ui/Section";
@@ -100,10 +101,12 @@ export function Outline() {
       <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
         <Materials />
       </Section>
-      <LightsPanel />
-      <EnvironmentPanel />
-      <BackgroundPanel />
-      <TransportPanel />
+      <div inert={!mayEdit.value}>
+        <LightsPanel />
+        <EnvironmentPanel />
+        <BackgroundPanel />
+        <TransportPanel />
+      </div>
     </nav>
   );
 }

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
+import { mayEdit } from "../state/me";
 import { IconButton } from "../ui/Button";
 import { formatCount } from "../ui/scale";
 import { CardProgress } from "./CardProgress";
@@ -48,7 +49,7 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }
           </details>
         )}
       </div>
-      <div class="scene-actions">
+      <div class="scene-actions" inert={!mayEdit.value}>
         <button onClick={onBake}>Bake…</button>
         {!scene.materials.some(({ catcher }) => catcher) && (
           <button

@@ -5,6 +5,8 @@ import type { SceneBody } from "../protocol";
 import type { BakeChoice } from "../scene/bakeChoice";
 import { openScene } from "../scene/open";
 import { attempt, note } from "../ui/toasts";
+import { Account, ReadOnly } from "../account/Account";
+import { mayEdit } from "../state/me";
 import { BakeDialog } from "./BakeDialog";
 import { BuiltIns } from "./BuiltIns";
 import { DropZone } from "./DropZone";
@@ -39,12 +41,14 @@ export function StartPage() {
       <header>
         <h1>relume</h1>
         <p>Edit materials in the finished picture, with its real shadows, while you drag a curve.</p>
+        <Account />
       </header>
-      <DropZone onImported={imported} />
+      <ReadOnly />
+      {mayEdit.value && <DropZone onImported={imported} />}
       {planned !== null && (
         <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(choice) => open(planned, choice)} />
       )}
-      <BuiltIns onOpen={open} />
+      {mayEdit.value && <BuiltIns onOpen={open} />}
       <h2>Scenes</h2>
       {scenes === null && <p class="quiet">Looking for scenes…</p>}
       {scenes?.length === 0 && <p class="quiet">No scenes yet. Take a built-in one, or drop your own above.</p>}

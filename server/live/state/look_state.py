@@ -13,12 +13,17 @@ from server.wire.protocol import EditMessage
 
 
 class LookState:
-    """The newest accepted look, its revision, and which sources of light alone are shown (None: all)."""
+    """The newest accepted look, its revision, and which sources of light alone are shown (None: all).
+
+    Attributes:
+        num_edits: accepted so far.
+    """
 
     def __init__(
         self, default: dict[str, Any], document: dict[str, Any], revision: int, solo: frozenset[str] | None = None
     ) -> None:
         self.default, self.document, self.revision, self.solo = default, document, revision, solo
+        self.num_edits = 0
         self._materials: dict[str, tuple[Any, MaterialLook]] = {}
 
     def target(self) -> Target:
@@ -39,6 +44,7 @@ class LookState:
             check_hand(message.hand, document)
         look = self._read(document)
         self.document, self.revision = document, message.revision
+        self.num_edits += 1
         if message.says_solo:
             self.solo = None if message.solo is None else frozenset(message.solo)
         return Target(look, document, message.revision, received_s, message.hand, self.solo)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from relume.picture.transfer import Opened
+from server.access.roles import Caller
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
@@ -15,7 +16,11 @@ from server.metrics import Metrics
 
 @dataclass(frozen=True)
 class SessionState:
-    """The receiving half fills them, the sending half follows; all on the event loop."""
+    """The receiving half fills them, the sending half follows; all on the event loop.
+
+    Attributes:
+        caller: who is at the other end.
+    """
 
     socket: ClientSocket
     pending: PendingRequests
@@ -24,3 +29,4 @@ class SessionState:
     look: LookState
     transfer: Opened
     metrics: Metrics
+    caller: Caller

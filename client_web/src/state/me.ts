@@ -1,0 +1,23 @@
+/** Who is here, and what they may do. */
+import { computed, signal } from "@preact/signals";
+import type { MeBody } from "../protocol";
+
+export const me = signal<MeBody>({ login: false, name: "", role: "admin", by: "open" });
+
+export const mayEdit = computed(() => me.value.role === "edit" || me.value.role === "admin");
+
+/** Why nothing can be edited; null where it can. */
+export const readOnlyWords = computed(() =>
+  mayEdit.value
+    ? null
+    : `${me.value.name} may look, but not edit: the role is “view”. An admin can hand out a token with the role “edit”.`,
+);
+
+/** Counts edits of somebody who may not. */
+export const refusals = signal(0);
+
+/** Why a token is asked for; null where it is not. */
+export const loginWords = signal<string | null>(null);
+
+/** What somebody who may not edit looks at: a saved or a shared look of a scene. */
+export const watched = signal<{ scene: string; look: string } | { scene: string; share: string } | null>(null);

@@ -1,0 +1,43 @@
+"""Token buckets: so many calls a second on the mean, some more at once; of each caller, and of not too many callers.
+
+The libraries for this (slowapi, limits) keep their counts in a store of their own and wrap each route; this is twenty
+lines, and stands where all requests pass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable
+
+MAX_BUCKETS = 10_000
+
+
+class Buckets:
+    """One bucket for each name; used from the event loop only.
+
+    Args:
+        per_second: calls on the mean. burst: calls at once, after a rest. clock: seconds.
+    """
+
+    def __init__(self, per_second: float, burst: float, clock: Callable[[], float]) -> None:
+        self._per_second, self._burst, self._clock = per_second, burst, clock
+        self._levels: OrderedDict[str, tuple[float, float]] = OrderedDict()
+
+    def wait_s(self, name: str) -> float:
+        """Seconds until a call of this name may come; 0: now."""
+        return max(0.0, (1.0 - self._level(name)) / self._per_second)
+
+    def take(self, name: str) -> float:
+        """Take one call; seconds to wait where there is none, which takes nothing."""
+        wait_s = self.wait_s(name)
+        if wait_s == 0.0:
+            self._levels[name] = self._level(name) - 1.0, self._clock()
+            self._levels.move_to_end(name)
+            if len(self._levels) > MAX_BUCKETS:
+                self._levels.popitem(last=False)
+        return wait_s
+
+    def _level(self, name: str) -> float:
+        level, at_s = self._levels.get(name, (self._burst, -math.inf))
+        return min(self._burst, level + (self._clock() - at_s) * self._per_second)

@@ -1,0 +1,138 @@
+"""What every request passes before anything of it is read: who calls, how often, whether they may; and the audit.
+
+Pure ASGI, and not a dependency of routes: FastAPI reads a body before it asks dependencies, so that whoever may not
+upload would have uploaded.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from anyio.to_thread import run_sync
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.access.access import Access
+from server.access.audit import Change
+from server.access.buckets import Buckets
+from server.access.roles import KEY, Caller, Role
+from server.access.rules import SOCKET, is_change, needed
+from server.errors import (
+    ForbiddenError,
+    LoginError,
+    RateError,
+    close_code_of,
+    headers_of,
+    problem_of,
+    problem_response,
+)
+from server.logs.context import USER
+from server.wire.protocol import SUBPROTOCOL
+from worker.database.faults import AWAY, told
+
+if TYPE_CHECKING:
+    from server.settings import Settings
+
+log = logging.getLogger(__name__)
+_UNCHANGED = 200
+"""Calls that change something answer 201, 202 or 204; 200 says that they would, or that it was so before."""
+
+
+class Gate:
+    """The middleware between the guard, which knows no callers, and the routes.
+
+    Args:
+        access: asked for with each request, because it is opened after the app is made. clock: seconds.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        settings: Settings,
+        access: Callable[[], Access],
+        clock: Callable[[], float],
+    ) -> None:
+        self._app, self._access = app, access
+        rate = settings.requests_per_second
+        self._buckets = None if rate is None else Buckets(rate, settings.requests_at_once, clock)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or hand on with the caller in the scope."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        method = scope.get("method", SOCKET)
+        try:
+            caller = scope[KEY] = await self._known(scope)
+            USER.set(caller.name)
+            self._check(caller, needed(method, scope["path"]))
+        except (LoginError, ForbiddenError, RateError) as error:
+            await self._refuse(error, scope, receive, send)
+            return
+        except AWAY as error:
+            log.error("who calls cannot be told (%s)", told(error))
+            await self._refuse(error, scope, receive, send)
+            return
+        if is_change(method, scope["path"]):
+            send = self._audited(caller, scope, send)
+        await self._app(scope, receive, send)
+
+    async def _known(self, scope: Scope) -> Caller:
+        """Who calls, if not too often."""
+        access = self._access()
+        try:
+            caller = await access.identity.caller(scope, access.tokens)
+        except LoginError:
+            self._count(access.identity.address(scope))
+            raise
+        self._count(caller.shown)
+        return caller
+
+    def _count(self, name: str) -> None:
+        wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
+        if wait_s > 0.0:
+            raise RateError(f"too many calls; wait {wait_s:.1f} s, and make them less often", wait_s)
+
+    @staticmethod
+    def _check(caller: Caller, role: Role) -> None:
+        if caller.role >= role:
+            return
+        if caller.role is Role.ANYONE:
+            raise LoginError("log in first: send a token as Authorization: Bearer, or open the editor and log in there")
+        raise ForbiddenError(
+            f"{caller.name} has the role {caller.role.word}, this needs {role.word}; ask an admin for a token with it"
+        )
+
+    def _audited(self, caller: Caller, scope: Scope, send: Send) -> Send:
+        """Writes a line when a change has been made, before its answer goes out."""
+
+        async def audited(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                status, made = message["status"], Headers(raw=message["headers"]).get("location", "")
+                if status < 400 and status != _UNCHANGED:
+                    what = f"{scope['method']} {scope['path']}"
+                    change = Change.by(caller, what, made or scope["path"], status)
+                    await run_sync(self._access().audit.add, change)
+            await send(message)
+
+        return audited
+
+    @staticmethod
+    async def _refuse(error: Exception, scope: Scope, receive: Receive, send: Send) -> None:
+        """An answer; a WebSocket is opened first, because browsers tell pages only of the codes that close one."""
+        problem = problem_of(error)
+        if scope["type"] == "http":
+            await problem_response(problem, headers_of(error))(scope, receive, send)
+            return
+        await receive()
+        subprotocol = SUBPROTOCOL if SUBPROTOCOL in scope["subprotocols"] else None
+        await send({"type": "websocket.accept", "subprotocol": subprotocol, "headers": []})
+        await send({"type": "websocket.close", "code": close_code_of(error), "reason": _short(problem.detail)})
+
+
+def _short(text: str) -> str:
+    """As much as a closing word may have."""
+    return text.encode()[:123].decode(errors="ignore")

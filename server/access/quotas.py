@@ -1,0 +1,128 @@
+"""How much each may have: bytes of uploads and bakes, bakes that wait or run, live sessions."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session, sessionmaker
+
+from server.access.tables import OwnedRow
+from server.errors import BusyError, QuotaError
+from worker.database.models import BakeRow
+
+if TYPE_CHECKING:
+    from server.settings import Settings
+
+Kind = Literal["scene", "environment", "material", "btf-work", "bake"]
+_ACTIVE = ("queued", "running")
+
+
+class Quotas:
+    """What belongs to whom, and whether there is room for more; may be used from any thread.
+
+    Things are shared: who brings what is here already owns nothing of it.
+
+    Attributes:
+        deciding: held while a bake is looked at and queued, lest two at once both be the last that may.
+    """
+
+    def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
+        self._sessions, self._settings = sessions, settings
+        self._lock, self._open = threading.Lock(), Counter[str]()
+        self.deciding = threading.Lock()
+
+    @property
+    def num_sessions(self) -> int:
+        """Live sessions of all."""
+        return self._open.total()
+
+    @contextmanager
+    def session(self, who: str) -> Iterator[None]:
+        """One live session of somebody. Raises BusyError, QuotaError: enough are open."""
+        most, each = self._settings.max_sessions, self._settings.max_sessions_each
+        with self._lock:
+            if self._open.total() >= most:
+                raise BusyError(f"{most} sessions are open; close one and try again")
+            if each is not None and self._open[who] >= each:
+                text = f"you have {each} sessions open, and {each} may be; close one (RELUME_MAX_SESSIONS_EACH)"
+                raise QuotaError(text)
+            self._open[who] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open[who] -= 1
+                self._open += Counter()  # forgets those who have none
+
+    @property
+    def counts_bytes(self) -> bool:
+        """Whether there is a limit on them."""
+        return self._settings.max_bytes_each is not None
+
+    def check_bytes(self, who: str, more: int) -> None:
+        """Raises QuotaError where somebody would have too much with so many bytes more."""
+        most = self._settings.max_bytes_each
+        if most is None:
+            return
+        used = self.used_bytes(who)
+        if used + more > most:
+            raise QuotaError(
+                f"you have {used / 1e6:,.1f} MB of at most {most / 1e6:,.1f} MB, and this takes {more / 1e6:,.1f} MB; "
+                "delete a scene or a material of yours first (RELUME_MAX_BYTES_EACH)"
+            )
+
+    def check_bakes(self, who: str) -> None:
+        """Raises QuotaError where enough bakes of somebody wait or run."""
+        most = self._settings.max_bakes_each
+        if most is None:
+            return
+        query = (
+            select(func.count())
+            .select_from(OwnedRow)
+            .join(BakeRow, BakeRow.id == OwnedRow.object)
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == who, BakeRow.state.in_(_ACTIVE))
+        )
+        with self._sessions() as session:
+            active = session.scalar(query) or 0
+        if active >= most:
+            raise QuotaError(
+                f"{active} bakes of yours wait or run, and {most} may; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
+            )
+
+    def used_bytes(self, who: str) -> int:
+        """What somebody's uploads had, finished bakes have, and others are planned to take."""
+        uploads = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
+            OwnedRow.owner == who, OwnedRow.kind != "bake"
+        )
+        bakes = (
+            select(OwnedRow.bytes, BakeRow.bytes, BakeRow.state)
+            .join(BakeRow, BakeRow.id == OwnedRow.object)
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == who)
+        )
+        with self._sessions() as session:
+            total = int(session.scalar(uploads) or 0)
+            for planned, written, state in session.execute(bakes):
+                total += planned if state in _ACTIVE else written
+        return total
+
+    def own(self, who: str, kind: Kind, thing: str, num_bytes: int) -> None:
+        """Something of so many bytes is somebody's, unless somebody has it."""
+        with self._sessions.begin() as session:
+            if session.get(OwnedRow, (kind, thing)) is None:
+                session.add(OwnedRow(kind=kind, object=thing, owner=who, bytes=num_bytes))
+
+    def disown(self, kind: Kind, *things: str) -> None:
+        """They are deleted."""
+        with self._sessions.begin() as session:
+            session.execute(delete(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object.in_(things)))
+
+
+def folder_bytes(folder: Path) -> int:
+    """What the files in a folder take."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

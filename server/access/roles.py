@@ -1,0 +1,63 @@
+"""Roles, and whoever calls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, Literal
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+
+class Role(IntEnum):
+    """What somebody may do; who has one may do all that those below it may."""
+
+    ANYONE = 0
+    VIEW = 1
+    EDIT = 2
+    ADMIN = 3
+
+    @property
+    def word(self) -> str:
+        """As settings, commands and messages write it."""
+        return self.name.lower()
+
+
+ROLES: dict[str, Role] = {"view": Role.VIEW, "edit": Role.EDIT, "admin": Role.ADMIN}
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Whoever sent a request.
+
+    Attributes:
+        name: by which quotas, turns and the audit know them; empty where nobody logs in.
+        role: what they may do. address: where the request came from.
+        by: how they are known: no login is asked for, they have not logged in, a token, a proxy.
+        token: id of the token.
+    """
+
+    name: str
+    role: Role
+    address: str
+    by: Literal["open", "nobody", "token", "proxy"]
+    token: str | None = None
+
+    @property
+    def shown(self) -> str:
+        """As logs and the audit call them."""
+        return self.name or self.address
+
+
+KEY = "relume.caller"
+"""Under which the gate leaves the caller in the scope of a request."""
+
+
+def caller_of(connection: HTTPConnection) -> Caller:
+    """Who calls, for routes."""
+    found: Caller = connection.scope[KEY]
+    return found
+
+
+Who = Annotated[Caller, Depends(caller_of)]

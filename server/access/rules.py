@@ -1,0 +1,124 @@
+"""The table of what each call needs; the gate asks it before anything of a request is read.
+
+A call that is not listed is for admins alone, and `tests/access` fails for it: every route has its line here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from starlette.routing import compile_path
+
+from server.access.roles import Caller, Role
+from server.errors import ForbiddenError
+
+ANYONE, VIEW, EDIT, ADMIN = Role
+
+SOCKET = "WEBSOCKET"
+"""Stands for a method where a live session is opened."""
+
+RULES: Mapping[str, Mapping[str, Role]] = {
+    "/livez": {"GET": ANYONE},
+    "/readyz": {"GET": ANYONE},
+    "/metrics": {"GET": VIEW},
+    "/api/openapi.json": {"GET": ANYONE, "HEAD": ANYONE},
+    "/api/me": {"GET": ANYONE},
+    "/api/login": {"POST": ANYONE},
+    "/api/logout": {"POST": ANYONE},
+    "/api/audit": {"GET": ADMIN},
+    "/api/scenes": {"GET": VIEW, "POST": EDIT},
+    "/api/scenes/{scene}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/scenes/{scene}/ground": {"POST": EDIT},
+    "/api/scenes/{scene}/thumbnail.webp": {"GET": VIEW},
+    "/api/scenes/{scene}/cameras": {"GET": VIEW},
+    "/api/scenes/{scene}/cameras/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
+    "/api/scenes/{scene}/finder": {"GET": VIEW, "POST": VIEW},
+    "/api/scenes/{scene}/finder/place": {"POST": VIEW},
+    "/api/built-ins": {"GET": VIEW},
+    "/api/built-ins/{name}": {"POST": EDIT},
+    "/api/models": {"GET": VIEW},
+    "/api/models/in-out": {"POST": VIEW},
+    "/api/models/albedo": {"POST": VIEW},
+    "/api/materials": {"GET": VIEW},
+    "/api/materials/map": {"GET": VIEW},
+    "/api/materials/map/at": {"GET": VIEW},
+    "/api/materials/{table}/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/measured": {"GET": VIEW, "POST": EDIT},
+    "/api/materials/measured/{material}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/measured/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/btf": {"GET": VIEW},
+    "/api/materials/btf/{material}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/btf/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/btf-works": {"GET": VIEW, "POST": EDIT},
+    "/api/materials/btf-works/synthetic": {"POST": EDIT},
+    "/api/materials/btf-works/{work}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/btf-works/{work}/resume": {"POST": EDIT},
+    "/api/environments": {"GET": VIEW, "POST": EDIT},
+    "/api/environments/{environment}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/environments/{environment}/thumbnail.png": {"GET": VIEW},
+    "/api/bakes": {"GET": VIEW, "POST": EDIT},
+    "/api/bakes/{bake}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/bakes/{bake}/events": {"GET": VIEW},
+    "/api/bakes/{bake}/views/{view}/materials.png": {"GET": VIEW},
+    "/api/bakes/{bake}/environment.png": {"GET": VIEW},
+    "/api/bakes/{bake}/surface": {"GET": VIEW},
+    "/api/bakes/{bake}/surface/{array}": {"GET": VIEW},
+    "/api/bakes/{bake}/session": {SOCKET: VIEW},
+    "/api/renders": {"POST": EDIT},
+    "/api/renders/looks": {"POST": VIEW},
+    "/api/renders/{render}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/renders/{render}/frames/{index}": {"GET": VIEW},
+    "/api/renders/{render}/video.mp4": {"GET": VIEW},
+    "/api/renders/{render}/archive.zip": {"GET": VIEW},
+    "/api/truths": {"POST": EDIT},
+    "/api/truths/{truth}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/truths/{truth}/resume": {"POST": EDIT},
+    "/api/truths/{truth}/{name}.png": {"GET": VIEW},
+    "/api/looks": {"GET": VIEW},
+    "/api/looks/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
+    "/api/shares": {"POST": EDIT},
+    "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
+}
+
+MESSAGES: Mapping[str, Role] = {
+    "edit": EDIT,
+    "touch": EDIT,  # freezes a curve for edits
+    "solo": VIEW,  # an edit that changes nothing of the look
+    "view": VIEW,
+    "views": VIEW,
+    "focus": VIEW,
+    "eye": VIEW,
+    "evaluate": VIEW,
+    "stream": VIEW,
+    "ack": VIEW,
+    "probe": VIEW,
+    "brush": VIEW,
+}
+"""What the messages of a live session need."""
+
+_COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
+    (compile_path(path)[0], roles) for path, roles in RULES.items()
+)
+
+
+def needed(method: str, path: str) -> Role:
+    """What a call needs: the most that any line asks that fits it; of what is no call, nothing, the editor's files."""
+    fitting = [roles[method] for pattern, roles in _COMPILED if method in roles and pattern.match(path)]
+    if fitting:
+        return max(fitting)
+    is_file = method in ("GET", "HEAD") and not (path == "/api" or path.startswith("/api/"))
+    return ANYONE if is_file else ADMIN
+
+
+def is_change(method: str, path: str) -> bool:
+    """Whether a call changes something that others see: it is not safe, and needs more than to look."""
+    return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and needed(method, path) >= EDIT
+
+
+def check_message(caller: Caller, kind: str) -> None:
+    """Raises ForbiddenError where a caller may not send messages of that kind."""
+    if caller.role < MESSAGES[kind]:
+        raise ForbiddenError(
+            f"{caller.shown} may look at this picture but not edit it; ask an admin for a token with the role edit"
+        )

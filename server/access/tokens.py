@@ -1,0 +1,125 @@
+"""Tokens: made, listed, revoked, and told apart. `relume_<id>_<secret>`; the database keeps a hash of the secret.
+
+The secret is 256 random bits, so that a plain hash is as good as a slow one, and a salt would protect nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+import time
+from dataclasses import dataclass
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.errors import NotFoundError, ParameterError
+from server.access.roles import ROLES, Role
+from server.access.tables import TokenRow
+
+MAX_TOKENS = 10_000
+REMEMBERED_S = 2.0
+"""How long a token that was revoked elsewhere may still be taken."""
+_ID_DIGITS, _MAX_LENGTH = 12, 120
+
+
+@dataclass(frozen=True)
+class Token:
+    """A token without its secret; times in seconds since 1970."""
+
+    id: str
+    name: str
+    role: Role
+    created: float
+    expires: float | None
+    revoked: float | None
+
+    def is_valid(self, now: float) -> bool:
+        """Whether it opens anything."""
+        return self.revoked is None and (self.expires is None or now < self.expires)
+
+
+class TokenStore:
+    """Tokens in the database; may be used from any thread."""
+
+    def __init__(self, sessions: sessionmaker[Session]) -> None:
+        self._sessions = sessions
+        self._remembered: dict[str, tuple[float, Token, str]] = {}
+
+    def add(self, name: str, role: str, days: float | None = None) -> str:
+        """Hand out a token; the text is told this once.
+
+        Raises:
+            ParameterError: there is no such role, the name is not one, or a valid token has it already.
+        """
+        if role not in ROLES:
+            raise ParameterError("role", role, ", ".join(ROLES))
+        if not (name.isprintable() and name == name.strip() and 1 <= len(name) <= 80):
+            raise ParameterError("name", name, "1 to 80 printable characters")
+        if days is not None and not 0 < days <= 36_500:
+            raise ParameterError("days", days, "more than 0, at most 36500")
+        now, known = time.time(), self.all()
+        if any(token.name == name and token.is_valid(now) for token in known):
+            raise ParameterError("name", name, "one that no valid token has; revoke that first")
+        if len(known) >= MAX_TOKENS:
+            raise ParameterError("name", name, f"no more: {MAX_TOKENS:,} tokens were handed out")
+        identity, secret = secrets.token_hex(_ID_DIGITS // 2), secrets.token_urlsafe(32)
+        expires = None if days is None else now + days * 86_400
+        with self._sessions.begin() as session:
+            session.add(
+                TokenRow(id=identity, name=name, role=role, digest=_digest(secret), created=now, expires=expires)
+            )
+        return f"relume_{identity}_{secret}"
+
+    def all(self) -> list[Token]:
+        """Every token that was handed out, oldest first."""
+        with self._sessions() as session:
+            return [_token(row) for row in session.scalars(select(TokenRow).order_by(TokenRow.created))]
+
+    def revoke(self, name: str) -> None:
+        """The valid token of that name, or of that id, opens nothing any more. Raises NotFoundError."""
+        now = time.time()
+        found = [token for token in self.all() if name in (token.name, token.id) and token.is_valid(now)]
+        if not found:
+            raise NotFoundError(f"there is no valid token {name[:80]!r}; relume token list shows them")
+        with self._sessions.begin() as session:
+            for token in found:
+                row = session.get(TokenRow, token.id)
+                if row is not None:
+                    row.revoked = now
+                self._remembered.pop(token.id, None)
+
+    def find(self, text: str) -> Token | None:
+        """The valid token that a text is; asks the database, unless it has just done so."""
+        parts = text.split("_", 2)
+        if len(text) > _MAX_LENGTH or len(parts) != 3 or parts[0] != "relume" or len(parts[1]) != _ID_DIGITS:
+            return None
+        known = self._known(parts[1])
+        digest = known[1] if known is not None else ""
+        is_right = hmac.compare_digest(digest.encode(), _digest(parts[2]).encode())
+        return known[0] if known is not None and is_right and known[0].is_valid(time.time()) else None
+
+    def is_valid(self, identity: str) -> bool:
+        """Whether the token of that id still opens what it opened."""
+        known = self._known(identity)
+        return known is not None and known[0].is_valid(time.time())
+
+    def _known(self, identity: str) -> tuple[Token, str] | None:
+        now_s, remembered = time.monotonic(), self._remembered.get(identity)
+        if remembered is not None and now_s < remembered[0]:
+            return remembered[1:]
+        with self._sessions() as session:
+            row = session.get(TokenRow, identity)
+        if row is None:
+            return None
+        self._remembered[identity] = now_s + REMEMBERED_S, _token(row), row.digest
+        return _token(row), row.digest
+
+
+def _digest(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def _token(row: TokenRow) -> Token:
+    return Token(row.id, row.name, ROLES[row.role], row.created, row.expires, row.revoked)

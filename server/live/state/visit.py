@@ -1,0 +1,22 @@
+"""Who has come to a session, and with what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from server.access.roles import Caller
+
+
+@dataclass(frozen=True)
+class Visit:
+    """What a client says when it opens a session.
+
+    Attributes:
+        resume: token of a session that was lost. look: complete document that the session begins with; None: the
+            scene's own.
+    """
+
+    caller: Caller
+    resume: str | None
+    look: dict[str, Any] | None

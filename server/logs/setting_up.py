@@ -1,0 +1,60 @@
+"""How lines of the log look: text for people, or JSON for machines, with what they are about."""
+
+from __future__ import annotations
+
+import json
+import logging
+from datetime import UTC, datetime
+from typing import Literal
+
+from server.logs.context import current
+
+Format = Literal["plain", "json"]
+
+
+class JsonFormatter(logging.Formatter):
+    """One JSON object a line: time, level, logger, message, what it is about, and the trace where there is one."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """See `logging.Formatter`."""
+        line = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "about", {}),
+            **getattr(record, "fields", {}),
+        }
+        if record.exc_info:
+            line["trace"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False, default=str)
+
+
+class PlainFormatter(logging.Formatter):
+    """A line of text; what it is about stands at its end."""
+
+    def __init__(self) -> None:
+        super().__init__("%(levelname)s %(name)s: %(message)s")
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  (of the base class)
+        """See `logging.Formatter`."""
+        about = " ".join(f"{name}={value}" for name, value in getattr(record, "about", {}).items())
+        return super().formatMessage(record) + (f" [{about}]" if about else "")
+
+
+def _note(record: logging.LogRecord) -> bool:
+    """Write down what is worked on where a line is logged, which may not be where it is formatted."""
+    record.about = current()
+    return True
+
+
+def set_up(form: Format, level: str) -> None:
+    """Log this process's lines in a form, from a level on, or from a lower one where --verbose asked for that."""
+    root = logging.getLogger()
+    handler = logging.StreamHandler()
+    handler.setFormatter(JsonFormatter() if form == "json" else PlainFormatter())
+    handler.addFilter(_note)
+    verbose = [logging.INFO] if any(each.level == logging.INFO for each in root.handlers) else []
+    handler.setLevel(min([logging.getLevelNamesMapping()[level.upper()], *verbose]))
+    root.handlers = [handler]
+    root.setLevel(handler.level)

@@ -1,0 +1,37 @@
+"""A server that people log in to, and clients of each role."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fixtures import ack_seconds, baked, client, control
+from server_fixtures import settings as open_settings
+
+from server.access.access import Access
+from server.settings import Settings
+
+__all__ = ["ack_seconds", "baked", "client", "control", "open_settings"]
+
+
+@pytest.fixture
+def settings(open_settings: Settings) -> Settings:
+    open_settings.login = True
+    return open_settings
+
+
+@pytest.fixture
+def access(client: TestClient) -> Access:
+    return client.app.state.services.access
+
+
+@pytest.fixture
+def bearer(access: Access) -> Callable[..., dict[str, str]]:
+    """Headers of somebody with a role."""
+
+    def headers(role: str, name: str | None = None, **more: Any) -> dict[str, str]:
+        return {"Authorization": f"Bearer {access.tokens.add(name or role, role, **more)}"}
+
+    return headers

@@ -1,0 +1,173 @@
+"""How much each may have, how often each may call, and the audit of what they did."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import SIZE, FakeMethod, tiny_scene
+from session_client import Baked
+
+from server.access.access import Access
+from server.access.audit import Audit, Change
+from server.access.buckets import Buckets
+from server.settings import Settings
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+Bearer = Callable[..., dict[str, str]]
+CHANGE = Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1")
+
+
+SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
+
+
+@pytest.fixture
+def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Importing makes the tiny scene, without a process of its own."""
+    bakes: BakeService = client.app.state.services.bakes
+    importers = client.app.state.services.importers
+    monkeypatch.setattr(importers, "run", lambda _: register_scene(bakes.data_dir, bakes.ledger, tiny_scene()))
+
+
+def test_buckets_fill_again() -> None:
+    now_s = 0.0
+    buckets = Buckets(2.0, 3, lambda: now_s)
+    assert [buckets.take("Ann") for _ in range(4)] == [0, 0, 0, 0.5]
+    assert buckets.take("Bob") == 0
+    now_s = 0.5
+    assert [buckets.take("Ann"), buckets.take("Ann")] == [0, 0.5]
+    now_s = 100.0
+    assert [buckets.take("Ann") for _ in range(4)] == [0, 0, 0, 0.5]
+
+
+def test_buckets_are_of_bounded_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.access.buckets.MAX_BUCKETS", 2)
+    buckets = Buckets(1.0, 1, lambda: 0.0)
+    assert [buckets.take(name) for name in "abc"] == [0, 0, 0]
+    assert (buckets.take("c"), buckets.take("a")) == (1, 0)
+
+
+class TestRates:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.requests_per_second, settings.requests_at_once = 0.001, 3
+        return settings
+
+    def test_each_user_has_a_bucket_and_each_address(self, client: TestClient, bearer: Bearer) -> None:
+        ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+        assert [client.get("/api/me", headers=ann).status_code for _ in range(4)] == [200, 200, 200, 429]
+        refused = client.get("/api/me", headers=ann)
+        assert int(refused.headers["retry-after"]) > 100
+        assert "too many calls; wait" in refused.json()["detail"]
+        assert client.get("/api/me", headers=bob).status_code == 200
+        wrong = {"Authorization": "Bearer relume_000000000000_x"}
+        assert [client.get("/api/me", headers=wrong).status_code for _ in range(4)] == [401, 401, 401, 429]
+
+
+@pytest.mark.usefixtures("_imports")
+class TestBytes:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.max_bytes_each = 100_000
+        return settings
+
+    def test_uploads_and_bakes_count_until_they_are_deleted(
+        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings
+    ) -> None:
+        ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+        made = client.post("/api/scenes", files=SCENE, headers=ann)
+        assert made.status_code == 201, made.text
+        scene = made.json()["id"]
+        used = access.quotas.used_bytes("Ann")
+        on_disk = sum(path.stat().st_size for path in (settings.data / "scenes" / scene).rglob("*") if path.is_file())
+        assert used == on_disk > 0
+        client.post("/api/scenes", files=SCENE, headers=bob)  # the same scene, which is Ann's
+        assert access.quotas.used_bytes("Bob") == 0
+        settings.max_bytes_each = used
+        refused = client.post("/api/scenes", files=SCENE, headers=ann)
+        assert refused.status_code == 429
+        assert refused.json()["type"] == "urn:relume:problem:quota"
+        assert "RELUME_MAX_BYTES_EACH" in refused.json()["detail"]
+        bake = {"scene": scene, "size": list(SIZE), "lights": 10}
+        assert client.post("/api/bakes", json=bake, headers=ann).status_code == 429
+        assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
+        assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+
+@pytest.mark.usefixtures("_imports")
+class TestBakes:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.max_bakes_each = 1
+        return settings
+
+    @pytest.fixture
+    def gate(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+        gate = threading.Event()
+        held = FakeMethod(gate)
+        monkeypatch.setattr("server_fixtures.FakeMethod", lambda: held)
+        yield gate
+        gate.set()
+
+    def test_each_has_so_many_under_way(self, gate: threading.Event, client: TestClient, bearer: Bearer) -> None:
+        ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+        scene = client.post("/api/built-ins/cornell_box", headers=ann).json()["id"]
+        recipes = [{"scene": scene, "size": list(SIZE), "lights": lights} for lights in (10, 20)]
+        first = client.post("/api/bakes", json=recipes[0], headers=ann)
+        assert first.status_code == 202, first.text
+        assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same
+        refused = client.post("/api/bakes", json=recipes[1], headers=ann)
+        assert refused.status_code == 429
+        assert "RELUME_MAX_BAKES_EACH" in refused.json()["detail"]
+        assert client.post("/api/bakes", json=recipes[1], headers=bob).status_code == 202
+        gate.set()
+        bakes: BakeService = client.app.state.services.bakes
+        with bakes.subscribe(first.json()["id"]) as changes:
+            list(changes)
+        third = {**recipes[0], "lights": 30}
+        assert client.post("/api/bakes", json=third, headers=ann).status_code == 202
+
+
+def test_each_change_is_a_line_and_nothing_else_is(client: TestClient, bearer: Bearer, baked: Baked) -> None:
+    ann, root, viewer = bearer("edit", "Ann"), bearer("admin", "Root"), bearer("view")
+    client.put("/api/looks/Red", json={}, headers={**ann, "X-Request-ID": "abc-1"})
+    client.put("/api/looks/Red", json={}, headers=ann)  # refused: which version?
+    client.put("/api/looks/Red", json={}, headers=viewer)  # refused
+    client.get("/api/looks", headers=ann)
+    client.post("/api/bakes", json={"scene": baked.scene, "dry_run": True}, headers=ann)
+    seen = {"bake": baked.bake, "view": "front", "views": ["front"], "look": {}}
+    share = client.post("/api/shares", json=seen, headers=ann).json()["id"]
+    client.delete("/api/looks/Red", headers={**ann, "If-Match": "*"})
+    lines = client.get("/api/audit", headers=root).json()
+    assert [(line["what"], line["object"], line["status"]) for line in lines] == [
+        ("DELETE /api/looks/Red", "/api/looks/Red", 204),
+        ("POST /api/shares", f"/api/shares/{share}", 201),
+        ("PUT /api/looks/Red", "/api/looks/Red", 201),
+    ]
+    assert {(line["who"], line["role"], line["address"]) for line in lines} == {("Ann", "edit", "testclient")}
+    assert lines[2]["request"] == "abc-1"
+    assert lines[0]["request"] not in ("", "abc-1")
+    before = lines[0]["number"]
+    assert len(client.get(f"/api/audit?before={before}&limit=1", headers=root).json()) == 1
+    assert client.get("/api/audit?who=Bob", headers=root).json() == []
+
+
+def test_the_audit_is_bounded(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.access.audit._TRIM_EVERY", 2)
+    audit = Audit(client.app.state.services.looks._sessions, 5)
+    for _ in range(20):
+        audit.add(CHANGE)
+    lines = audit.list(100)
+    assert 5 <= len(lines) <= 5 + 3
+    assert [line.number for line in lines] == list(range(20, 20 - len(lines), -1))
+
+
+def test_request_ids_are_given_or_taken(client: TestClient) -> None:
+    assert client.get("/livez", headers={"X-Request-ID": "from.proxy-7"}).headers["x-request-id"] == "from.proxy-7"
+    one, other = (client.get("/livez", headers={"X-Request-ID": "ev il\n"}).headers["x-request-id"] for _ in range(2))
+    assert len(one) == 16
+    assert one != other

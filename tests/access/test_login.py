@@ -1,0 +1,220 @@
+"""Who is let in: by a token in a header or a cookie, or by the word of a trusted proxy."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from relume.errors import DatabaseDamagedError
+from server.access.access import Access
+from server.access.roles import Role
+from server.access.rules import RULES, SOCKET
+from server.settings import Settings
+
+Bearer = Callable[..., dict[str, str]]
+
+
+def calls(at_least: Role) -> list[tuple[str, str]]:
+    """Calls that need so much, their ids filled in."""
+    found = []
+    for path, roles in RULES.items():
+        filled = re.sub(r"\{\w+\}", "0123456789abcdef", path)
+        found += [(method, filled) for method, role in roles.items() if role >= at_least and method != SOCKET]
+    return found
+
+
+def test_nobody_gets_in_anywhere(client: TestClient) -> None:
+    for method, path in calls(Role.VIEW):
+        refused = client.request(method, path)
+        assert refused.status_code == 401, (method, path)
+        assert refused.headers["www-authenticate"] == "Bearer"
+        assert refused.json()["type"] == "urn:relume:problem:login"
+        assert "log in first" in refused.json()["detail"]
+
+
+def test_viewers_change_nothing(client: TestClient, bearer: Bearer) -> None:
+    headers = bearer("view", "Vera")
+    for method, path in calls(Role.EDIT):
+        refused = client.request(method, path, headers=headers)
+        assert refused.status_code == 403, (method, path)
+        assert refused.json()["detail"].startswith("Vera has the role view, this needs ")
+    assert client.get("/api/scenes", headers=headers).status_code == 200
+
+
+def test_editors_edit_and_only_admins_read_the_audit(client: TestClient, bearer: Bearer) -> None:
+    editor, admin = bearer("edit"), bearer("admin")
+    assert client.put("/api/looks/Red", json={}, headers=editor).status_code == 201
+    assert client.get("/api/audit", headers=editor).status_code == 403
+    assert client.get("/api/audit", headers=admin).status_code == 200
+
+
+def test_what_is_open_stays_open(client: TestClient) -> None:
+    for path in ("/livez", "/readyz", "/api/openapi.json"):
+        assert client.get(path).status_code == 200
+    assert client.get("/api/me").json() == {"login": True, "name": "", "role": "anyone", "by": "nobody"}
+    assert client.get("/").status_code == 503  # the editor, which is not built here
+
+
+def test_a_body_is_not_read_before_it_is_known_who_sends_it(client: TestClient) -> None:
+    def body() -> Any:
+        raise AssertionError("the body was asked for")
+        yield b""
+
+    assert client.post("/api/looks/Red", content=body(), headers={"content-length": "10"}).status_code == 401
+
+
+@pytest.mark.parametrize(
+    "sent", ["nonsense", "relume__", "relume_000000000000_x", "relume_0_0_0", "rélume_1", "x" * 10_000, ""]
+)
+def test_wrong_tokens_open_nothing(client: TestClient, sent: str) -> None:
+    refused = client.get("/api/scenes", headers={"Authorization": f"Bearer {sent}".encode()})
+    assert refused.status_code == 401
+    assert client.get("/api/scenes", headers={"Cookie": f"relume_token={sent}".encode()}).status_code == 401
+
+
+def test_the_secret_counts_not_the_id(client: TestClient, bearer: Bearer) -> None:
+    token = bearer("edit")["Authorization"]
+    other = token[:-1] + ("a" if token[-1] != "a" else "b")
+    assert client.get("/api/scenes", headers={"Authorization": token}).status_code == 200
+    assert client.get("/api/scenes", headers={"Authorization": other}).status_code == 401
+
+
+def test_secrets_are_not_kept(access: Access, settings: Settings) -> None:
+    secret = access.tokens.add("Ann", "edit").split("_", 2)[2]
+    kept = b"".join(path.read_bytes() for path in settings.data.glob("relume.db*"))
+    assert b"Ann" in kept
+    assert secret.encode() not in kept
+
+
+def test_tokens_run_out_and_are_revoked(client: TestClient, access: Access, bearer: Bearer, monkeypatch: Any) -> None:
+    short, long = bearer("edit", "short", days=1), bearer("edit", "long")
+    assert client.get("/api/scenes", headers=short).status_code == 200
+    now = time.time()
+    monkeypatch.setattr("server.access.tokens.time.time", lambda: now + 86_401)
+    assert client.get("/api/scenes", headers=short).status_code == 401
+    assert client.get("/api/scenes", headers=long).status_code == 200
+    access.tokens.revoke("long")
+    assert client.get("/api/scenes", headers=long).status_code == 401
+
+
+def test_a_token_that_another_process_revokes_is_soon_refused(
+    client: TestClient, access: Access, bearer: Bearer, monkeypatch: Any
+) -> None:
+    headers = bearer("edit", "Ann")
+    assert client.get("/api/scenes", headers=headers).status_code == 200
+    Access(client.app.state.services.looks._sessions, Settings()).tokens.revoke("Ann")
+    monkeypatch.setattr("server.access.tokens.time.monotonic", lambda: time.perf_counter() + 1e9)
+    assert client.get("/api/scenes", headers=headers).status_code == 401
+
+
+def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: Access) -> None:
+    token = access.tokens.add("Ann", "edit")
+    assert client.post("/api/login", json={"token": "relume_000000000000_x"}).status_code == 401
+    answer = client.post("/api/login", json={"token": token})
+    assert answer.status_code == 204
+    cookie = answer.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=strict" in cookie
+    assert "secure" not in cookie  # plain HTTP
+    assert client.get("/api/me").json() == {"login": True, "name": "Ann", "role": "edit", "by": "token"}
+    assert client.post("/api/logout").status_code == 204
+    assert client.get("/api/me").json()["by"] == "nobody"
+
+
+def test_another_site_cannot_use_the_cookie(client: TestClient, access: Access) -> None:
+    client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
+    refused = client.put("/api/looks/Red", json={}, headers={"Origin": "https://evil.example"})
+    assert refused.status_code == 403
+    assert refused.json()["type"] == "urn:relume:problem:forbidden-origin"
+
+
+class TestProxy:
+    """A proxy at 10.0.0.0/8 that says who calls."""
+
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.trusted_proxies, settings.proxy_roles = ["10.0.0.0/8"], {"Ann": "edit"}
+        return settings
+
+    def at(self, client: TestClient, address: str) -> TestClient:
+        return TestClient(client.app, client=(address, 1), base_url="http://testserver")
+
+    def test_its_word_counts_and_roles_are_settings(self, client: TestClient) -> None:
+        proxy = self.at(client, "10.1.2.3")
+        ann = proxy.get("/api/me", headers={"X-Forwarded-User": "Ann"}).json()
+        bob = proxy.get("/api/me", headers={"X-Forwarded-User": "Bob"}).json()
+        assert (ann["name"], ann["role"], ann["by"]) == ("Ann", "edit", "proxy")
+        assert (bob["name"], bob["role"]) == ("Bob", "view")
+        assert proxy.get("/api/scenes").status_code == 401
+
+    def test_nobody_elses_word_counts(self, client: TestClient) -> None:
+        for address in ("192.168.0.1", "testclient", ""):
+            other = self.at(client, address)
+            assert other.get("/api/scenes", headers={"X-Forwarded-User": "Ann"}).status_code == 401
+            told = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
+            assert other.get("/api/scenes", headers=told).status_code == 401
+
+    def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: Access) -> None:
+        told = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
+        for each, name in ((self.at(client, "10.1.2.3"), "Red"), (client, "Blue")):
+            each.put(f"/api/looks/{name}", json={}, headers={**told, **bearer("edit", name)})
+        assert [line.address for line in access.audit.list()] == ["testclient", "192.0.2.7"]
+
+    def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: Access) -> None:
+        token = {"token": access.tokens.add("Ann", "edit")}
+        told = {"X-Forwarded-Proto": "https"}
+        behind, direct = (
+            each.post("/api/login", json=token, headers=told).headers["set-cookie"].lower()
+            for each in (self.at(client, "10.1.2.3"), client)
+        )
+        assert "secure" in behind
+        assert "secure" not in direct
+
+    def test_a_token_goes_before_it(self, client: TestClient, bearer: Bearer) -> None:
+        told = {"X-Forwarded-User": "Ann", **bearer("admin", "Root")}
+        assert self.at(client, "10.1.2.3").get("/api/me", headers=told).json()["name"] == "Root"
+
+
+def test_names_of_tokens_are_unique_while_they_open(access: Access) -> None:
+    access.tokens.add("Ann", "view")
+    with pytest.raises(Exception, match="one that no valid token has"):
+        access.tokens.add("Ann", "edit")
+    access.tokens.revoke("Ann")
+    access.tokens.add("Ann", "edit")
+    with pytest.raises(Exception, match="view, edit, admin"):
+        access.tokens.add("Bob", "root")
+    with pytest.raises(Exception, match="no valid token 'Eve'"):
+        access.tokens.revoke("Eve")
+
+
+def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
+    client: TestClient, bearer: Bearer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    headers = bearer("edit")
+
+    def damaged(*_: object) -> None:
+        raise DatabaseDamagedError("database disk image is malformed")
+
+    monkeypatch.setattr("server.access.tokens.TokenStore._known", damaged)
+    caplog.clear()
+    answer = client.get("/api/scenes", headers=headers)
+    assert answer.status_code == 503
+    assert answer.json()["type"] == "urn:relume:problem:database"
+    assert client.get("/livez").status_code == 200
+    (line,) = [record for record in caplog.records if record.name.startswith("server.access")]
+    assert "who calls cannot be told" in line.getMessage()
+    assert not line.exc_info
+
+
+def test_open_sessions_go_on_while_the_database_is_away(access: Access, monkeypatch: pytest.MonkeyPatch) -> None:
+    def away(*_: object) -> None:
+        raise DatabaseDamagedError("database disk image is malformed")
+
+    monkeypatch.setattr(access.tokens, "is_valid", away)
+    assert asyncio.run(access._is_valid("0123456789ab"))

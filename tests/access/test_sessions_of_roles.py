@@ -1,0 +1,113 @@
+"""Live sessions: who may open one, who may edit in it, and how it ends where a token is revoked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import pytest
+from fastapi.testclient import TestClient
+from session_client import SIGMA, THETA_H, Baked, open_session
+
+from server.access.access import Access
+from server.settings import Settings
+
+Bearer = Callable[..., dict[str, str]]
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.access.access.REMEMBERED_S", 0.05)
+    monkeypatch.setattr("server.access.tokens.REMEMBERED_S", 0.0)
+
+
+def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as ended:
+        session.receive()
+    assert ended.value.args[0] == 4401
+    assert "log in first" in ended.value.args[1]
+
+
+def test_editors_edit(client: TestClient, baked: Baked, bearer: Bearer, access: Access) -> None:
+    with open_session(client, baked.bake, headers=bearer("edit", "Ann")) as session:
+        assert session.text("hello")["role"] == "edit"
+        session.edit(1, SIGMA, 0.3)
+        session.exact(1)
+    while not (lines := access.audit.list()):  # it is written when the session has ended
+        time.sleep(0.01)
+    (line,) = lines
+    assert (line.who, line.what, line.object) == ("Ann", "1 edits in a session", f"/api/bakes/{baked.bake}/session")
+
+
+def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, baked: Baked, bearer: Bearer) -> None:
+    with open_session(client, baked.bake, headers=bearer("view", "Vera")) as session:
+        assert session.text("hello")["role"] == "view"
+        before = session.exact(0)
+        session.edit(1, SIGMA, 0.3)
+        told = session.text("problem")
+        assert (told["revision"], told["problem"]["status"]) == (1, 403)
+        assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
+        session.send(type="touch", curve=THETA_H)
+        assert session.text("problem")["problem"]["status"] == 403
+        session.send(type="view", name="front")
+        again = session.exact(0)
+        assert again.payload == before.payload
+        session.send(type="edit", revision=2, patch=[], solo=["environment"])
+        session.exact(2)
+        session.send(type="probe", x=3, y=4)
+        assert session.text("probe")["material"] == "Paper"
+
+
+def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, bearer: Bearer) -> None:
+    editor, viewer = bearer("edit"), bearer("view")
+    blue = [{"model": "lambert", "color": [0.25, 0.5, 0.75]}, {"model": "cook_torrance", "color": [0.5, 0.5, 0.5]}]
+    look = {"materials": {"Paper": {"terms": blue}}}
+    request = {"bake": baked.bake, "view": "front", "views": ["front"], "look": look}
+    share = client.post("/api/shares", json=request, headers=editor).json()["id"]
+    client.put("/api/looks/Blue", json=look, headers=editor)
+    for query in (f"?share={share}", "?look=Blue"):
+        with open_session(client, baked.bake, query=query, headers=viewer) as session:
+            shown = session.text("hello")["look"]["materials"]["Paper"]["terms"]
+            assert [term["color"] for term in shown] == [[0.25, 0.5, 0.75], [0.5, 0.5, 0.5]]
+            session.exact(0)
+    gone = open_session(client, baked.bake, query="?share=aaaaaaaaaa", headers=viewer)
+    with gone as session, pytest.raises(ConnectionError, match="there is no shared look"):
+        session.receive()
+
+
+def test_revoking_a_token_ends_its_sessions_and_no_others(
+    client: TestClient, baked: Baked, access: Access, bearer: Bearer
+) -> None:
+    ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+    with (
+        open_session(client, baked.bake, headers=ann) as of_ann,
+        open_session(client, baked.bake, headers=bob) as of_bob,
+    ):
+        of_ann.exact(0)
+        of_bob.exact(0)
+        access.tokens.revoke("Ann")
+        with pytest.raises(ConnectionError) as ended:
+            of_ann.text("never")
+        assert ended.value.args == (4401, "your token has run out or was revoked; log in with another one")
+        of_bob.edit(1, SIGMA, 0.3)
+        of_bob.exact(1)
+
+
+class TestQuota:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.max_sessions_each = 1
+        return settings
+
+    def test_each_has_so_many_sessions(self, client: TestClient, baked: Baked, bearer: Bearer) -> None:
+        ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+        with open_session(client, baked.bake, headers=ann) as first:
+            first.text("hello")
+            with open_session(client, baked.bake, headers=ann) as second, pytest.raises(ConnectionError) as ended:
+                second.receive()
+            assert ended.value.args[0] == 1013
+            assert "RELUME_MAX_SESSIONS_EACH" in ended.value.args[1]
+            with open_session(client, baked.bake, headers=bob) as other:
+                other.text("hello")
+        with open_session(client, baked.bake, headers=ann) as again:
+            again.text("hello")

@@ -1,0 +1,57 @@
+"""`relume token` and `relume audit`: what they print, and what of it another process finds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.main import main
+from cli.tokens import open_access
+from server.access.roles import Role
+
+
+def run(capsys: pytest.CaptureFixture[str], data: Path, *words: str) -> tuple[int, str, str]:
+    code = main([*words, "--data", str(data)])
+    return code, *capsys.readouterr()
+
+
+def test_a_token_is_told_once_listed_revoked_and_written_down(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, text, _ = run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--days", "30")
+    assert code == 0
+    found = open_access(tmp_path).tokens.find(text.strip())
+    assert found is not None
+    assert (found.name, found.role) == ("Ann", Role.EDIT)
+    _, listed, _ = run(capsys, tmp_path, "token", "list")
+    assert listed.split()[:3] == [found.id, "edit", "valid"]
+    assert "until 20" in listed
+    assert text.strip().split("_", 2)[2] not in listed
+    assert run(capsys, tmp_path, "token", "revoke", "Ann")[0] == 0
+    assert open_access(tmp_path).tokens.find(text.strip()) is None
+    assert "revoked" in run(capsys, tmp_path, "token", "list")[1]
+    _, audit, _ = run(capsys, tmp_path, "audit", "--json")
+    lines = [json.loads(line) for line in audit.splitlines()]
+    assert [(line["what"], line["object"]) for line in lines] == [
+        ("token add --role edit", "Ann"),
+        ("token revoke", "Ann"),
+    ]
+    assert all(line["who"].endswith("(shell)") for line in lines)
+    assert "token revoke  Ann" in run(capsys, tmp_path, "audit", "--last", "1")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["add", "Ann", "--role", "boss"], "relume: role is 'boss'; give view, edit, admin\n"),
+        (["add", " Ann"], "relume: name is ' Ann'; give 1 to 80 printable characters\n"),
+        (["revoke", "Eve"], "relume: there is no valid token 'Eve'; relume token list shows them\n"),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], sentence: str
+) -> None:
+    code, text, said = run(capsys, tmp_path, "token", *words)
+    assert (code, text, said) == (1, "", sentence)

@@ -1,0 +1,118 @@
+"""Metrics are named as Prometheus wants them; those that a rule, a dashboard or a page names are the server's."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from fastapi.testclient import TestClient
+from prometheus_client.registry import CollectorRegistry
+from server_fakes import BatchesHere, Control
+from server_fixtures import open_fake_bakes
+
+from server.app import create_app
+from server.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+MONITORING = ROOT / "docker" / "monitoring"
+SUFFIXES = {"counter": ("_total",), "histogram": ("_bucket", "_sum", "_count"), "gauge": ("",)}
+OF_PROMETHEUS = {"up"}
+WORDS = {"and", "by", "histogram_quantile", "increase", "label_values", "le", "rate", "sum"}
+LABELS = {"format", "instance", "kind", "outcome", "reason", "state", "status"}
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegistry]:
+    """The metrics of a server that runs."""
+    settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], waiting_importers=0)
+    library = Control().open_library
+    app = create_app(settings, open_library=library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
+    with TestClient(app):
+        yield app.state.services.metrics.registry
+
+
+@pytest.fixture(scope="module")
+def names(registry: CollectorRegistry) -> set[str]:
+    """Of all samples that the server may give."""
+    found = {family.name + suffix for family in registry.collect() for suffix in SUFFIXES[family.type]}
+    assert "relume_edit_to_socket_seconds_bucket" in found
+    return found | OF_PROMETHEUS
+
+
+def expressions() -> dict[str, str]:
+    """PromQL by the name of its rule or panel."""
+    rules = yaml.safe_load((MONITORING / "alerts.yml").read_text())["groups"][0]["rules"]
+    board = json.loads((MONITORING / "dashboard.json").read_text())
+    found = {rule["alert"]: rule["expr"] for rule in rules}
+    for panel in board["panels"]:
+        found |= {f"{panel['title']} {target['refId']}": target["expr"] for target in panel["targets"]}
+    found["instances"] = board["templating"]["list"][1]["query"]["query"]
+    return found
+
+
+@pytest.mark.parametrize("name", expressions())
+def test_what_is_asked_for_is_there(name: str, names: set[str]) -> None:
+    text = re.sub(r"\{[^}]*\}|\[[^\]]*\]", "", expressions()[name])  # matchers and ranges
+    asked = set(re.findall(r"[A-Za-z_]\w*", text)) - WORDS - LABELS
+    assert asked
+    assert asked <= names
+
+
+def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
+    known = {"instance", "job"}
+    for collector in set(registry._collector_to_names):
+        known |= set(getattr(collector, "_labelnames", ()))
+    known |= {label for family in registry.collect() for sample in family.samples for label in sample.labels}
+    for text in expressions().values():
+        matched = {label for group in re.findall(r"\{([^}]*)\}", text) for label in re.findall(r"(\w+)\s*[!=]", group)}
+        grouped = {label for group in re.findall(r"by \(([^)]*)\)", text) for label in re.findall(r"\w+", group)}
+        assert matched | grouped <= known, text
+
+
+def test_names_follow_the_rules(registry: CollectorRegistry) -> None:
+    for family in registry.collect():
+        if not family.name.startswith("relume_"):
+            continue
+        assert re.fullmatch(r"relume_[a-z]+(_[a-z]+)*", family.name)
+        assert not re.search(r"_(total|count|sum|bucket|ms|milliseconds|mb|kb|percent)$", family.name), family.name
+        assert family.documentation[0].isupper()
+        assert family.type != "histogram" or family.name.endswith("_seconds")
+
+
+def test_pages_name_metrics_that_are_there(names: set[str], registry: CollectorRegistry) -> None:
+    text = (ROOT / "docs" / "operations.md").read_text()
+    named = set(re.findall(r"`((?:relume|process)_[a-z_]+)", text))
+    assert named
+    assert named <= names | {family.name for family in registry.collect()}
+
+
+def compose(name: str) -> dict[str, Any]:
+    class Loader(yaml.SafeLoader):
+        """Knows what Compose adds to YAML."""
+
+    Loader.add_constructor("!reset", lambda loader, node: [])
+    loaded: dict[str, Any] = yaml.load((ROOT / "docker" / name).read_text(), Loader)
+    return loaded
+
+
+def test_the_overlay_sets_what_there_is_and_gives_time_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    server = compose("compose.production.yml")["services"]["server"]
+    assert {name.removeprefix("RELUME_").lower() for name in server["environment"]} <= set(Settings.model_fields)
+    for name, value in server["environment"].items():
+        monkeypatch.setenv(name, re.sub(r"\$\{(\w+)[^}]*\}", "relight.example.org", value))
+    settings = Settings(data=tmp_path)
+    assert settings.login
+    assert "relight.example.org" in settings.allowed_hosts
+    assert settings.drain_seconds + settings.stop_seconds < float(server["stop_grace_period"].removesuffix("s"))
+
+
+def test_files_that_the_overlay_mounts_are_there() -> None:
+    for service in compose("compose.production.yml")["services"].values():
+        for volume in service.get("volumes", ()):
+            if volume.startswith("./"):
+                assert (ROOT / "docker" / volume.split(":")[0]).is_file(), volume

@@ -1,0 +1,74 @@
+"""The editor where people log in: who may look, who may edit, and what happens when a token is revoked meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from editor_page import Editor, opened_page
+from editor_server import Server
+from playwright.sync_api import Browser, Page, expect
+
+from server.access.access import Access
+from server.settings import Settings
+from worker.database import open_database
+from worker.ledger import Ledger
+
+
+@pytest.fixture(scope="module")
+def access(server: Server) -> Iterator[Access]:
+    """Tokens and audit of the servers' database."""
+    ledger = Ledger(open_database(f"sqlite:///{server.data / 'relume.db'}"))
+    yield Access(ledger.sessions, Settings())
+    ledger.close()
+
+
+@pytest.fixture(scope="module")
+def asking(server: Server) -> Iterator[Server]:
+    """A second server on the same folder; people log in to it."""
+    asking = Server(server.data)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RELUME_LOGIN", "true")
+        asking.start()
+    yield asking
+    asking.kill()
+
+
+def log_in(page: Page, token: str) -> Editor:
+    page.get_by_label("Token").fill(token)
+    page.get_by_role("button", name="Log in").click()
+    editor = Editor(page)
+    editor.wait_until_exact()
+    return editor
+
+
+def test_people_log_in_and_roles_say_what_they_may_do(
+    server: Server, asking: Server, access: Access, browser: Browser
+) -> None:
+    (scene,) = server.call("/api/scenes")
+    url = f"{asking.url}/?scene={scene['id']}"
+    with opened_page(browser) as page:
+        page.goto(url)
+        page.get_by_label("Token").fill("relume_000000000000_x")
+        page.get_by_role("button", name="Log in").click()
+        expect(page.get_by_role("alert")).to_contain_text("this token opens nothing")
+        log_in(page, access.tokens.add("Vera", "view"))
+        page.get_by_role("option", name="Ball").click()
+        expect(page.get_by_role("note")).to_contain_text("Vera may look, but not edit")
+        expect(page.locator("aside [inert]")).to_be_attached()
+        page.get_by_role("button", name="Log out").click()
+        expect(page.get_by_label("Token")).to_be_visible()
+        editor = log_in(page, access.tokens.add("Ann", "edit"))
+        expect(page.locator(".account")).to_contain_text("Ann")
+        expect(page.get_by_role("note")).to_have_count(0)
+        editor.choose("Ball", 1)
+        roughness = editor.slider("Roughness σ")
+        editor.drag(roughness, 0.5, 0.7)
+        edited = roughness.get_attribute("aria-valuenow")
+        editor.wait_until_exact()
+        access.tokens.revoke("Ann")
+        expect(page.get_by_role("dialog", name="Log in")).to_contain_text("revoked")
+        editor = log_in(page, access.tokens.add("Ann", "edit"))
+        editor.choose("Ball", 1)
+        expect(editor.slider("Roughness σ")).to_have_attribute("aria-valuenow", str(edited))
+    assert any(line.who == "Ann" and "edits in a session" in line.what for line in access.audit.list())

@@ -1,0 +1,52 @@
+"""The server as uvicorn runs it, in a thread, on a real socket."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from fastapi import FastAPI
+from server_fakes import SIZE, BatchesHere, Control, tiny_scene
+from server_fixtures import open_fake_bakes
+
+from relume.bake import Recipe
+from server.app import create_app, stoppable
+from server.running.process import Process
+from server.settings import Settings
+from worker.scenes import register_scene
+
+
+@dataclass(frozen=True)
+class Running:
+    """A server, the thread that it runs in, and its port."""
+
+    app: FastAPI
+    process: Process
+    thread: threading.Thread
+    port: int
+
+    def baked_url(self) -> str:
+        """Address of the session of a bake that is ready."""
+        bakes = self.app.state.services.bakes
+        scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
+        bake = bakes.submit(scene, Recipe("direct", ("front",), SIZE, 10))
+        with bakes.subscribe(bake) as changes:
+            assert list(changes)[-1].state == "ready"
+        return f"ws://127.0.0.1:{self.port}/api/bakes/{bake}/session"
+
+
+@contextmanager
+def running_server(settings: Settings, control: Control) -> Iterator[Running]:
+    settings.allowed_hosts = ["127.0.0.1"]
+    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
+    process = stoppable(app, settings)
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        thread = threading.Thread(target=process.run, kwargs={"sockets": [listening]})
+        thread.start()
+        while not process.started:
+            time.sleep(0.01)
+        yield Running(app, process, thread, listening.getsockname()[1])
+        process.should_exit = True
+        thread.join()

@@ -1,0 +1,74 @@
+"""Lines of the log: what they are about, as text and as JSON."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from session_client import Baked, open_session
+
+from server.logs.context import BAKE, REQUEST, USER
+from server.logs.setting_up import Format, set_up
+
+log = logging.getLogger("server.somewhere")
+
+
+@pytest.fixture(autouse=True)
+def _as_it_was() -> Iterator[None]:
+    root = logging.getLogger()
+    before = root.handlers, root.level
+    yield
+    root.handlers = before[0]
+    root.setLevel(before[1])  # which forgets what loggers remember of it
+
+
+def logged(capsys: pytest.CaptureFixture[str], form: Format, say: Any) -> str:
+    set_up(form, "warning")  # asyncio has something to say below that
+    say()
+    return capsys.readouterr().err
+
+
+def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) -> None:
+    def say() -> None:
+        REQUEST.set("r1")
+        BAKE.set("b1")
+        try:
+            raise ValueError("why")
+        except ValueError:
+            log.exception("it “failed”\nfor %s", "Ann")
+
+    line = json.loads(logged(capsys, "json", lambda: asyncio.run(asyncio.to_thread(say))))
+    assert line.pop("time").endswith("+00:00")
+    assert "ValueError: why" in line.pop("trace")
+    assert (line.pop("level"), line.pop("logger")) == ("error", "server.somewhere")
+    assert line == {"message": "it “failed”\nfor Ann", "request": "r1", "bake": "b1"}
+
+
+def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> None:
+    def say() -> None:
+        log.warning("nothing is known")
+        USER.set("Ann")
+        log.warning("the user is")
+
+    said = logged(capsys, "plain", lambda: asyncio.run(asyncio.to_thread(say)))
+    assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
+
+
+def test_requests_and_sessions_are_lines_without_their_tokens(
+    client: TestClient, baked: Baked, capsys: pytest.CaptureFixture[str]
+) -> None:
+    set_up("json", "info")
+    client.get("/api/scenes?resume=secret", headers={"X-Request-ID": "r7"})
+    with open_session(client, baked.bake, query="?resume=secret", headers={"X-Request-ID": "r8"}) as session:
+        hello = session.text("hello")
+        session.exact(0)
+    said = [line for line in capsys.readouterr().err.splitlines() if '"server.' in line]  # not the test client's own
+    assert "secret" not in "".join(said)
+    lines = {line["request"]: line for line in map(json.loads, said)}
+    assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/api/scenes", 200)
+    assert (lines["r8"]["session"], lines["r8"]["bake"]) == (hello["session"], baked.bake)
