@@ -40,7 +40,7 @@ def num_threads() -> int:
 def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
         if name not in _pools:
-            _pools[name] = ThreadPoolExecutor(num_threads(), f"relume-{name}", _begin, (name,))
+            _pools[name] = ThreadPoolExecutor(num_threads(), f"kernels-{name}", _begin, (name,))
         return _pools[name]
 
 

@@ -35,19 +35,19 @@ def names_of(run):
 
 @pytest.mark.parametrize("run", [shares, ranges])
 def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
-    assert names_of(run) == {"relume-frame"}
+    assert names_of(run) == {"kernels-frame"}
     with beside_frames():
-        assert names_of(run) == {"relume-beside"}
-    assert names_of(run) == {"relume-frame"}
+        assert names_of(run) == {"kernels-beside"}
+    assert names_of(run) == {"kernels-frame"}
     with ThreadPoolExecutor(1, initializer=do_long_work) as long:
-        assert long.submit(names_of, run).result() == {"relume-long"}
+        assert long.submit(names_of, run).result() == {"kernels-long"}
 
         def follows():
             with beside_frames():
                 return names_of(run)
 
-        assert long.submit(follows).result() == {"relume-beside"}
-        assert long.submit(names_of, run).result() == {"relume-long"}
+        assert long.submit(follows).result() == {"kernels-beside"}
+        assert long.submit(names_of, run).result() == {"kernels-long"}
 
 
 def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
@@ -56,7 +56,7 @@ def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
 
     with pytest.raises(ZeroDivisionError), beside_frames():
         for_shares(fails, 1000)
-    assert names_of(shares) == {"relume-frame"}
+    assert names_of(shares) == {"kernels-frame"}
 
 
 def test_kernels_within_kernels_wait_for_nobody():
