@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
@@ -108,38 +108,15 @@ async def open_services(
     library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
-    batch, quota = batches(settings, library), Quota(settings.max_queued, settings.max_queued_each)
-    sessions = service.ledger.sessions
-
-    def scene_name(bake: str) -> str:
-        return get_scene(service.ledger, service.ledger.bake(bake).scene).name
-
-    renders = RenderQueue(sessions, settings.data, batch.run, quota, scene_name)
-    comparisons = ComparisonQueue(sessions, settings.data, batch.run, quota)
-    btfs = BtfQueue(sessions, settings.data, batch.run, quota)
-    access = Access(sessions, settings)
-    live = SessionServices(
-        library=library,
-        threads=threads,
-        metrics=metrics,
-        resumes=ResumeStore(settings.resume_seconds),
-        bake_news=BakeNews(service.bakes),
-        access=access,
-        leave=leave,
-        ack_seconds=settings.ack_seconds,
-        drain_seconds=settings.drain_seconds,
-    )
+    batch, sessions = batches(settings, library), service.ledger.sessions
+    access, queues = Access(sessions, settings), _queues(settings, service, batch)
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
     _watch_memory(metrics, library, transfers)
-    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
-    metrics.watch_work(lambda: count_work(sessions))
-    metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
-    looks = LookStore(service.ledger.sessions)
+    _watch_work(metrics, settings, service, batch, leave)
     await asyncio.to_thread(service.start)
     importers = Importers(settings.waiting_importers)
     importers.start()
-    queues = renders, comparisons, btfs
     for queue in queues:
         queue.start()
     rounds = asyncio.create_task(caretaker.run())
@@ -150,27 +127,68 @@ async def open_services(
             leave=leave,
             access=access,
             bakes=service,
-            looks=looks,
-            shares=ShareStore(service.ledger.sessions),
-            renders=renders,
-            comparisons=comparisons,
-            btfs=btfs,
+            looks=LookStore(sessions),
+            shares=ShareStore(sessions),
+            **queues._asdict(),
             threads=threads,
             transfers=transfers,
             caretaker=caretaker,
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
-            live=live,
+            live=_live(settings, metrics, library, threads, service, access, leave),
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
         rounds.cancel()
-        await asyncio.to_thread(importers.close)
-        for queue in reversed(queues):
-            await asyncio.to_thread(queue.close)
-        await asyncio.to_thread(batch.close)
-        await asyncio.to_thread(service.close)
-        await asyncio.to_thread(threads.close)
+        ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
+        for end in ends:
+            await asyncio.to_thread(end)
+
+
+class _Queues(NamedTuple):
+    """Of long work that is done in processes of their own."""
+
+    renders: RenderQueue
+    comparisons: ComparisonQueue
+    btfs: BtfQueue
+
+
+def _queues(settings: Settings, service: BakeService, batch: Batches) -> _Queues:
+    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.max_queued_each)
+
+    def scene_name(bake: str) -> str:
+        return get_scene(service.ledger, service.ledger.bake(bake).scene).name
+
+    return _Queues(
+        RenderQueue(sessions, settings.data, batch.run, quota, scene_name),
+        ComparisonQueue(sessions, settings.data, batch.run, quota),
+        BtfQueue(sessions, settings.data, batch.run, quota),
+    )
+
+
+def _live(
+    settings: Settings, metrics: Metrics, library: Library, threads: Threads, service: BakeService, access: Access,
+    leave: Leave,
+) -> SessionServices:  # fmt: skip
+    """What live sessions need of all this."""
+    return SessionServices(
+        library=library,
+        threads=threads,
+        metrics=metrics,
+        resumes=ResumeStore(settings.resume_seconds),
+        bake_news=BakeNews(service.bakes),
+        access=access,
+        leave=leave,
+        ack_seconds=settings.ack_seconds,
+        drain_seconds=settings.drain_seconds,
+    )
+
+
+def _watch_work(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, leave: Leave) -> None:
+    """Have it shown what works and waits, and whether there is room for more."""
+    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
+    metrics.watch_work(lambda: count_work(service.ledger.sessions))
+    metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
 
 
 def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
