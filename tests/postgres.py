@@ -12,7 +12,7 @@ import uuid
 from collections.abc import Sequence
 from pathlib import Path
 
-import psycopg
+import pg8000
 import pytest
 
 MISSING = "PostgreSQL is not installed (Debian: apt-get install --no-install-recommends postgresql)"
@@ -59,10 +59,10 @@ class Cluster:
     def new_database(self) -> str:
         """The URL of an empty database."""
         name = f"test_{uuid.uuid4().hex}"
-        where = f"{USER}@127.0.0.1:{self._port}"
-        with psycopg.connect(f"postgresql://{where}/postgres", autocommit=True) as connection:
-            connection.execute(f"CREATE DATABASE {name}".encode())
-        return f"postgresql://{where}/{name}"
+        with pg8000.connect(USER, host="127.0.0.1", port=self._port, database="postgres") as connection:
+            connection.autocommit = True
+            connection.run(f"CREATE DATABASE {name}")
+        return f"postgresql://{USER}@127.0.0.1:{self._port}/{name}"
 
     def remove(self) -> None:
         """Stop it and forget it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -12,11 +13,11 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 from postgres import Cluster
 from sqlalchemy import text
-from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 
 from server.errors import problem_of
-from worker.database import open_database
-from worker.database.faults import is_away
+from worker.database import open_database, postgresql
+from worker.database.faults import is_away, told
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 from worker.service import BakeService
@@ -61,3 +62,42 @@ def test_failures_of_statements_are_no_absence(ledger_url: str) -> None:
         with pytest.raises(DBAPIError) as failure:
             connection.execute(text("SELECT nothing FROM nowhere"))
         assert not is_away(failure.value)
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(postgresql, "TIMEOUT_S", 0.3)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_server_that_accepts_and_says_nothing_is_away() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(OperationalError, match="timed out") as failure:
+        open_database(f"postgresql://relume@127.0.0.1:{mute.getsockname()[1]}/relume")
+    assert is_away(failure.value)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_server_that_falls_silent_is_away_and_asked_anew(own_cluster: Cluster) -> None:
+    with closing(Ledger(engine := open_database(own_cluster.new_database()))):
+        with pytest.raises(OperationalError) as failure, engine.connect() as connection:
+            connection.execute(text("SELECT pg_sleep(2)"))
+        assert is_away(failure.value)
+        assert failure.value.connection_invalidated
+        own_cluster.stop()
+        own_cluster.start()  # connections that are kept were ended
+        with engine.connect() as connection:
+            assert connection.scalar(text("SELECT 1")) == 1
+
+
+def test_what_a_server_says_of_a_failure_is_told(own_cluster: Cluster) -> None:
+    url = own_cluster.new_database()
+    with pytest.raises(DBAPIError) as failure:
+        open_database(f"{url}_of_nobody")
+    assert told(failure.value).endswith("does not exist")
+    assert not is_away(failure.value)
+
+
+def test_rows_of_what_is_not_there_are_refused(ledger_url: str) -> None:
+    ledger = Ledger(engine := open_database(ledger_url))
+    with closing(ledger), pytest.raises(IntegrityError), engine.begin() as connection:
+        connection.execute(text("INSERT INTO cameras VALUES ('nowhere', 'one', '{}')"))

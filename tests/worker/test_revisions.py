@@ -196,7 +196,16 @@ def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: 
     assert "op.create_table('shares'" in path.read_text()
 
 
-@pytest.mark.parametrize("url", ["mysql://root@host/name", "nonsense", "oracle://secret@host"])
+@pytest.mark.parametrize(
+    "url",
+    [
+        "mysql://root@host/name",
+        "nonsense",
+        "oracle://secret@host",
+        "postgresql://host/secret",
+        "postgresql://me:secret@host/name?sslmode=require",
+    ],
+)
 def test_other_databases_are_refused_in_words(url: str) -> None:
     with pytest.raises(ParameterError, match="postgresql://user:password@host/name") as refusal:
         open_database(url)

@@ -6,8 +6,9 @@ import logging
 import sqlite3
 import threading
 
+import pg8000
 from sqlalchemy.engine import ExceptionContext
-from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 
 from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError
 
@@ -19,6 +20,7 @@ AWAY = (SQLAlchemyError, DatabaseDamagedError, DiskFullError)
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _NO_ROOM = "53100"  # of PostgreSQL, as are these: connections that fail, ends by an operator, too many clients
 _NO_ANSWER = ("08", "57P", "53300")
+_REFUSED_ROW = "23"
 
 
 def name_fault(context: ExceptionContext) -> None:
@@ -26,28 +28,46 @@ def name_fault(context: ExceptionContext) -> None:
 
     Raises:
         DiskFullError, DatabaseDamagedError: it is one of these.
+        OperationalError, IntegrityError: a server does not answer, or refuses a row; pg8000 calls them otherwise.
     """
     cause = context.original_exception
     code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest tells kinds of it apart
-    if code == sqlite3.SQLITE_FULL or getattr(cause, "sqlstate", None) == _NO_ROOM:
+    if code == sqlite3.SQLITE_FULL or _state(cause) == _NO_ROOM:
         raise DiskFullError("the database") from cause
     if code in _DAMAGED:
         raise DatabaseDamagedError(str(cause)) from cause
+    statement, values, is_lost = context.statement, context.parameters, context.is_disconnect
+    if _is_silent(cause):
+        raise OperationalError(statement, values, cause, connection_invalidated=is_lost) from cause
+    if _state(cause).startswith(_REFUSED_ROW):
+        raise IntegrityError(statement, values, cause) from cause
 
 
 def is_away(error: Exception) -> bool:
     """Whether a database server does not answer, so that asking again in a while may help."""
-    if not isinstance(error, DBAPIError) or not type(error.orig).__module__.startswith("psycopg"):
-        return False
-    state = getattr(error.orig, "sqlstate", None)
-    kind = type(error.orig).__name__  # without a state: nobody has answered
-    return state.startswith(_NO_ANSWER) if state else kind in ("OperationalError", "ConnectionTimeout")
+    return isinstance(error, DBAPIError) and _is_silent(error.orig)
 
 
 def told(error: Exception) -> str:
     """A failure in one line."""
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
-    return " ".join(str(cause).split()) or type(cause).__name__
+    return " ".join(_reply(cause).get("M", str(cause)).split()) or type(cause).__name__
+
+
+def _reply(cause: BaseException | None) -> dict[str, str]:
+    """The fields of a PostgreSQL's error message, by their letters; empty where it has not answered."""
+    fields = cause.args[0] if isinstance(cause, pg8000.Error) and cause.args else None
+    return fields if isinstance(fields, dict) else {}
+
+
+def _state(cause: BaseException | None) -> str:
+    """SQLSTATE; empty where there is none."""
+    return _reply(cause).get("C", "")
+
+
+def _is_silent(cause: BaseException | None) -> bool:
+    state = _state(cause)
+    return state.startswith(_NO_ANSWER) if state else isinstance(cause, pg8000.InterfaceError)
 
 
 class Complaint:

@@ -11,21 +11,12 @@ from sqlalchemy.exc import ArgumentError
 
 from relume.errors import ParameterError
 from worker.database.faults import name_fault
+from worker.database.postgresql import connect_postgresql
 from worker.database.upgrading import upgrade
 
 BUSY_TIMEOUT_MS = 30_000
 POOL_TIMEOUT_S = 10.0
 MAX_WAITING = 30  # connections beside the five that are kept: threads of the server that may ask at once
-
-# A PostgreSQL that does not answer is noticed after seconds, by whoever connects and by whoever waits for an answer.
-_POSTGRESQL: dict[str, Any] = {
-    "connect_timeout": 5,
-    "keepalives_idle": 10,
-    "keepalives_interval": 5,
-    "keepalives_count": 3,
-    "tcp_user_timeout": 20_000,
-    "application_name": "relume",
-}
 
 
 def open_database(url: str) -> Engine:
@@ -49,7 +40,8 @@ def connect(url: str) -> Engine:
     parsed = _parse(url)
     if parsed.get_backend_name() == "postgresql":
         waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_WAITING}
-        engine = create_engine(parsed, pool_pre_ping=True, connect_args=_POSTGRESQL, **waits)
+        engine = create_engine(parsed, pool_pre_ping=True, **waits)
+        event.listen(engine, "do_connect", connect_postgresql)
     else:
         if parsed.database:
             Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
@@ -65,11 +57,13 @@ def _parse(url: str) -> URL:
         parsed = make_url(url)
     except ArgumentError:
         raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may hold a password
-    if parsed.drivername in ("postgres", "postgresql"):
-        return parsed.set(drivername="postgresql+psycopg")
-    if parsed.drivername not in ("postgresql+psycopg", "sqlite"):
+    if parsed.drivername == "sqlite":
+        return parsed
+    if parsed.drivername not in ("postgres", "postgresql", "postgresql+pg8000"):
         raise ParameterError("RELUME_DATABASE", parsed.drivername, allowed)
-    return parsed
+    if not (parsed.username and parsed.host) or parsed.query:
+        raise ParameterError("RELUME_DATABASE", "a URL without user or host, or with options after ?", allowed)
+    return parsed.set(drivername="postgresql+pg8000")
 
 
 def _set_up_sqlite(connection: Any, _: object) -> None:
