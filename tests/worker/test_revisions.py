@@ -14,6 +14,7 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Engine, inspect, select, text
+from sqlalchemy.exc import SQLAlchemyError
 
 from relume.errors import LedgerVersionError, ParameterError
 from server.access.tables import AuditRow, OwnedRow, TokenRow
@@ -203,10 +204,19 @@ def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: 
         "nonsense",
         "oracle://secret@host",
         "postgresql://host/secret",
-        "postgresql://me:secret@host/name?sslmode=require",
+        "postgresql://me:secret@host/name?sslmode=secret",
+        "postgresql://me@host/name?sslmode=require&options=secret",
     ],
 )
 def test_other_databases_are_refused_in_words(url: str) -> None:
-    with pytest.raises(ParameterError, match="postgresql://user:password@host/name") as refusal:
+    with pytest.raises(ParameterError, match=r"postgresql://user:password@host/name|sslmode=prefer") as refusal:
         open_database(url)
     assert "secret" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("ledger_url", ["postgresql"], indirect=True)
+@pytest.mark.parametrize("mode", ["require", "verify-full"])
+def test_a_server_without_tls_is_not_talked_to_where_it_is_demanded(ledger_url: str, mode: str) -> None:
+    with pytest.raises(SQLAlchemyError, match="refuses SSL"):
+        open_database(f"{ledger_url}?sslmode={mode}")
+    open_database(f"{ledger_url}?sslmode=prefer").dispose()

@@ -11,7 +11,7 @@ from sqlalchemy.exc import ArgumentError
 
 from relume.errors import ParameterError
 from worker.database.faults import name_fault
-from worker.database.postgresql import connect_postgresql
+from worker.database.postgresql import TLS_MODES, connect_postgresql
 from worker.database.upgrading import upgrade
 
 BUSY_TIMEOUT_MS = 30_000
@@ -61,8 +61,10 @@ def _parse(url: str) -> URL:
         return parsed
     if parsed.drivername not in ("postgres", "postgresql", "postgresql+pg8000"):
         raise ParameterError("RELUME_DATABASE", parsed.drivername, allowed)
-    if not (parsed.username and parsed.host) or parsed.query:
-        raise ParameterError("RELUME_DATABASE", "a URL without user or host, or with options after ?", allowed)
+    if not (parsed.username and parsed.host):
+        raise ParameterError("RELUME_DATABASE", "a URL without user or host", allowed)
+    if not (parsed.query.keys() <= {"sslmode"} and parsed.query.get("sslmode", TLS_MODES[0]) in TLS_MODES):
+        raise ParameterError("RELUME_DATABASE", "other options after ?", f"sslmode={', '.join(TLS_MODES)}, or none")
     return parsed.set(drivername="postgresql+pg8000")
 
 

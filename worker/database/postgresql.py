@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -11,6 +12,7 @@ import pg8000
 
 TIMEOUT_S = 10.0  # to connect, and for each answer: of a host that is gone as of a server that hangs
 PORT = 5432
+TLS_MODES = ("prefer", "require", "verify-full")  # as libpq calls them; the first is what is done without a word
 
 
 class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types
@@ -45,9 +47,20 @@ def connect_postgresql(_: object, __: object, ___: object, settings: dict[str, A
     """A connection of an engine; listens to its `do_connect`. Raises pg8000's errors."""
     where = settings["host"], settings.get("port", PORT)
     password = settings.get("password", "")  # without one, pg8000 fails on servers that ask for it
+    more = {"password": password, "application_name": "relume", "ssl_context": _tls(settings.get("sslmode", "prefer"))}
     with _network():
         sock = socket.create_connection(where, TIMEOUT_S)
-        return _Connection(sock, **settings | {"password": password, "application_name": "relume"})
+        return _Connection(sock, **{name: value for name, value in settings.items() if name != "sslmode"} | more)
+
+
+def _tls(mode: str) -> ssl.SSLContext | None:
+    """What a connection demands: None takes TLS where it is offered, a context refuses to go on without."""
+    if mode == "prefer":
+        return None
+    context = ssl.create_default_context()
+    if mode == "require":  # whoever answers
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context
 
 
 @contextmanager
