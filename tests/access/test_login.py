@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 
 from relume.errors import DatabaseDamagedError
@@ -217,4 +217,4 @@ def test_open_sessions_go_on_while_the_database_is_away(access: Access, monkeypa
         raise DatabaseDamagedError("database disk image is malformed")
 
     monkeypatch.setattr(access.tokens, "is_valid", away)
-    assert asyncio.run(access._is_valid("0123456789ab"))
+    assert run_alone(access._is_valid("0123456789ab"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.light.suns import LANES, TURNS, without_suns
+from relume.light.suns import NUM_TARGETS, TURNS, without_suns
 
 
 def sky(*suns, size=(128, 256)):
@@ -43,7 +43,7 @@ def test_suns_and_what_is_left_are_the_whole_map(suns):
 
 def test_targets_are_spread_as_the_light_is():
     sun = without_suns(sky(HARD)).suns[0]
-    assert sun.towards.shape == (TURNS, LANES, 3)
+    assert sun.towards.shape == (TURNS, NUM_TARGETS, 3)
     np.testing.assert_allclose(np.linalg.norm(sun.towards, axis=2), 1, atol=1e-12)
     np.testing.assert_allclose(sun.towards.mean(axis=(0, 1)), sun.mean, atol=2e-3)
     np.testing.assert_allclose(sun.towards.mean(axis=1), np.tile(sun.mean, (TURNS, 1)), atol=6e-3)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 from session_client import Baked, open_session
 
@@ -42,7 +43,7 @@ def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) 
         except ValueError:
             log.exception("it “failed”\nfor %s", "Ann")
 
-    line = json.loads(logged(capsys, "json", lambda: asyncio.run(asyncio.to_thread(say))))
+    line = json.loads(logged(capsys, "json", lambda: run_alone(asyncio.to_thread(say))))
     assert line.pop("time").endswith("+00:00")
     assert "ValueError: why" in line.pop("trace")
     assert (line.pop("level"), line.pop("logger")) == ("error", "server.somewhere")
@@ -55,7 +56,7 @@ def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> 
         USER.set("Ann")
         log.warning("the user is")
 
-    said = logged(capsys, "plain", lambda: asyncio.run(asyncio.to_thread(say)))
+    said = logged(capsys, "plain", lambda: run_alone(asyncio.to_thread(say)))
     assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 from session_client import open_session
@@ -173,12 +174,6 @@ def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClie
         time.sleep(0.02)
     assert states == ["ready", "ready"]
     assert real.app.state.services.transfers.opened == []
-
-
-def run_alone(coroutine: Any) -> None:
-    """In a thread of its own: the browser tests' event loop may still stand in this one."""
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(asyncio.run, coroutine).result()
 
 
 def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
