@@ -119,6 +119,7 @@ def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, moving_
     assert [camera["name"] for camera in kept if camera["name"] == "View 1"] == ["View 1"]
 
 
+@pytest.mark.slow
 def test_a_turntable_from_where_the_eye_is_is_taken_away(moving: Editor, tmp_path: Path) -> None:
     page, first = moving.page, moving.pixels_now()
     moving.canvas.focus()
