@@ -44,7 +44,12 @@ class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types
 
 
 def connect_postgresql(_: object, __: object, ___: object, settings: dict[str, Any]) -> _Connection:
-    """A connection of an engine; listens to its `do_connect`. Raises pg8000's errors."""
+    """A connection of an engine; listens to its `do_connect`. Raises pg8000's errors.
+
+    Args:
+        _, __, ___: dialect, pool record and arguments of that event; not needed.
+        settings: what the URL says: user, host, and port, database, password, sslmode where it has them.
+    """
     where = settings["host"], settings.get("port", PORT)
     password = settings.get("password", "")  # without one, pg8000 fails on servers that ask for it
     more = {"password": password, "application_name": "relume", "ssl_context": _tls(settings.get("sslmode", "prefer"))}
