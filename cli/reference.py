@@ -33,11 +33,9 @@ def reference(
     from relume.errors import NotFoundError
     from relume.look import default_look
     from relume.reference import reference_image
-    from relume.scene.archive import load_scene
     from relume.scene.placed_camera import with_cameras
-    from worker.paths import scene_path
     from worker.presets import PRESETS
-    from worker.storage import fetched
+    from worker.tasks import scene_of
 
     check_output(output)
     partial, pixels = read_look(look), parse_size(size) if size else PRESETS["good"].size
@@ -48,7 +46,7 @@ def reference(
         service.close()
     if view is not None and view not in record.views:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
-    loaded, seen_from = load_scene(fetched(scene_path(service.data_dir, record.id))), view or record.views[0]
+    loaded, seen_from = scene_of(service.data_dir, record.id), view or record.views[0]
     if camera is not None:
         placed = read_camera(camera)
         loaded, seen_from = with_cameras(loaded, [placed.camera]), placed.name

@@ -38,9 +38,8 @@ def render(
     from relume.methods.registry import open_bake
     from relume.methods.stills import Stills
     from relume.render.image import render_image
-    from relume.scene.archive import load_scene
-    from worker.paths import scene_path
-    from worker.storage import fetched, open_kept
+    from worker.storage import open_kept
+    from worker.tasks import scene_of
 
     if turntable is None:
         check_output(output)
@@ -59,7 +58,7 @@ def render(
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
         stills = None
         if isinstance(transfer, MovingViews) and not quick:
-            stills = Stills(transfer.lit, load_scene(fetched(scene_path(service.data_dir, record.id))))
+            stills = Stills(transfer.lit, scene_of(service.data_dir, record.id))
         if isinstance(transfer, MovingViews) and quick:
             typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
         document = complete_look(partial, transfer.default_look)

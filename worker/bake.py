@@ -20,6 +20,7 @@ from sqlalchemy.exc import IntegrityError
 
 from relume.bake import Task
 from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, is_no_room
+from relume.folders import folder_bytes
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
 from worker.database.patience import Given, Result, patiently
@@ -92,7 +93,7 @@ class BakeRunner:
     def _bake(self) -> int:
         job, target, staging = self.job, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger knew
-            return _size(target)
+            return folder_bytes(target)
         self._begin_or_go_on()
         status = self._ask(self.ledger.bake, job.bake_id)
         shown = status.progress if self._ask(self.ledger.finished_tasks, job.bake_id) else 0.0
@@ -213,7 +214,7 @@ class BakeRunner:
         """What went wrong and what to do, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
             needed = self._ask(self.ledger.bake, self.job.bake_id).plan.store_bytes
-            missing = max(1, needed - _size(self._staging)) / 1e6
+            missing = max(1, needed - folder_bytes(self._staging)) / 1e6
             return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):
             return " ".join(str(error).split())
@@ -239,10 +240,6 @@ def _is_lost_process(error: Exception) -> bool:
     if isinstance(error, BrokenExecutor):
         return True
     return type(error).__name__ in ("KilledWorker", "CommClosedError")
-
-
-def _size(store: Path) -> int:
-    return sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
 
 
 def check_published(path: Path) -> bool:

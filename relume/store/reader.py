@@ -18,6 +18,7 @@ from zarr.storage import LocalStore
 
 from relume.bake import ArraySpec
 from relume.errors import ChunkDamagedError, StoreError, StoreNotFoundError
+from relume.folders import folder_bytes
 from relume.store.files import read_json
 from relume.store.schema import (
     MANIFEST_NAME,
@@ -167,7 +168,7 @@ def _check_array(path: Path, document: str, sizes: Mapping[str, int]) -> None:
 
 def stored_bytes(reader: Reader) -> int:
     """Size of a store's files on disk, in bytes."""
-    return sum(file.stat().st_size for file in reader.path.rglob("*") if file.is_file())
+    return folder_bytes(reader.path)
 
 
 def rows_per_shard(spec: ArraySpec) -> int:

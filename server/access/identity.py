@@ -43,9 +43,7 @@ class Identity:
         if scheme.lower() == "bearer":
             found = await self._by_token(sent.strip(), address, tokens)
             if found is None:
-                raise LoginError(
-                    "this token opens nothing: it is misspelt, has run out or was revoked; ask for another"
-                )
+                raise LoginError(OPENS_NOTHING)
             return found
         if self._is_trusted(_peer(scope)) and (named := self._by_proxy(headers, address)) is not None:
             return named

@@ -6,7 +6,6 @@ import threading
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sqlalchemy import delete, func, select
@@ -121,8 +120,3 @@ class Quotas:
         """They are deleted."""
         with self._sessions.begin() as session:
             session.execute(delete(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object.in_(things)))
-
-
-def folder_bytes(folder: Path) -> int:
-    """What the files in a folder take."""
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -29,9 +29,7 @@ def get_all() -> list[BuiltInBody]:
 
 
 @router.post("/{name}", status_code=201)
-async def take_one(
-    name: Annotated[str, Path(max_length=256)], services: Shared, caller: Who, response: Response
-) -> SceneBody:
+async def take_one(name: BuiltInName, services: Shared, caller: Who, response: Response) -> SceneBody:
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")

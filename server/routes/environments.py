@@ -15,7 +15,7 @@ from relume.asset_store import check_name
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
-from server.access.quotas import folder_bytes
+from relume.folders import folder_bytes
 from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.png import A_DAY, PngResponse

@@ -13,8 +13,8 @@ from fastapi.concurrency import run_in_threadpool
 from relume.asset_store import check_name
 from relume.brdf.document import complete_term
 from relume.btf.shelf import BtfRecord
+from relume.folders import folder_bytes
 from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
-from server.access.quotas import folder_bytes
 from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse

@@ -14,7 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
-from server.access.quotas import folder_bytes
+from relume.folders import folder_bytes
 from server.access.roles import Caller, Who
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.thumbnails import MAX_WIDTH

@@ -175,7 +175,7 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
     stale = picture.image()  # of surfaces as they are, in what they sent each other before
     job = picture.next_job()
     assert not job.refines
-    picture.install(job, job.make(lambda share: None, lambda: False))
+    picture.install(job, made(job))
     assert picture.advance(None).fidelity == "preview"
     seen = picture.image()
     rest(picture)
@@ -293,7 +293,7 @@ def test_a_shader_gets_what_follows(moving):
     picture.set_look(bounces(painted, exponent(8.0)))
     assert picture.advance(None).fidelity == "preview"
     job = picture.next_job()
-    picture.install(job, job.make(lambda share: None, lambda: False))
+    picture.install(job, made(job))
     assert picture.advance(None).fidelity == "preview"
     followed = sent(picture)
     rest(picture)
@@ -308,7 +308,7 @@ def test_a_shader_gets_what_follows(moving):
 def rest(picture):
     """As when a hand rests."""
     while (job := picture.next_job()) is not None:
-        picture.install(job, job.make(lambda share: None, lambda: False))
+        picture.install(job, made(job))
         picture.advance(None)
     assert picture.advance(None).fidelity == "approximate"
 

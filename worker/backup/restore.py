@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from relume.errors import BackupError, DiskFullError
+from relume.folders import folder_bytes
 from relume.replacing import UNFINISHED, replacing
 from worker.backup.ledger_copy import fill_ledger, is_empty
 from worker.backup.shelf import Kept, Shelf, Snapshot, Tell, copy_verified
@@ -46,7 +47,7 @@ def restore(
     snapshot = shelf.read(name)
     _mark(shelf, snapshot, data_dir, ledger_url)
     num_bytes = sum(kept.num_bytes for kept in snapshot.files)
-    if num_bytes > shutil.disk_usage(data_dir).free + _size(data_dir):
+    if num_bytes > shutil.disk_usage(data_dir).free + folder_bytes(data_dir):
         raise DiskFullError(f"a backup of {num_bytes / 1e6:,.0f} MB")
     tell = begin(num_bytes)
     for kept in snapshot.files:
@@ -98,7 +99,3 @@ def _put(shelf: Shelf, kept: Kept, target: Path, tell: Tell) -> None:
     source = shelf.path_of(kept.sha256)
     if not source.is_file() or not copy_verified(source, target, kept.sha256, tell):
         raise BackupError(f"{kept.path} is damaged in the backup; restore an older one, or copy the folder again")
-
-
-def _size(folder: Path) -> int:
-    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

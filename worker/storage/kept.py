@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from relume.folders import folder_bytes
 from relume.replacing import UNFINISHED
 from relume.store.publish import manifest_digests
 from relume.store.schema import MANIFEST_NAME
@@ -104,7 +105,7 @@ def forget(path: Path) -> None:
 def _make_room(bakes: Path, there: Remote, num_bytes: int) -> None:
     """Let go of bakes until there is room for so many bytes more."""
     stores = sorted(bakes.glob("[!.]*.zarr"), key=_last_used)
-    sizes = {store: sum(file.stat().st_size for file in store.rglob("*") if file.is_file()) for store in stores}
+    sizes = {store: folder_bytes(store) for store in stores}
     excess = sum(sizes.values()) + num_bytes - cache_bytes()
     for store in stores:
         if excess <= 0:

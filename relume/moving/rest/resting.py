@@ -145,10 +145,8 @@ class RestingPicture:
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
-        if isinstance(job, StillJob | SparseJob):
+        if isinstance(job, StillJob | SparseJob | FollowJob | LightJob):
             job.install(made)
-        elif isinstance(job, FollowJob | LightJob):
-            self._moving.install(job, made)
         elif self._still is not None:  # else it was made for one that is gone
             self._still.install(job, made)
 
