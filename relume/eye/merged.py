@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.eye.layers import Layer
 from relume.eye.pixel_edges import COS_TURN, is_off_plane
 from relume.trace.geometry import Geometry
-from relume.trace.surface import surface_at
+from relume.trace.normals import normals_at
 
 F32 = NDArray[np.float32]
 
@@ -47,7 +47,7 @@ def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chose
     distance, rays, through = np.ones(shape, np.float32), np.ones((*shape, 3), np.float32), np.ones((*shape, 3))
     key.flat[row], distance.flat[row], is_hit.flat[row] = seen.key, seen.hits.distance, seen.hits.face >= 0
     for out, values in (
-        (normal, surface_at(geometry, seen.hits, seen.directions).points.normal),
+        (normal, normals_at(geometry, seen.hits, seen.directions)),
         (rays, seen.directions),
         (through, seen.through),
     ):

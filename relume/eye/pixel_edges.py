@@ -10,8 +10,8 @@ from relume.environments.equirect import lookup
 from relume.eye.layers import Layer
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
 from relume.trace.geometry import Geometry
+from relume.trace.normals import normals_at
 from relume.trace.primary import trace_from
-from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
 
@@ -76,11 +76,11 @@ def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray
         geometry: the triangles. layer: of one ray through the middle of each pixel. size: width and height in pixels.
     """
     width, height = size
-    surface = surface_at(geometry, layer.hits, layer.directions)
+    normals = normals_at(geometry, layer.hits, layer.directions)
     key, normal = np.full(width * height, -2), np.zeros((width * height, 3), np.float32)
     distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
     key[layer.ray] = layer.key
-    normal[layer.ray] = surface.points.normal
+    normal[layer.ray] = normals
     if layer.chain is None:  # a mirror's rays have no eye in common: no steps in depth are told in it
         distance[layer.ray] = layer.hits.distance
     directions[layer.ray] = layer.directions

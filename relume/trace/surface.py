@@ -20,6 +20,7 @@ F32 = NDArray[np.float32]
 _IMAGES = ("diffuse", "specular", "emission")
 _RAYS_A_RANGE = 16_384
 OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; many times what positions are rounded by
+LEAST_FACING = 0.01  # cosine between a shading normal and the way back of its ray
 
 
 @dataclass(frozen=True)
@@ -230,5 +231,5 @@ def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) ->
 def _towards(normal: F32, directions: F32) -> F32:
     """Bend shading normals that face away from the viewer just into view: interpolation must lose no sample."""
     facing = -np.einsum("nc,nc->n", normal, directions)
-    lacking = np.maximum(0.01 - facing, 0)[:, None]
+    lacking = np.maximum(LEAST_FACING - facing, 0)[:, None]
     return _unit(normal - lacking * directions, -directions)
