@@ -46,8 +46,8 @@ _STEPS = 128  # of a highlight's numbers, from none to all
 
 
 def is_diffuse(term_document: Mapping[str, Any]) -> bool:
-    """Whether a term scatters light about evenly: those do whose colour is the diffuse one by default."""
-    return TERMS[term_document["model"]].texture == "diffuse"
+    """Whether a term scatters light about evenly; see `Term.scatters_evenly`."""
+    return TERMS[term_document["model"]].scatters_evenly
 
 
 def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:

@@ -133,6 +133,11 @@ class Term:
         """Whether documents must name something measured."""
         return self.data is not None
 
+    @property
+    def scatters_evenly(self) -> bool:
+        """Whether it scatters light about evenly: those do whose colour is the diffuse one by default."""
+        return self.texture == "diffuse"
+
     def fixed_values(self, document: Mapping[str, Any]) -> tuple[tuple[str, float | str], ...]:
         """Names and values of what a term document fixes at freeze; what it leaves out has its default."""
         given = document.get("params") or {}

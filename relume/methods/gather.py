@@ -52,14 +52,18 @@ class GatherMethod:
 
     Args:
         rays: of a view sample. glossy: of those, where its material has a highlight.
+        tents: how often neighbours in the picture share what these bring; see `relume.views.sharing`.
         smooths_edges: whether pixels across edges have several samples.
     """
 
     name = "gather"
     stages = (*SampledViews.stages, "gather cells", "gather rays")
 
-    def __init__(self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS, *, smooths_edges: bool = True) -> None:
+    def __init__(
+        self, rays: int = RAYS_A_SAMPLE, glossy: int = _GLOSSY_RAYS, *, tents: int = 1, smooths_edges: bool = True
+    ) -> None:
         self._views, self._rays, self._glossy = SampledViews(smooths_edges=smooths_edges), rays, glossy
+        self._tents = tents
         self._tree_of = LastRead(read_tree)
 
     def prepare(self, scene: Scene) -> None:
@@ -90,13 +94,15 @@ class GatherMethod:
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material."""
+        """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material, and
+        `gather_tents`: how often they are shared."""
         plain, glossy = [self._rays, 0], [self._rays - self._glossy, self._glossy]
         direct = self._views.attributes(scene, recipe)
         terms = [direct["look"]["materials"][material.name]["terms"] for material in scene.materials]
         return {
             **direct,
             "gather_rays": [plain if all(map(is_diffuse, of_material)) else glossy for of_material in terms],
+            "gather_tents": self._tents,
             "gather_seed": int(scene.id[:7], 16),
         }
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ from relume.project.levels import contract_levels, runs
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import GatherRays, Receivers
 from relume.project.sent import evenly
+from relume.project.sharing import Weights
 
 F32 = NDArray[np.float32]
 
@@ -50,14 +50,14 @@ class IndirectOperator:
         scale: what a step of their weights is worth. (blocks, K) float32
         weights: (blocks, K, channels, `BLOCK_SAMPLES`) int16; one channel where all are alike, else three
         num_samples: of the image, the last block's padding left out.
-        sharing: weights of the samples for each other, as in `GatherRays`. (n, n) sparse
+        sharing: weights of the samples for each other.
     """
 
     kept: NDArray[np.int32]
     scale: F32
     weights: NDArray[np.int16]
     num_samples: int
-    sharing: Any
+    sharing: Weights
 
     @property
     def num_bytes(self) -> int:
@@ -74,7 +74,10 @@ class IndirectOperator:
         args = (self.kept, self.scale, self.weights, light)
         alone = np.empty((len(self.kept) * BLOCK_SAMPLES, 4), np.float32)
         for_shares(lambda start, stop: apply_rows(*args, start, stop, alone), len(self.kept))
-        shares = (self.sharing.indptr, self.sharing.indices, self.sharing.data)
+        matrix, times = self.sharing
+        for _ in range(times - 1):
+            alone[: self.num_samples] = matrix @ alone[: self.num_samples]
+        shares = (matrix.indptr, matrix.indices, matrix.data)
         for_shares(lambda start, stop: add_shared(*shares, alone, start, stop, image), self.num_samples)
 
 
@@ -133,7 +136,7 @@ def freeze_rows(
         np.empty((blocks, NUM_KEPT), np.float32),
         np.empty((blocks, NUM_KEPT, num_channels(term, bands), BLOCK_SAMPLES), np.int16),
         num_samples,
-        eye_array(num_samples, dtype=np.float32, format="csr") if rays.sharing is None else rays.sharing,
+        _alone(num_samples) if rays.sharing is None else rays.sharing.of(term),
     )
 
     def step(first: int, last: int) -> None:
@@ -144,6 +147,10 @@ def freeze_rows(
 
     for_steps(step, blocks, _BLOCKS_A_STEP, progress, cancelled, "freezing")
     return rows
+
+
+def _alone(num_samples: int) -> Weights:
+    return Weights(eye_array(num_samples, dtype=np.float32, format="csr"), 1)
 
 
 class _RowMaker:

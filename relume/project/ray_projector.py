@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
 from relume.project.contraction import Contraction
 from relume.project.ray_kernel import project_rays, sum_rays, weigh_rays
 from relume.project.receivers import GatherRays, Listed, Rays, Receivers
+from relume.project.sharing import Sharing
 
 F32 = NDArray[np.float32]
 
@@ -35,19 +35,20 @@ class RayProjector:
         arrived = np.zeros_like(out)
         for rays in self._points.rays:
             if isinstance(rays, GatherRays) and rays.sharing is not None:
-                self._add_shared(rays, start, stop, arrived)
+                self._add_shared(rays, rays.sharing, start, stop, arrived)
             else:
                 self._add(rays, self._points, start, stop, arrived)
         out += self._contraction.constant[:, None] * arrived
 
-    def _add_shared(self, rays: GatherRays, start: int, stop: int, out: F32) -> None:
+    def _add_shared(self, rays: GatherRays, sharing: Sharing, start: int, stop: int, out: F32) -> None:
         """Add what points have of their own rays and of their neighbours'."""
-        weights = rays.sharing[start:stop]
-        among, place = np.unique(weights.indices, return_inverse=True)
+        rings, among = sharing.of(self._term).rings(start, stop)
         arrived = np.zeros((len(among), *out.shape[1:]), np.float32)
         self._add(rays.alone(among), self._points.places(among), 0, len(among), arrived)
-        within = csr_array((weights.data, place, weights.indptr), shape=(stop - start, len(among)))
-        out += (within @ arrived.reshape(len(among), -1)).reshape(out.shape)
+        shared = arrived.reshape(len(among), -1)
+        for within in reversed(rings):
+            shared = within @ shared
+        out += shared.reshape(out.shape)
 
     def _add(self, rays: Rays, points: Receivers, start: int, stop: int, out: F32) -> None:
         c = self._contraction

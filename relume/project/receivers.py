@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from relume.points import Points
 from relume.project.gathered_kernel import list_gathered, sum_gathered
 from relume.project.ray_kernel import list_local
 from relume.project.sent import Sent
+from relume.project.sharing import Sharing
 
 F32 = NDArray[np.float32]
 
@@ -53,13 +54,13 @@ class GatherRays:
     Attributes:
         links: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
         sent: by cells.
-        sharing: weights of the points for each other, from `relume.views.sharing`, (n, n) sparse; None: each alone.
+        sharing: among the points; None: each alone.
     """
 
     links: NDArray[np.uint16]
     pattern: Pattern
     sent: Sent
-    sharing: Any = None
+    sharing: Sharing | None = None
 
     @property
     def rays_a_point(self) -> int:

@@ -4,52 +4,94 @@ A few hundred rays a sample leave grain as fine as the pixels, and light between
 next: a weighted mean over the eight pixels around, of samples on the same smooth piece of the same material, is nearer
 to the truth than the sample alone. The weights depend on places and normals only, so that the mean is linear in light
 and materials, and one for images and for operators.
+
+What a highlight shows turns by twice as much as the normal: its neighbours are those that are turned alike
+(docs/adr/0072-gather-rays-of-stills.md).
 """
 
 from __future__ import annotations
 
-from typing import Any
-
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from relume.project.sharing import Sharing, Weights
+
 F32 = NDArray[np.float32]
 
-_TENT = {0: 2.0, 1: 1.0}
 _MIN_COS_TURN = 0.985  # normals that differ by more than 10° are of another piece
+_MIN_COS_TURN_OF_HIGHLIGHTS = 0.9986  # 3°
 _MAX_RISE = 0.2  # off the tangent plane, over the distance
 
 
-def sharing(pixel: NDArray[np.uint32], width: int, position: F32, normal: F32) -> Any:
+@nb.njit(nogil=True, cache=True)
+def _most_neighbours(first, pixel, width):  # type: ignore[no-untyped-def]
+    """Count the samples of the pixels around all samples. first: where each pixel's samples begin. (pixels + 1,)"""
+    height, count = (first.shape[0] - 1) // width, 0
+    for p in pixel:
+        x, y = p % width, p // width
+        for row in range(max(y - 1, 0), min(y + 2, height)):
+            begin, end = row * width + max(x - 1, 0), row * width + min(x + 2, width)
+            count += first[end] - first[begin]
+    return count
+
+
+@nb.njit(nogil=True, cache=True)
+def _weigh(order, first, pixel, width, position, normal, min_cos_turn, starts, among, weights):  # type: ignore[no-untyped-def]
+    """Weigh samples for each other.
+
+    Args:
+        order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: of each sample. (n,) int64
+        position, normal: of each. (n, 3) float32. min_cos_turn: of the normals of neighbours.
+        starts, among, weights: written, compressed rows. (n + 1,), (≥ entries,) each
+    Returns:
+        How many entries there are.
+    """
+    height, count = (first.shape[0] - 1) // width, 0
+    for a in range(pixel.shape[0]):
+        starts[a], total = count, 0.0
+        x, y = pixel[a] % width, pixel[a] // width
+        for row in range(max(y - 1, 0), min(y + 2, height)):
+            for column in range(max(x - 1, 0), min(x + 2, width)):
+                begin, end = first[row * width + column], first[row * width + column + 1]
+                for at in range(begin, end):
+                    b, turn, rise, squared = order[at], 0.0, 0.0, 0.0
+                    for axis in range(3):
+                        away = np.float64(position[b, axis]) - np.float64(position[a, axis])
+                        turn += np.float64(normal[a, axis]) * np.float64(normal[b, axis])
+                        rise += np.float64(normal[a, axis]) * away
+                        squared += away * away
+                    if a == b or (turn > min_cos_turn and rise * rise <= _MAX_RISE * _MAX_RISE * squared):
+                        # a tent; samples of one pixel count as one
+                        weight = (2 - abs(row - y)) * (2 - abs(column - x)) / (end - begin)
+                        among[count], weights[count] = b, weight
+                        total += weight
+                        count += 1
+        for at in range(starts[a], count):
+            weights[at] /= total
+    starts[pixel.shape[0]] = count
+    return count
+
+
+def sharing(pixel: NDArray[np.uint32], width: int, position: F32, normal: F32, tents: int = 1) -> Sharing:
     """Weigh a material's samples for each other; rows sum to one.
 
     Args:
         pixel: y · width + x of each. (n,) uint32. width: of the picture, pixels.
         position, normal: of each. (n, 3) float32
-    Returns:
-        (n, n) sparse, float32
+        tents: how often what is scattered evenly is shared, one tent after another.
+    Cost: O(n) time.
     """
-    order = np.argsort(pixel, kind="stable")
-    key = pixel[order].astype(np.int64)
-    x, y = pixel.astype(np.int64) % width, pixel.astype(np.int64) // width
-    rows, columns, weights = [], [], []
-    for dx in (-1, 0, 1):
-        for dy in (-1, 0, 1):
-            around = np.where((x + dx >= 0) & (x + dx < width), (y + dy) * width + x + dx, -1)
-            first, stop = np.searchsorted(key, around), np.searchsorted(key, around, side="right")
-            num = stop - first
-            row = np.repeat(np.arange(len(pixel)), num)
-            within = np.arange(len(row)) - np.repeat(np.cumsum(num) - num, num)
-            column = order[np.repeat(first, num) + within]
-            away = (position[column] - position[row]).astype(np.float64)
-            turn = np.einsum("nc,nc->n", normal[row], normal[column])
-            rise = np.abs(np.einsum("nc,nc->n", normal[row].astype(np.float64), away))
-            same = (turn > _MIN_COS_TURN) & (rise <= _MAX_RISE * np.linalg.norm(away, axis=1)) | (row == column)
-            rows.append(row[same])
-            columns.append(column[same])
-            weights.append((_TENT[abs(dx)] * _TENT[abs(dy)] / np.repeat(num, num))[same])
-    shape = (len(pixel), len(pixel))
-    found = csr_array((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
-    found.data /= np.repeat(found.sum(axis=1), np.diff(found.indptr))
-    return found.astype(np.float32)
+    own, num_pixels = pixel.astype(np.int64), (int(pixel.max(initial=0)) // width + 1) * width
+    order = np.argsort(own, kind="stable").astype(np.int32)
+    first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=num_pixels))])
+    most = _most_neighbours(first, own, width)
+
+    def weights(min_cos_turn: float) -> csr_array:
+        starts, among = np.empty(len(own) + 1, np.int32), np.empty(most, np.int32)
+        found = np.empty(most, np.float32)
+        num = _weigh(order, first, own, width, position, normal, min_cos_turn, starts, among, found)
+        return csr_array((found[:num].copy(), among[:num].copy(), starts), shape=(len(own), len(own)))
+
+    return Sharing(Weights(weights(_MIN_COS_TURN), tents), Weights(weights(_MIN_COS_TURN_OF_HIGHLIGHTS), 1))

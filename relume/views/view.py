@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from relume.memory import Memory
 from relume.points import Points
 from relume.project.receivers import GatherRays, LocalRays, Receivers
 from relume.project.sent import Sent
+from relume.project.sharing import Sharing
 from relume.scene.model import Camera
 from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
@@ -157,10 +157,10 @@ class View:
         alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
         return replace(alone, sharing=self._sharing(material))
 
-    def _sharing(self, material: int) -> Any:
-        def found() -> Any:
-            points = self.points(material)
-            return sharing(self.pixel[self.rows(material)], self.width, points.position, points.normal)
+    def _sharing(self, material: int) -> Sharing:
+        def found() -> Sharing:
+            points, tents = self.points(material), int(self.store.attributes.get("gather_tents", 1))
+            return sharing(self.pixel[self.rows(material)], self.width, points.position, points.normal, tents)
 
         return self.memory.keep((self.key, "sharing", self.name, material), found)
 

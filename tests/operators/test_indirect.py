@@ -24,6 +24,7 @@ from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays, Receivers
 from relume.project.sent import evenly
+from relume.project.sharing import Sharing, Weights
 from relume.trace.cell_tree import NO_CELL
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
@@ -70,15 +71,18 @@ def image_by_rows(term, bands, receivers, radiance):
     return image.transpose(0, 2, 1).reshape(-1, 3)[:NUM_POINTS] - 1
 
 
-def test_rows_are_shared_as_rays_are(receivers):
+@pytest.mark.parametrize("times", [1, 3])
+def test_rows_are_shared_as_rays_are(receivers, times):
     """Samples take part in each other's image with the weights that the exact image has."""
     rng = np.random.default_rng(8)
     weights = csr_array(rng.random((NUM_POINTS,) * 2) * (rng.random((NUM_POINTS,) * 2) < 0.02) + np.eye(NUM_POINTS))
     (rays,) = receivers.rays
-    shared = replace(receivers, rays=(replace(rays, sharing=weights.astype(np.float32)),))
+    weights = csr_array(weights / weights.sum(axis=1)[:, None]).astype(np.float32)
+    nobody = Weights(0 * weights, 1)
+    shared = replace(receivers, rays=(replace(rays, sharing=Sharing(Weights(weights, times), nobody)),))
     term, bands = TERMS["lambert"], bands_of(TERMS["lambert"])
-    alone = image_by_rows(term, bands, receivers, light(1))
-    np.testing.assert_allclose(image_by_rows(term, bands, shared, light(1)), weights @ alone, rtol=1e-4, atol=1e-4)
+    expected = np.linalg.matrix_power(weights.toarray(), times) @ image_by_rows(term, bands, receivers, light(1))
+    np.testing.assert_allclose(image_by_rows(term, bands, shared, light(1)), expected, rtol=1e-4, atol=1e-4)
 
 
 def freeze(term, bands, receivers, cancelled=lambda: False):

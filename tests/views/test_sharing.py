@@ -17,6 +17,7 @@ from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays
 from relume.project.sent import evenly
+from relume.project.sharing import Sharing, Weights
 from relume.views.sharing import sharing
 
 WIDTH, HEIGHT = 9, 7
@@ -43,14 +44,14 @@ def by_hand(pixel, is_same):
 
 def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
     pixel, position, normal = grid()
-    found = sharing(pixel, WIDTH, position, normal)
+    found = sharing(pixel, WIDTH, position, normal).even.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
     np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_count_as_one():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    found = sharing(pixel, WIDTH, position, normal)
+    found = sharing(pixel, WIDTH, position, normal).even.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
 
 
@@ -60,7 +61,7 @@ def test_other_pieces_of_a_surface_take_no_part():
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 0.5
-    found = sharing(pixel, WIDTH, position, normal).toarray()
+    found = sharing(pixel, WIDTH, position, normal).even.matrix.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # on the wall, depth as the floor has it is a rise
     assert not found[piece[:, None] != piece[None, :]].any()
@@ -68,9 +69,40 @@ def test_other_pieces_of_a_surface_take_no_part():
     np.testing.assert_allclose(found[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
 
 
+def test_highlights_are_shared_by_what_is_turned_alike():
+    """Every other column of a floor is turned, first a little, then more; for what is scattered all are alike."""
+    pixel, position, normal = grid()
+    is_turned = pixel % WIDTH % 2
+
+    def both(degrees):
+        angle = np.radians(degrees) * is_turned
+        normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
+        found = sharing(pixel, WIDTH, position, normal)
+        return found.even.matrix.toarray(), found.highlights.matrix.toarray()
+
+    all_alike = by_hand(pixel, lambda a, b: True)
+    for found in (*both(2.0), both(5.0)[0]):
+        np.testing.assert_allclose(found, all_alike, rtol=1e-6)
+    np.testing.assert_allclose(both(5.0)[1], by_hand(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6)
+
+
+def test_tents_follow_each_other_and_highlights_have_one():
+    pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
+    found = sharing(pixel, WIDTH, position, normal, tents=3)
+    assert (found.even.times, found.highlights.times) == (3, 1)
+    rings, among = found.even.rings(4, 11)
+    values = np.random.default_rng(9).random((len(pixel), 3))
+    once = by_hand(pixel, lambda a, b: True)
+    shared = values[among]
+    for within in reversed(rings):
+        shared = within @ shared
+    np.testing.assert_allclose(shared, (once @ once @ once @ values)[4:11], rtol=1e-5)
+
+
+@pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize("model", ["lambert", "cook_torrance"])
 @pytest.mark.parametrize("is_active", [False, True])
-def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active):
+def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active, times):
     """Free curves and contracted ones, in ranges of any length; light of the environment is not shared."""
     rng, num = np.random.default_rng(2), 70
     lights = subdivide(rng.random((16, 32, 3), np.float32), 40)
@@ -90,6 +122,9 @@ def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active
 
     dark = project((), [(0, num)])
     separate = project((alone,), [(0, num)]) - dark
-    shared = project((replace(alone, sharing=weights),), [(0, 50), (50, num)]) - dark
-    expected = np.einsum("pq,qjc->pjc", weights.toarray(), separate)
+    nobody = Weights(csr_array((num, num), dtype=np.float32), 1)
+    of_term = Weights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
+    both = Sharing(of_term, nobody) if model == "lambert" else Sharing(nobody, of_term)
+    shared = project((replace(alone, sharing=both),), [(0, 50), (50, num)]) - dark
+    expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())
