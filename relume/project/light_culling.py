@@ -31,6 +31,12 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
     return half / max(farthest, np.float32(1e-6)), cos_theta_d
 
 
+@nb.njit(nogil=True, cache=True, inline="always")
+def has_bound(kind):  # type: ignore[no-untyped-def]
+    """Whether `nearest_into` bounds an angle."""
+    return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """Bound γ(wi', wo) from below over all wi' within `radius` of wi; zero for angles without a bound.
@@ -64,13 +70,18 @@ def _keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach,
     """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end."""
     for k in range(kinds.shape[0]):
         limit = support[k] + _SLACK
-        if limit > np.float32(math.pi / 2):
+        if limit > np.float32(math.pi / 2) or not has_bound(kinds[k]):
             continue
         num = end - begin
         for n in range(num):
             reach[n] = radius[light[begin + n]]
         x, y, z = wi[0, begin:end], wi[1, begin:end], wi[2, begin:end]
         nearest_into(kinds[k], reach[:num], x, y, z, ox, oy, oz, nearest)
+        farthest = _ZERO
+        for n in range(num):
+            farthest = max(farthest, nearest[n])
+        if farthest <= limit:
+            continue
         kept = begin
         for n in range(num):
             light[kept] = light[begin + n]

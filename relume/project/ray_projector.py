@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.project.contraction import Contraction
+from relume.project.lambertian import uprights
 from relume.project.ray_kernel import project_rays, sum_rays, weigh_rays
 from relume.project.receivers import GatherRays, Listed, Rays, Receivers
 from relume.project.sharing import Sharing
@@ -53,7 +54,7 @@ class RayProjector:
     def _add(self, rays: Rays, points: Receivers, start: int, stop: int, out: F32) -> None:
         c = self._contraction
         if c.kinds.size == 0 and self._term.is_lambertian and isinstance(rays, GatherRays):
-            out[:, :, 0] += self._uprights(points, start, stop)[:, None] * rays.sum(points, start, stop)
+            out[:, :, 0] += uprights(self._term, points, start, stop)[:, None] * rays.sum(points, start, stop)
             return
         for first in range(start, stop, self._capacity):
             last = min(first + self._capacity, stop)
@@ -65,12 +66,6 @@ class RayProjector:
                 *self._listed, shading,
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.active, some,
             )  # fmt: skip
-
-    def _uprights(self, points: Receivers, start: int, stop: int) -> F32:
-        """The quotients of a Lambertian term, which know of no direction but above and below. (stop - start,)"""
-        cos_theta_o = np.einsum("nc,nc->n", points.normal[start:stop], points.wo[start:stop])
-        nothing = np.zeros_like(cos_theta_o)
-        return np.asarray(self._term.quotients(nothing, nothing, nothing + 1, nothing, nothing, cos_theta_o)[0])
 
     def weigh(self, start: int, stop: int) -> F32:
         """Weigh what each ray of points [start, stop) brings, all curves contracted. (3, rays) float32"""

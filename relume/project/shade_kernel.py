@@ -171,6 +171,19 @@ def _look_up(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untype
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _look_up_middles(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
+    """Look up the midpoints of edges of listed lights [begin, begin + num). local: written. (3, 6, ≥ num)"""
+    ab_x, bc_x, ca_x = local[0, 3], local[0, 4], local[0, 5]
+    ab_y, bc_y, ca_y = local[1, 3], local[1, 4], local[1, 5]
+    ab_z, bc_z, ca_z = local[2, 3], local[2, 4], local[2, 5]
+    for k in range(num):  # no vectors, whatever the order: so all of a light, which lies together
+        m = np.uint32(light[begin + k])
+        ab_x[k], ab_y[k], ab_z[k] = nodes[m, 3, 0], nodes[m, 3, 1], nodes[m, 3, 2]
+        bc_x[k], bc_y[k], bc_z[k] = nodes[m, 4, 0], nodes[m, 4, 1], nodes[m, 4, 2]
+        ca_x[k], ca_y[k], ca_z[k] = nodes[m, 5, 0], nodes[m, 5, 1], nodes[m, 5, 2]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _turn(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
     """Turn nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -357,8 +370,7 @@ def shade_points(  # type: ignore[no-untyped-def]
             at = begin + chunk * _CHUNK
             num = min(_CHUNK, end - at)
             if num_curves > 0:
-                for node in range(3, 6):
-                    _look_up(nodes, node, light, at, num, local[0, 0, node], local[0, 1, node], local[0, 2, node])
+                _look_up_middles(nodes, light, at, num, local[0])
                 _turn(normal[p], tangent[p], 3, num, local[0])
             _weigh(brings, light, shading, at, num, weight[chunk], reach[chunk])
             _evaluate(curves, scale, wo, local[0], reach[chunk], num, scratch, value[chunk], error[chunk])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
+from relume.project.lambertian import EvenShader
 from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
@@ -35,12 +36,23 @@ class Shader:
         self._contraction, self._lights, self._receivers = contraction, lights, receivers
         self._listed = ListedLights(term, contraction, lights, receivers)
         self._brings = np.concatenate([self._listed.irradiance, lights.radius[:, None]], axis=1)
+        is_even = term.is_lambertian and contraction.kinds.size == 0
+        self._even = EvenShader(term, contraction.constant, lights) if is_even else None
         self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
 
     def project(self, start: int, stop: int) -> F32:
         """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
-        r, c, listed = self._receivers, self._contraction, self._listed
         out = np.zeros((stop - start, 3, 1), np.float32)
+        if self._even is None:
+            self._add_listed(start, stop, out)
+        else:
+            out[:, :, 0] = self._even.shade(self._receivers, start, stop)
+        self._rays.add(start, stop, out)
+        return out.transpose(0, 2, 1)
+
+    def _add_listed(self, start: int, stop: int, out: F32) -> None:
+        """Add the environment, of which lists are made."""
+        r, c, listed = self._receivers, self._contraction, self._listed
         for block in range(start, stop, POINTS_A_BLOCK):
             end = min(block + POINTS_A_BLOCK, stop)
             shading, wo = listed.list(block, end)
@@ -48,5 +60,3 @@ class Shader:
                 r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.by_light, self._brings,
                 c.axes, c.whole, block, end, out[block - start : end - start],
             )  # fmt: skip
-        self._rays.add(start, stop, out)
-        return out.transpose(0, 2, 1)

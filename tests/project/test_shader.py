@@ -100,3 +100,14 @@ def test_a_range_is_shaded_as_part_of_all(lights, receivers):
     term, bands = curves_of("cook_torrance", {})
     part = Shader(term, contract(term, bands, None), lights, receivers).project(5, 9)[:, 0]
     np.testing.assert_array_equal(part, shaded(term, bands, lights, receivers)[5:9])
+
+
+def test_light_that_scatters_evenly_is_its_sum(receivers, lights):
+    """All lights at once, in double precision: those that are seen, by their cosine."""
+    term, bands = curves_of("lambert", {})
+    bands = {"theta_i": np.repeat([[0.5], [1.0], [2.0]], 64, axis=1)}
+    seen = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
+    cosine = np.maximum(receivers.normal.astype(float) @ lights.direction.T.astype(float), 0)
+    is_up = np.einsum("nc,nc->n", receivers.normal, receivers.wo) > 0
+    expected = (is_up[:, None] * seen * cosine) @ lights.irradiance.astype(float) / np.pi * [0.5, 1, 2]
+    np.testing.assert_allclose(shaded(term, bands, lights, receivers), expected, rtol=2e-5)
