@@ -97,13 +97,23 @@ def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targ
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
-    arguments = packet_arguments(coherent=False)
+    few, all_of_a_light = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))
     found = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
         trace_blocks(
-            occluded, scene.handle, arguments.ctypes.data, origins, normals, targets, start, stop, bits, counts
+            occluded,
+            scene.handle,
+            few.ctypes.data,
+            all_of_a_light.ctypes.data,
+            origins,
+            normals,
+            targets,
+            start,
+            stop,
+            bits,
+            counts,
         )
         found.append(counts)
 

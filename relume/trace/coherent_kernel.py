@@ -26,6 +26,7 @@ U64 = NDArray[np.uint64]
 BLOCK = 64
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
+_ENOUGH = LANES * 3 // 4  # rays to one light from which on they do not wait for the next light's
 # predictions: what a region's untraced samples are held to see of a light
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 # of the predicted bits, one in this many is traced all the same; a power of two from the size of a quarter up
@@ -90,7 +91,7 @@ def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
     facing, known = block.facing, block.known
-    rays = 0
+    rays = lane = 0
     for at in range(lights.shape[0]):
         light = lights[at]
         wanted = samples[at] & facing[light] & ~known[light]
@@ -99,14 +100,18 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
         while wanted:
             k = trailing_zeros(wanted)  # type: ignore[call-arg, var-annotated]
             wanted &= wanted - np.uint64(1)
-            lane = rays & (LANES - 1)
             packet.owner[lane] = light << _BLOCK_BITS | k
             set_origin(packet, lane, origins[k, 0], origins[k, 1], origins[k, 2])
             aim(packet, lane, x, y, z, FAR)
             rays += 1
-            if lane == LANES - 1:
+            lane += 1
+            if lane == LANES:
                 _flush(occluded, packet, block, LANES)
-    _flush(occluded, packet, block, rays & (LANES - 1))
+                lane = 0
+        if lane >= _ENOUGH:
+            _flush(occluded, packet, block, lane)
+            lane = 0
+    _flush(occluded, packet, block, lane)
     return rays
 
 
@@ -289,32 +294,35 @@ def _write(block, bits):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace_quarter(occluded, packet, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
+def _trace_quarter(occluded, packets, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
-    whole, quarter, each = levels
+    (packet, alike), (whole, quarter, each) = packets, levels
     start, stop = span
     region = _mask(start, stop)
     anchors = _ends(points, start, stop)
     counts[0] += _flood(occluded, packet, block, points, lights, region, anchors, whole, quarter)
     _doubt(quarter, lights)
-    counts[0] += _flood(occluded, packet, block, points, lights, region, region, quarter, each)
+    counts[0] += _flood(occluded, alike, block, points, lights, region, region, quarter, each)
     checked, wrong = _check(occluded, packet, block, points, lights, region, start, salt, each)
     counts[0] += checked
     counts[2] += checked
     counts[3] += wrong
     if wrong:
-        counts[0] += _flood(occluded, packet, block, points, lights, region, region, each, quarter)
+        counts[0] += _flood(occluded, alike, block, points, lights, region, region, each, quarter)
         _keep(block, region, quarter)
     else:
         _keep(block, region, each)
 
 
 @nb.njit(nogil=True, cache=True)
-def trace_blocks(occluded, scene, arguments, origins, normals, lights, start, stop, bits, counts):  # type: ignore[no-untyped-def]
+def trace_blocks(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, of_alike, origins, normals, lights, start, stop, bits, counts
+):
     """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
     Args:
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
+        of_alike: address of those of rays that go to one light from all samples of a quarter.
         origins: off the surface. normals: shading normals. (n, 3) float32
         lights: directions, the two arrays of `relume.light.neighbours.Neighbours`, and which are always traced.
         start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
@@ -322,7 +330,7 @@ def trace_blocks(occluded, scene, arguments, origins, normals, lights, start, st
     """
     directions = lights[0]
     n = directions.shape[0]
-    packet = new_packet(scene, arguments)
+    packet, alike = new_packet(scene, arguments), new_packet(scene, of_alike)
     block = _Block(np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64))
     nothing, whole = _new_level(n), _new_level(n)
     levels = (whole, _new_level(n), _new_level(n))
@@ -336,5 +344,5 @@ def trace_blocks(occluded, scene, arguments, origins, normals, lights, start, st
         _doubt(whole, lights)
         for begin in range(0, width, _QUARTER):
             span, salt = (begin, min(begin + _QUARTER, width)), here + begin
-            _trace_quarter(occluded, packet, block, points, lights, span, salt, levels, counts)
+            _trace_quarter(occluded, (packet, alike), block, points, lights, span, salt, levels, counts)
         _write(block, bits[here:there])
