@@ -32,7 +32,7 @@ from relume.project.levels import contract_levels, runs
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import GatherRays, Receivers
 from relume.project.sent import evenly
-from relume.project.sharing import Weights
+from relume.sharing import Weights
 
 F32 = NDArray[np.float32]
 

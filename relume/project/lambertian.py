@@ -21,7 +21,13 @@ _ZERO = np.float32(0)
 
 
 def uprights(term: Term, points: Receivers, start: int, stop: int) -> F32:
-    """Evaluate the quotients of a Lambertian term, which know of no direction but above and below. (stop - start,)"""
+    """Evaluate the quotients of a Lambertian term, which know of no direction but above and below.
+
+    Args:
+        term: the term. points: of which [start, stop) are asked.
+    Returns:
+        (stop - start,) float32
+    """
     cos_theta_o = np.einsum("nc,nc->n", points.normal[start:stop], points.wo[start:stop])
     nothing = np.zeros_like(cos_theta_o)
     return np.asarray(term.quotients(nothing, nothing, nothing + 1, nothing, nothing, cos_theta_o)[0])

@@ -13,7 +13,7 @@ from relume.project.contraction import Contraction
 from relume.project.lambertian import uprights
 from relume.project.ray_kernel import project_rays, sum_rays, weigh_rays
 from relume.project.receivers import GatherRays, Listed, Rays, Receivers
-from relume.project.sharing import Sharing
+from relume.sharing import Sharing
 
 F32 = NDArray[np.float32]
 

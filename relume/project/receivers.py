@@ -15,7 +15,7 @@ from relume.points import Points
 from relume.project.gathered_kernel import list_gathered, sum_gathered
 from relume.project.ray_kernel import list_local
 from relume.project.sent import Sent
-from relume.project.sharing import Sharing
+from relume.sharing import Sharing
 
 F32 = NDArray[np.float32]
 

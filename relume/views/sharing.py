@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from relume.project.sharing import Sharing, Weights
+from relume.sharing import Sharing, Weights
 
 F32 = NDArray[np.float32]
 

@@ -17,8 +17,8 @@ from relume.memory import Memory
 from relume.points import Points
 from relume.project.receivers import GatherRays, LocalRays, Receivers
 from relume.project.sent import Sent
-from relume.project.sharing import Sharing
 from relume.scene.model import Camera
+from relume.sharing import Sharing
 from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
 from relume.views.store_io import (

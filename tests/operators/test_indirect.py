@@ -24,7 +24,7 @@ from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays, Receivers
 from relume.project.sent import evenly
-from relume.project.sharing import Sharing, Weights
+from relume.sharing import Sharing, Weights
 from relume.trace.cell_tree import NO_CELL
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33

@@ -17,7 +17,7 @@ from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays
 from relume.project.sent import evenly
-from relume.project.sharing import Sharing, Weights
+from relume.sharing import Sharing, Weights
 from relume.views.sharing import sharing
 
 WIDTH, HEIGHT = 9, 7
