@@ -45,7 +45,7 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
     return p * math.sqrt(_ONE - x)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
     """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
 
@@ -74,7 +74,7 @@ def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
     return e * np.int32((k + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions, in radians.
 
