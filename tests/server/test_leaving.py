@@ -16,12 +16,19 @@ import pytest
 import uvicorn
 from running_server import Running, running_server
 from server_fakes import Control
+from sse_starlette.sse import AppStatus
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from server.running.leave import Leave
 from server.running.process import Process
 from server.settings import Settings
+
+
+@pytest.fixture(autouse=True)
+def _others_events_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a signal sets for every stream of events in this process is unset again."""
+    monkeypatch.setattr(AppStatus, "should_exit", False)
 
 
 @pytest.fixture
