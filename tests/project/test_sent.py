@@ -22,21 +22,27 @@ def over_hemisphere(num, seed):
     return np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
 
 
+@pytest.fixture(scope="module")
+def sides():
+    """A million directions in and as many out, and the functions of each as rows, which are read one after another."""
+    wi, wo = over_hemisphere(1_000_000, 1), over_hemisphere(1_000_000, 2)
+    return wi, wo, *(np.ascontiguousarray(in_basis(w)[:, :NUM_SENT].T) for w in (wi, wo))
+
+
 @pytest.mark.parametrize(
     ("model", "params"),
     [("blinn_phong", {"exponent": 12.0}), ("ggx", {"roughness": 0.6, "f0": 0.8}), ("ward_anisotropic", {})],
 )
-def test_what_a_term_sends_on_is_its_double_integral(model, params):
+def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
     """F_jk by Monte Carlo over both directions."""
     document = {**PLAIN, "model": model, "params": params}
-    wi, wo = over_hemisphere(1_000_000, 1), over_hemisphere(1_000_000, 2)
-    value = np.pi**2 * eval_brdf(document, wi, wo)[:, 0]
-    h_i, h_o = in_basis(wi)[:, :NUM_SENT], in_basis(wo)[:, :NUM_SENT]
+    wi, wo, h_i, h_o = sides
+    value = np.ascontiguousarray(np.pi**2 * eval_brdf(document, wi, wo)[:, 0])
     found, rungs = shares(document), ladder(SENT_DEGREE)
     for pair, (j, k) in enumerate(PAIRS):
-        drawn = value * h_i[:, rungs.cosine[k]] * h_o[:, rungs.cosine[j]]
+        drawn = value * h_i[rungs.cosine[k]] * h_o[rungs.cosine[j]]
         if rungs.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
-            drawn = (drawn + value * h_i[:, rungs.sine[k]] * h_o[:, rungs.sine[j]]) / 2
+            drawn = (drawn + value * h_i[rungs.sine[k]] * h_o[rungs.sine[j]]) / 2
         deviation = drawn.std() / np.sqrt(len(drawn))
         assert found[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
     np.testing.assert_allclose(found[1], found[0] / 2, rtol=1e-6)
