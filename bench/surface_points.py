@@ -131,9 +131,9 @@ def _traced(of: MovingScene, look: Look, chosen: NDArray[np.intp], num_paths: in
     copied, paths = np.repeat(np.arange(len(chosen)), _COPIES), max(1, num_paths // (_COPIES * PASSES))
     out = np.empty((PASSES, len(chosen), 3))
     for k in range(PASSES):
-        reflected, _ = reference_indirect(
-            scene, geometry, texels, look, points.rows(copied), material[copied], look.transport.paths.last, paths,
-            _TEXELS_A_PLACE, seed=k,
+        reflected = reference_indirect(
+            scene, geometry, texels, look, points.rows(copied), material[copied],
+            [look.transport.paths.without_direct()], paths, _TEXELS_A_PLACE, seed=k,
         )  # fmt: skip
-        out[k] = direct + reflected.reshape(len(chosen), _COPIES, 3).mean(axis=1)
+        out[k] = direct + reflected.mean[0].reshape(len(chosen), _COPIES, 3).mean(axis=1)
     return out

@@ -175,11 +175,12 @@ export interface TouchMessage {
   parameter?: string | null;
 }
 
-/** Compare a look with brute force, in so many passes; figures come from the second on. */
+/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. */
 export interface TruthRequest {
   bake: string;
   view: string;
   look?: Record<string, unknown>;
+  paths?: "all" | "method";
   passes?: number;
   dry_run?: boolean;
 }
@@ -670,7 +671,7 @@ export interface TablesInfo {
   arrays: ArrayInfo[];
 }
 
-/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. */
+/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
 export interface TruthBody {
   id: string;
   bake: string;
@@ -680,15 +681,20 @@ export interface TruthBody {
   total: number;
   progress: number;
   seconds_left: number | null;
+  paths: "all" | "method";
+  left_out: string[];
+  untraced: string[];
   found: TruthFigures | null;
+  found_of_method: TruthFigures | null;
   problem: string | null;
 }
 
-/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
+/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
 export interface TruthFigures {
   rmse: number;
   noise: number;
   error: number | null;
+  standard_error: number | null;
   limit: number;
   significant: number;
 }

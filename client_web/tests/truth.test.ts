@@ -1,33 +1,41 @@
 import { describe, expect, it } from "vitest";
-import { findings, planWords, progressWords } from "../src/truth/words";
+import { findings, omissions, percent, planWords, progressWords, verdicts } from "../src/truth/words";
 
-const found = { rmse: 0.02, noise: 0.012, error: 0.016, limit: 0.018, significant: 0.032 };
+const found = { rmse: 0.02, noise: 0.012, error: 0.0163, standard_error: 0.0021, limit: 0.018, significant: 0.032 };
+const whole = { ...found, error: 0.3271, standard_error: 0.0004 };
+const left = ["Light that surfaces reflect onto each other."];
+const body = { found: whole, found_of_method: found, left_out: left, untraced: [] };
 
 describe("how true a picture is, in words", () => {
-  it("tells the frame's error apart from the noise", () => {
-    const [pixels, error, noise] = findings(found);
-    expect(pixels).toContain("3.2 %");
-    expect(error).toContain("errs by 1.6 %");
-    expect(noise).toContain("1.2 %");
+  it("tells both errors, against all paths and against the method's, each with its standard error", () => {
+    const [all, method] = verdicts(body);
+    expect(all).toContain("all light paths: the frame errs by 32.71 ± 0.04 %");
+    expect(method).toContain("the method's light paths: the frame errs by 1.6 ± 0.2 %");
+    expect(omissions(body)).toEqual(["The method leaves out: light that surfaces reflect onto each other."]);
   });
 
-  it("says of a frame whose pixels do not differ that it errs by less than the noise, never more", () => {
-    const said = findings({ ...found, error: null, significant: 0 }).join(" ");
-    expect(said).toContain("No difference was found");
-    expect(said).toContain("less than the noise: below 1.8 %");
-    expect(said).not.toContain("errs by");
-    expect(said).not.toContain("differ by more");
+  it("tells one error where the method follows all paths", () => {
+    expect(verdicts({ ...body, left_out: [] })).toHaveLength(1);
+    expect(omissions({ left_out: [], untraced: ["Caustics."] })).toEqual(["Brute force leaves out, too: caustics."]);
   });
 
-  it("does not call a frame right of which some pixels differ, however small that is on the whole", () => {
-    const said = findings({ ...found, error: null }).join(" ");
-    expect(said).toContain("3.2 % of the pixels differ");
-    expect(said).toContain("Over the whole picture that is less than the noise");
-    expect(said).not.toContain("No difference");
+  it("never tells a number that is below the noise", () => {
+    const [, method] = verdicts({ ...body, found_of_method: { ...found, error: null, standard_error: null, significant: 0 } });
+    expect(method).toContain("the error is less than the noise, below 1.8 %");
+    expect(method).not.toContain("errs by");
   });
 
-  it("shows small errors with two digits", () => {
-    expect(findings({ ...found, error: 0.0016 })[1]).toContain("0.16 %");
+  it("says what the map shows, and how much is noise", () => {
+    expect(findings(found)[0]).toContain("3.2 % of the pixels differ");
+    expect(findings(found)[1]).toContain("1.2 %");
+    expect(findings({ ...found, significant: 0 })[0]).toContain("no difference");
+  });
+
+  it("shows as many digits as are known", () => {
+    expect(percent(0.0016)).toBe("0.16 %");
+    expect(percent(0.0016, 0.00004)).toBe("0.160 ± 0.004 %");
+    expect(percent(0.31, 0.02)).toBe("31 ± 2 %");
+    expect(percent(0)).toBe("0.00 %");
   });
 
   it("counts the pass that is being made, and never beyond the last", () => {

@@ -1,4 +1,8 @@
-"""A whole picture by brute force, over the same view samples as a bake: what differs is transport, not antialiasing."""
+"""A whole picture by brute force, over the same view samples as a bake: what differs is transport, not antialiasing.
+
+By all light paths that there are, and by those that a method follows: of one draw, so that the two differ by what the
+method leaves out alone.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ from relume.bake import Recipe
 from relume.environments.equirect import lookup, turned
 from relume.environments.model import Environment
 from relume.errors import CancelledError
+from relume.eye.mirrors import are_mirrors
 from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
@@ -20,6 +25,7 @@ from relume.methods.direct import DirectMethod
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
+from relume.reference.paths import followed_paths, left_out, untraced, whole_paths
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels, texels_of
 from relume.scene.model import Scene
@@ -45,35 +51,88 @@ def reference_image(
     *,
     reflects: bool = False,
 ) -> F32:
-    """Render a look under all its lights, with shadows, by the light paths that its `transport` names.
+    """Render a look under all its lights, with shadows, by the light paths that a method follows.
 
     Args:
-        size: width and height in pixels.
-        spp: texels of the environment for each view sample, drawn by power with a fixed seed, and places of each local
-            light that has an extent; 0, or as many as the map has, for every texel.
-        progress: called with the share done. cancelled: asked now and then.
-        pass_index: pictures with other indices draw independently.
-        reflects: whether there is light between surfaces, as method `gather` has it; one path for every
-            `_SPP_A_PATH` of `spp`.
+        scene, view, look, size, spp, progress, cancelled, pass_index: as of `reference_truth`.
+        reflects: whether the method has light between surfaces, as the look's `transport` names it.
     Returns:
         Linear radiance, the background seen where there is no surface. (height, width, 3) float32
+    """
+    wanted = [followed_paths(look, reflects=reflects)]
+    return _images(scene, view, look, size, _Draw(spp, pass_index, cancelled), wanted, progress)[0]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Pictures of one pass of brute force, (height, width, 3) float32 each.
+
+    Attributes:
+        whole: by all light paths; None where they were not asked for.
+        followed: by those that the method follows.
+        left_out: of the whole, by the method; untraced: by brute force, too. In sentences.
+    """
+
+    whole: F32 | None
+    followed: F32
+    left_out: tuple[str, ...]
+    untraced: tuple[str, ...]
+
+
+def reference_truth(
+    scene: Scene,
+    view: str,
+    look: Look,
+    size: tuple[int, int],
+    spp: int,
+    progress: Callable[[float], object] = lambda share: None,
+    cancelled: Callable[[], bool] = lambda: False,
+    pass_index: int = 0,
+    *,
+    reflects: bool = False,
+    is_whole: bool = True,
+) -> Truth:
+    """Render a look by all light paths and by those that a method follows, which share what is drawn.
+
+    Args:
+        scene: whose light it is. view: one of its cameras. look: that is shown.
+        size: width and height in pixels.
+        spp: texels of the environment for each view sample, drawn by power with a fixed seed, and places of each local
+            light that has an extent; 0, or as many as the map has, for every texel. One path between surfaces for every
+            `_SPP_A_PATH` of them.
+        progress: called with the share done. cancelled: asked now and then.
+        pass_index: pictures with other indices draw independently.
+        reflects: whether the method has light between surfaces.
+        is_whole: whether all paths are asked for.
     Raises:
         PlanError: the scene has no such view, or a bake of this size would be refused.
         CancelledError: `cancelled` said so.
         NotFoundError: the look names an environment that is not here.
     """
+    wanted = [followed_paths(look, reflects=reflects), *([whole_paths(look)] if is_whole else [])]
+    images = _images(scene, view, look, size, _Draw(spp, pass_index, cancelled), wanted, progress)
+    return Truth(images[1] if is_whole else None, images[0], left_out(look, reflects=reflects), untraced(scene))
+
+
+def _images(
+    scene: Scene, view: str, look: Look, size: tuple[int, int], draw: _Draw, wanted: Sequence[Paths],
+    progress: Callable[[float], object],
+) -> list[F32]:  # fmt: skip
+    """One picture for each choice of paths."""
     DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
     shot = _shoot(scene, view, look, size)
-    paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
-    direct = _DIRECT_SHARE if paths.reflect else 1.0
-    draw = _Draw(spp, pass_index, cancelled)
-    radiance = np.zeros((len(shot.samples.pixel), 3))
-    if paths.direct:
-        _add_direct(radiance, shot, draw, lambda share: progress(direct * share))
-        _add_background(radiance, shot)
-    if paths.reflect:
-        _add_reflected(radiance, shot, paths, draw, lambda share: progress(direct + (1 - direct) * share))
-    return _resolve(shot.samples, radiance, size)
+    is_direct = np.array([paths.direct for paths in wanted], np.float64)
+    has_others = any(paths.reflect for paths in wanted) or (is_direct.any() and are_mirrors(scene.materials).any())
+    direct = _DIRECT_SHARE if has_others else 1.0
+    radiance = np.zeros((len(wanted), len(shot.samples.pixel), 3))
+    if is_direct.any():
+        straight = np.zeros(radiance.shape[1:])
+        _add_direct(straight, shot, draw, lambda share: progress(direct * share))
+        _add_background(straight, shot)
+        radiance += is_direct[:, None, None] * straight
+    if has_others:
+        _add_reflected(radiance, shot, wanted, draw, lambda share: progress(direct + (1 - direct) * share))
+    return [_resolve(shot.samples, of_paths, size) for of_paths in radiance]
 
 
 @dataclass(frozen=True)
@@ -156,19 +215,21 @@ def _add_background(radiance: F64, shot: _Shot) -> None:
     radiance[outside] += np.array(environment.gain) * lookup(shot.light.radiance, towards.astype(np.float32))
 
 
-def _add_reflected(radiance: F64, shot: _Shot, paths: Paths, draw: _Draw, progress: Callable[[float], object]) -> None:
-    """Add light by way of other surfaces, block by block."""
+def _add_reflected(
+    radiance: F64, shot: _Shot, wanted: Sequence[Paths], draw: _Draw, progress: Callable[[float], object]
+) -> None:
+    """Add light by way of other surfaces and of mirrors, block by block. radiance: (paths wanted, samples, 3)"""
     num_points = shot.on_surface.stop
     num_blocks, num_paths = -(-num_points // _POINTS_A_BLOCK), max(1, draw.spp // _SPP_A_PATH)
     for block in range(num_blocks):
         if draw.cancelled():
             raise CancelledError("the reference was cancelled")
         rows = slice(block * _POINTS_A_BLOCK, min((block + 1) * _POINTS_A_BLOCK, num_points))
-        found, _ = reference_indirect(
+        found = reference_indirect(
             shot.scene, shot.geometry, shot.texels, shot.look, shot.points.rows(rows), shot.samples.material[rows],
-            paths.last, num_paths, _SPP_A_PATH, seed=draw.pass_index * num_blocks + block, first_bounce=paths.first,
+            wanted, num_paths, _SPP_A_PATH, seed=draw.pass_index * num_blocks + block,
         )  # fmt: skip
-        radiance[rows] += found
+        radiance[:, rows] += found.mean
         progress((block + 1) / num_blocks)
 
 

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.levels import at_ratio, follows_map
+from relume.brdf.mirror import is_mirror, mirrored_share
 from relume.look import Look
 from relume.scene.model import Scene
 from relume.scene.roughness import level_of, levels_of
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
 
 _EACH, _ALL = 48, 96  # kinds of a material, and of a scene: far finer than pictures tell apart
@@ -25,10 +27,13 @@ class Kinds:
     """What the surfaces of a scene are made of.
 
     Attributes:
-        terms: of each kind. first: kind of each material's first. ratios: of each material's kinds, none for one.
+        terms: of each kind. mirrors: how much of each term of a kind mirrors, where the scene's own material does, so
+            that pictures follow what is seen in it. (3,) each
+        first: kind of each material's first. ratios: of each material's kinds, none for one.
     """
 
     terms: list[Terms]
+    mirrors: list[list[F64]]
     first: list[int]
     ratios: list[tuple[float, ...]]
 
@@ -55,10 +60,12 @@ def kinds_of(scene: Scene, look: Look) -> Kinds:
         for m, terms in zip(scene.materials, of_materials, strict=True)
     ]
     num = min(_EACH, max(2, _ALL // max(1, sum(map(bool, ends)))))
-    kinds = Kinds([], [], [])
-    for terms, levels in zip(of_materials, ends, strict=True):
+    kinds = Kinds([], [], [], [])
+    for material, terms, levels in zip(scene.materials, of_materials, ends, strict=True):
         ratios = tuple(np.square(np.linspace(levels[0] ** 0.5, levels[-1] ** 0.5, num)).tolist()) if levels else ()
         kinds.first.append(len(kinds.terms))
         kinds.ratios.append(ratios)
         kinds.terms.extend([at_ratio(term, ratio) for term in terms] for ratio in ratios or (1.0,))
+        mirrors = [mirrored_share(term) * is_mirror(material.terms) for term in terms]
+        kinds.mirrors.extend(mirrors for _ in ratios or (1.0,))
     return kinds

@@ -79,6 +79,7 @@ class Comparison:
     Attributes:
         rmse: of the difference, noise included. noise: of the estimate.
         error: of the frame, noise taken off; None where that cannot be told from the noise.
+        standard_error: of `error`, one standard deviation of what other passes would make of it; None where that is.
         limit: what the error is very likely below.
         significant: share of pixels that differ by more than noise explains; at most `CHANCE` of these by chance.
     """
@@ -86,6 +87,7 @@ class Comparison:
     rmse: float
     noise: float
     error: float | None
+    standard_error: float | None
     limit: float
     significant: float
 
@@ -105,10 +107,12 @@ def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
     noise = max(0.0, (float(np.trace(gram)) / num - square) / (num - 1))
     error, deviation = _error_squared(gram)
     is_told = bool(differs.any()) and error > 2 * deviation
+    root = float(np.sqrt(error)) if is_told else None
     figures = Comparison(
         rmse=float(np.sqrt(square)),
         noise=float(np.sqrt(noise)),
-        error=float(np.sqrt(error)) if is_told else None,
+        error=root,
+        standard_error=None if root is None else deviation / (2 * root),
         limit=float(np.sqrt(max(0.0, error) + 2 * deviation)),
         significant=float(differs.mean()),
     )

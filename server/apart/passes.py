@@ -1,8 +1,9 @@
 """Passes of comparisons: the frame, then brute force pass by pass; sums and pictures are files.
 
 A comparison keeps in its folder the frame and the sums of its passes, so that whoever comes later goes on with the next
-pass, under other code with the first; after each pass from the second on, the figures and the two pictures there are of
-all passes so far.
+pass, under other code with the first. Passes are added up twice, by all light paths and by those that the bake's method
+follows, where both are asked for. After each pass from the second on there are the figures and pictures of all passes
+so far: `error` and `reference` of the paths that were asked for, `method-error` and `method-reference` of the method's.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -21,7 +22,7 @@ from relume.code_version import truth_code
 from relume.imageio.files import write_image
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.transfer import Axis, Opened
-from relume.reference.truth import Estimate, compare, error_map
+from relume.reference.truth import Comparison, Estimate, compare, error_map
 from relume.replacing import replacing
 from server.apart.step_timer import sampled
 from server.apart.workshop import Workshop
@@ -29,8 +30,13 @@ from server.library.ports import F32
 from server.wire.bodies import TruthRequest
 from worker.paths import scene_path
 
+if TYPE_CHECKING:
+    from relume.reference import Truth
+
 SPP = 64
+FIGURES = "figures.json"
 _SAMPLE = 4  # times as wide as its sample is a picture whose pace is not known
+_Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
 
 
 def make_frame(
@@ -44,14 +50,13 @@ def make_frame(
         `passes`: how many there are of it.
     """
     asked, where = TruthRequest.model_validate(request), Path(folder)
-    frame, estimate = _load(where)
-    if frame is None or estimate is None:
+    kept = _load(where)
+    if kept is None:
         transfer = shop.transfer(asked.bake)
-        look = _look(asked, transfer)
-        frame = shop.library.render(transfer, asked.view, look, cancelled=cancelled)
-        estimate = Estimate.nothing(*frame.shape[:2])
-        _save(where, frame, estimate, look.display)
-    return {"passes": estimate.passes}
+        frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled)
+        kept = frame, {paths: Estimate.nothing(*frame.shape[:2]) for paths in dict.fromkeys((asked.paths, "method"))}
+        _keep(where, *kept)
+    return {"passes": kept[1]["method"].passes}
 
 
 def make_pass(
@@ -65,16 +70,18 @@ def make_pass(
         `passes`: how many there are now.
     """
     asked, where = TruthRequest.model_validate(request), Path(folder)
-    frame, estimate = _load(where)
-    if frame is None or estimate is None:  # somebody tidied up
+    kept = _load(where)
+    if kept is None:  # somebody tidied up
         raise FileNotFoundError(where)
+    frame, before = kept
     transfer = shop.transfer(asked.bake)
-    look = _look(asked, transfer)
-    size = frame.shape[1], frame.shape[0]
-    picture = _pass(shop, transfer, asked.view, look, size, estimate.passes, tell, cancelled)
-    estimate = estimate.add(picture)
-    _save(where, frame, estimate, look.display)
-    return {"passes": estimate.passes}
+    look, size = _look(asked, transfer), (frame.shape[1], frame.shape[0])
+    truth = _pass(shop, transfer, asked, look, size, before["method"].passes, tell, cancelled)
+    pictures = {"all": truth.whole, "method": truth.followed}
+    after = {paths: estimate.add(pictures[paths]) for paths, estimate in before.items()}  # type: ignore[arg-type]
+    _keep(where, frame, after)
+    _judge(where, frame, after, asked.paths, truth, look.display)
+    return {"passes": after["method"].passes}
 
 
 def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -90,7 +97,7 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
     look, view = _look(asked, transfer), transfer.views[asked.view]
     size = max(1, view.width // _SAMPLE), max(1, view.height // _SAMPLE)
     scale = view.width * view.height / (size[0] * size[1])
-    return {"seconds": sampled(lambda told: _pass(shop, transfer, asked.view, look, size, 0, told, cancelled), scale)}
+    return {"seconds": sampled(lambda told: _pass(shop, transfer, asked, look, size, 0, told, cancelled), scale)}
 
 
 def _look(request: TruthRequest, transfer: Opened) -> Any:
@@ -98,35 +105,50 @@ def _look(request: TruthRequest, transfer: Opened) -> Any:
 
 
 def _pass(
-    shop: Workshop, transfer: Opened, view: str, look: Any, size: tuple[int, int], index: int, tell: Any, cancelled: Any
-) -> F32:
+    shop: Workshop, transfer: Opened, asked: TruthRequest, look: Any, size: tuple[int, int], index: int, tell: Any,
+    cancelled: Any,
+) -> Truth:  # fmt: skip
     return shop.library.reference(
-        scene_path(shop.data, transfer.scene_id), transfer.views[view].camera, look, size, SPP, tell, cancelled,
-        index, reflects=Axis.BOUNCES in transfer.axes,
+        scene_path(shop.data, transfer.scene_id), transfer.views[asked.view].camera, look, size, SPP, tell, cancelled,
+        index, reflects=Axis.BOUNCES in transfer.axes, is_whole=asked.paths == "all",
     )  # fmt: skip
 
 
-def _load(folder: Path) -> tuple[F32 | None, Estimate | None]:
+def _load(folder: Path) -> tuple[F32, _Estimates] | None:
     """The frame and the passes of an earlier start."""
     path = folder / "passes.npz"
     if not path.exists():
-        return None, None
+        return None
     with np.load(path, allow_pickle=False) as kept:
         if "code" not in kept or str(kept["code"]) != truth_code():  # passes of other code: they are made again
-            return None, None
-        return kept["frame"], Estimate(kept["sums"], int(kept["passes"]))
+            return None
+        sums = {name.removeprefix("sums_"): kept[name] for name in kept if name.startswith("sums_")}
+        return kept["frame"], {paths: Estimate(of, int(kept["passes"])) for paths, of in sums.items()}
 
 
-def _save(folder: Path, frame: F32, estimate: Estimate, display: Any) -> None:
-    """Keep the passes first: whatever is lost after that is made again from them."""
-    counted = {"passes": np.array(estimate.passes), "code": np.array(truth_code())}
+def _keep(folder: Path, frame: F32, estimates: _Estimates) -> None:
+    """Before anything is said of them: whatever is lost after that is made again from them."""
+    counted = {"passes": np.array(estimates["method"].passes), "code": np.array(truth_code())}
+    sums = {f"sums_{paths}": estimate.sums for paths, estimate in estimates.items()}
     with replacing(folder / "passes.npz") as unfinished:
-        np.savez(unfinished, allow_pickle=False, frame=frame, sums=estimate.sums, **counted)
-    if estimate.passes < 2:
-        return
+        np.savez(unfinished, allow_pickle=False, frame=frame, **sums, **counted)
+
+
+def _judge(folder: Path, frame: F32, estimates: _Estimates, asked: str, truth: Truth, display: Any) -> None:
+    """Say what the passes so far say of the frame."""
+    figures: dict[str, Any] = {"left_out": truth.left_out, "untraced": truth.untraced}
+    if estimates["method"].passes >= 2:
+        found = {paths: _shown(folder, frame, of, paths != asked, display) for paths, of in estimates.items()}
+        figures |= {"found": asdict(found[asked]), "found_of_method": asdict(found["method"])}
+    with replacing(folder / FIGURES) as unfinished:
+        unfinished.write_text(json.dumps(figures))
+
+
+def _shown(folder: Path, frame: F32, estimate: Estimate, is_beside: bool, display: Any) -> Comparison:
+    """Write the pictures of a comparison. is_beside: it is not what was asked for."""
+    prefix = "method-" if is_beside else ""
     found, differs = compare(frame, estimate)
-    write_image(folder / "reference.png", estimate.mean, display.exposure, display.tone_map)
-    with replacing(folder / "error.png") as unfinished:
+    write_image(folder / f"{prefix}reference.png", estimate.mean, display.exposure, display.tone_map)
+    with replacing(folder / f"{prefix}error.png") as unfinished:
         Image.fromarray(error_map(frame, estimate, differs)).save(unfinished)
-    with replacing(folder / "found.json") as unfinished:
-        unfinished.write_text(json.dumps(asdict(found)))
+    return found

@@ -29,16 +29,14 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.moving.shader.geometry import arrays_of, constants
     from relume.picture.picture import Picture
     from relume.picture.transfer import Eyes
-    from relume.reference import reference_image
+    from relume.reference import reference_truth
     from relume.render.finder import Finder
     from relume.render.image import render_image, render_small
     from relume.scene.archive import load_scene
     from relume.scene.placed_camera import with_cameras
 
-    def reference(scene: Path, camera: Camera, *args: Any, reflects: bool) -> Any:
-        return reference_image(
-            with_cameras(load_scene(fetched(scene)), [camera]), camera.name, *args, reflects=reflects
-        )
+    def reference(scene: Path, camera: Camera, *args: Any, **paths: Any) -> Any:
+        return reference_truth(with_cameras(load_scene(fetched(scene)), [camera]), camera.name, *args, **paths)
 
     def finder(scene: Path) -> Finder:
         return memory.passing.keep((str(scene), "finder"), lambda: Finder.of(load_scene(fetched(scene))))

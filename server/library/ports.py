@@ -17,6 +17,7 @@ from relume.picture.transfer import Opened
 if TYPE_CHECKING:
     from relume.moving.shader.tables import Numbers, Part
     from relume.picture.jobs import Job
+    from relume.reference import Truth
     from relume.scene.model import Camera
 
 Tile = tuple[int, int, int, int]
@@ -100,7 +101,8 @@ class Library:
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
         reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,
-            reflects=whether surfaces light each other) -> the same by brute force; heavy.
+            reflects=whether surfaces light each other, is_whole=whether all light paths are asked for) -> pictures by
+            brute force, `relume.reference.Truth`; heavy.
         finder: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
         shader_arrays: transfer of a moving view -> what its shaders are written from, and the arrays that they keep.
         held_bytes: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
@@ -113,7 +115,7 @@ class Library:
     make_picture: Callable[[Any, str], Picture]
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
-    reference: Callable[..., F32]
+    reference: Callable[..., Truth]
     finder: Callable[[Path], Finder]
     shader_arrays: Callable[[Any], tuple[Mapping[str, Any], Mapping[str, Callable[[], NDArray[Any]]]]]
     held_bytes: Callable[[], Mapping[Holder, int]]

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.reference.truth import Comparison
+from server.apart.passes import FIGURES
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
 from server.errors import BusyError
 from server.queues.work_queue import Quota, Work, WorkQueue
 from server.records.tables import ComparisonRow
-from server.wire.bodies import TruthRequest
+from server.wire.bodies import TruthFigures, TruthRequest
+from server.wire.body import Body
 
 Comparing = Work[TruthRequest]
+
+
+class Figures(Body):
+    """What a comparison has found; fields as of `TruthBody`."""
+
+    left_out: Annotated[list[str], Field(default_factory=list)]
+    untraced: Annotated[list[str], Field(default_factory=list)]
+    found: TruthFigures | None = None
+    found_of_method: TruthFigures | None = None
 
 
 class ComparisonQueue(WorkQueue[TruthRequest]):
@@ -32,7 +42,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
             run: does the steps. quota: how much may wait.
         """
         super().__init__(sessions, data / "truths", run, quota)
-        self._pass_s: dict[tuple[str, str], float] = {}
+        self._pass_s: dict[tuple[str, str, str], float] = {}  # of a bake's view, by the paths that are traced
         self._sampling = threading.Lock()
 
     def steps(self, request: TruthRequest) -> int:
@@ -41,7 +51,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
 
     def step_s(self, request: TruthRequest) -> float | None:
         """As passes of this view took before."""
-        return self._pass_s.get((request.bake, request.view))
+        return self._pass_s.get(_kind(request))
 
     def is_first(self, request: TruthRequest) -> bool:
         """All of them take their time."""
@@ -54,7 +64,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
             BusyError: another view is being tried out, and who asks would wait behind it.
             CancelledError: the server closes.
         """
-        key = request.bake, request.view
+        key = _kind(request)
         if key not in self._pass_s:
             if not self._sampling.acquire(blocking=False):
                 raise BusyError("another comparison is being estimated; ask again in a moment")
@@ -66,13 +76,16 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         return request.passes * self._pass_s[key]
 
     def picture_path(self, identity: str, name: str) -> Path:
-        """File of a picture, "error" or "reference", there or not."""
+        """File of a picture, there or not: "error" or "reference" of the paths that were asked for, "method-error" or
+        "method-reference" of those that the method follows."""
+        if self.get(identity).request.paths == "method":
+            name = name.removeprefix("method-")
         return self.folder / identity / f"{name}.png"
 
-    def found(self, identity: str) -> Comparison | None:
-        """What the passes so far say of the frame; None before the second."""
-        path = self.folder / identity / "found.json"
-        return Comparison(**json.loads(path.read_text())) if path.exists() else None
+    def figures(self, identity: str) -> Figures:
+        """What the passes so far say of the frame."""
+        path = self.folder / identity / FIGURES
+        return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
 
     def step(self, work: Comparing, timer: StepTimer) -> int:
         """Make the frame where it is missing, and a pass."""
@@ -85,5 +98,10 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         self.note(work.id, done)
         timer.begin()
         done = int(self.run_apart(work, "pass of a comparison", values, timer.tell)["passes"])
-        self._pass_s[request.bake, request.view] = timer.next_step()
+        self._pass_s[_kind(request)] = timer.next_step()
         return done
+
+
+def _kind(request: TruthRequest) -> tuple[str, str, str]:
+    """Passes of one kind take as long as each other."""
+    return request.bake, request.view, request.paths

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Literal
 
 from fastapi import APIRouter, Response
@@ -16,10 +15,11 @@ from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
 from server.routes.renders import baked_view, check_look
 from server.services import Services, Shared
-from server.wire.bodies import TruthBody, TruthFigures, TruthPlanBody, TruthRequest
+from server.wire.bodies import TruthBody, TruthPlanBody, TruthRequest
 from server.wire.body import Id
 
 router = APIRouter(prefix="/api/truths", tags=["truths"])
+Picture = Literal["error", "reference", "method-error", "method-reference"]
 
 
 @router.post("", status_code=202, responses={200: {"model": TruthPlanBody, "description": "A dry run's answer"}})
@@ -65,8 +65,9 @@ def resume_comparison(truth: Id, services: Shared) -> TruthBody:
 
 
 @router.get("/{truth}/{name}.png", response_class=FileResponse)
-def get_picture(truth: Id, name: Literal["error", "reference"], services: Shared) -> FileResponse:
-    """Where the frame differs, or the brute force so far; from the second pass on."""
+def get_picture(truth: Id, name: Picture, services: Shared) -> FileResponse:
+    """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
+    method follows; from the second pass on."""
     comparing = services.comparisons.get(truth)
     path = services.comparisons.picture_path(truth, name)
     if not path.exists():
@@ -75,11 +76,8 @@ def get_picture(truth: Id, name: Literal["error", "reference"], services: Shared
 
 
 def _body(comparing: Comparing, services: Services) -> TruthBody:
-    found, request = services.comparisons.found(comparing.id), comparing.request
+    request = comparing.request
+    figures = dict(services.comparisons.figures(comparing.id))
     return TruthBody.of(
-        comparing,
-        bake=request.bake,
-        view=request.view,
-        passes=comparing.done,
-        found=None if found is None else TruthFigures(**asdict(found)),
+        comparing, bake=request.bake, view=request.view, paths=request.paths, passes=comparing.done, **figures
     )

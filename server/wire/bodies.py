@@ -293,11 +293,16 @@ class ShareBody(ShareRequest):
 
 
 class TruthRequest(Body):
-    """Compare a look with brute force, in so many passes; figures come from the second on."""
+    """Compare a look with brute force, in so many passes; figures come from the second on.
+
+    `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone,
+    which is sooner done.
+    """
 
     bake: Id
     view: Name
     look: Annotated[dict[str, Any], Field(default_factory=dict)]
+    paths: Literal["all", "method"] = "all"
     passes: Annotated[int, Field(ge=2, le=1024)] = 16
     dry_run: bool = False
 
@@ -312,20 +317,26 @@ class TruthPlanBody(Body):
 class TruthFigures(Body):
     """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
 
-    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off: null where that
-    cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the
-    noise does not explain, at most a hundredth of them by chance.
+    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its
+    `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`:
+    share of pixels whose difference the noise does not explain, at most a hundredth of them by chance.
     """
 
     rmse: float
     noise: float
     error: float | None
+    standard_error: float | None
     limit: float
     significant: float
 
 
 class TruthBody(Body):
-    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet."""
+    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet.
+
+    `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method
+    follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves
+    out, too. In sentences; both are empty before the first pass.
+    """
 
     id: str
     bake: str
@@ -335,5 +346,9 @@ class TruthBody(Body):
     total: int
     progress: float
     seconds_left: float | None
+    paths: Literal["all", "method"]
+    left_out: list[str]
+    untraced: list[str]
     found: TruthFigures | None
+    found_of_method: TruthFigures | None
     problem: str | None

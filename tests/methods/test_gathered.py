@@ -22,7 +22,7 @@ from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
 from relume.light.triangles import subdivide
-from relume.look import validate
+from relume.look import Paths, validate
 from relume.memory import Memory
 from relume.methods.cells.between import sent_between
 from relume.methods.cells.cell_light import CellLight
@@ -263,7 +263,8 @@ def against_paths(scene, transfer, index, every, spp):
     points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
     points = points.rows(chosen)
     traced = merge(scene), texels_of(scene.environment), look, points, np.full(len(chosen), index)
-    return radiance[chosen], *reference_indirect(scene, *traced, 4, 48, spp, seed=index), position[chosen]
+    found = reference_indirect(scene, *traced, [Paths(False, 1, 4)], 48, spp, seed=index)
+    return radiance[chosen], found.mean[0], found.variance[0], position[chosen]
 
 
 def test_gathered_light_is_that_of_path_tracing(corner, gathered):

@@ -18,7 +18,7 @@ from relume.memory import Memory
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.picture.transfer import Transfer
-from relume.reference import Points, reference_image, reference_radiance, texels_of
+from relume.reference import Points, Truth, reference_image, reference_radiance, reference_truth, texels_of
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.model import Light, Material, Scene
@@ -122,6 +122,50 @@ def test_light_paths_of_a_grey_corner_add_up() -> None:
     parts = shown["direct"] + shown["first_bounce"] + shown["further_bounces"]
     np.testing.assert_allclose(parts, shown["all"], rtol=1e-5)
     assert 0.02 < shown["further_bounces"].mean() / shown["first_bounce"].mean() < 0.4
+
+
+def test_what_a_method_leaves_out_is_what_the_two_truths_differ_by() -> None:
+    scene, size = corner_of(0.5), (16, 16)
+
+    def truth_of(reflects: bool, **transport: object) -> Truth:
+        look = validate({"transport": transport}, default_look(scene.materials))
+        return reference_truth(scene, "front", look, size, 64, reflects=reflects)
+
+    shown = {show: image_of(scene, size, 64, reflects=True, transport={"show": show}) for show in ("all", "direct")}
+    direct = truth_of(False)
+    np.testing.assert_allclose(direct.whole, shown["all"], rtol=1e-5)  # nothing is left of 24 bounces
+    np.testing.assert_allclose(direct.followed, shown["direct"], rtol=1e-6)
+    assert "reflect onto each other" in direct.left_out[0]
+    few = truth_of(True, bounces=1)
+    np.testing.assert_allclose(few.whole, shown["all"], rtol=1e-5)
+    assert shown["direct"].mean() < few.followed.mean() < few.whole.mean()
+    assert few.left_out == ("Light that more than 1 surfaces have reflected.",)
+    asked = truth_of(False, show="direct")  # of what is shown nothing is left out
+    np.testing.assert_array_equal(asked.whole, asked.followed)
+    assert asked.left_out == asked.untraced == ()
+
+
+def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Path) -> None:
+    """A wall of chrome before a coloured floor: frames of `direct` show the floor in it, and so does the truth."""
+    chrome = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.03, "f0": 0.9}}
+    materials = (
+        Material("Floor", ({"model": "lambert", "color": [0.8, 0.4, 0.1]},)),
+        Material("Chrome", (chrome,)),
+    )
+    parts = [
+        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
+        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
+    ]
+    camera = looking("front", [0, 0.6, 1.2], [0, 0.35, -1], 0.3)
+    scene = scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=materials)
+    look, size = validate({}, default_look(scene.materials)), (32, 24)
+    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 500), tmp_path / "store.zarr")
+    frame = render_image(open_transfer(store, Memory(1 << 30)), "front", look)
+    followed = reference_image(scene, "front", look, size, 1024)
+    in_mirror = followed[16:].mean(axis=(0, 1))
+    assert in_mirror[0] == pytest.approx(8 * in_mirror[2], rel=0.01)
+    np.testing.assert_allclose(frame[16:].mean(axis=(0, 1)), in_mirror, rtol=0.03)
+    assert relative_rmse(frame[:14], followed[:14]) < 0.02
 
 
 def test_drawn_texels_estimate_all_of_them() -> None:

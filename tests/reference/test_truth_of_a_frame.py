@@ -91,7 +91,7 @@ def test_black_truth_is_compared_without_dividing_by_it() -> None:
     black = np.zeros(SHAPE, np.float32)
     nothing = added([black] * 4)
     found, differs = compare(black, nothing)
-    assert found == Comparison(0.0, 0.0, None, 0.0, 0.0)
+    assert found == Comparison(0.0, 0.0, None, None, 0.0, 0.0)
     assert np.all(error_map(black, nothing, differs) == error_map(black, nothing, differs)[0, 0])
 
 
@@ -142,7 +142,7 @@ def metals(roughness: float):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("roughness", [0.05, 0.2, 0.5])
+@pytest.mark.parametrize("roughness", [0.06, 0.2, 0.5])  # below, balls are mirrors and show the floor, too
 def test_right_frame_under_a_small_sun_is_not_blamed_and_wrong_ones_are(roughness: float) -> None:
     """A frame of the same brute force, drawn apart and four times as much, against passes of few texels."""
     scene, size = metals(roughness), (40, 30)

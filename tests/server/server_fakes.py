@@ -15,6 +15,7 @@ from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetErr
 from relume.look import default_look
 from relume.memory import Holder
 from relume.picture.transfer import Axis, Eyes
+from relume.reference import Truth
 from relume.render.finder import Finder
 from relume.scene.archive import load_scene, make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
@@ -314,8 +315,9 @@ class Control:
         pass_index: int,
         *,
         reflects: bool,
-    ) -> np.ndarray:
-        """Noise of a fiftieth around a truth that the frame misses by a tenth."""
+        is_whole: bool,
+    ) -> Truth:
+        """Noise of a fiftieth around a truth that the frame misses by a tenth, and by a third by all paths."""
         if not scene.is_dir():
             raise FileNotFoundError(scene)
         self.passes_asked.append(pass_index)
@@ -325,7 +327,9 @@ class Control:
                 raise CancelledError("stopped")
         progress(1.0)
         noise = np.random.default_rng(pass_index).standard_normal((size[1], size[0], 3))
-        return (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
+        followed = (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
+        whole = followed * np.float32(1.1 * 0.75)
+        return Truth(whole if is_whole else None, followed, ("What surfaces reflect.",), ())
 
 
 class BatchesHere:

@@ -32,8 +32,8 @@ def is_done(body: dict[str, Any]) -> bool:
     return body["state"] in ("ready", "failed")
 
 
-def submit(client: TestClient, baked: Baked, passes: int) -> str:
-    queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes})
+def submit(client: TestClient, baked: Baked, passes: int, **more: str) -> str:
+    queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes, **more})
     assert queued.status_code == 202, queued.text
     return str(queued.headers["location"])
 
@@ -43,16 +43,39 @@ def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Co
     url = submit(client, baked, 6)
     body = wait_until(client, url, is_done)
     assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
-    # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth
-    assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
-    assert body["found"]["error"] < body["found"]["limit"] < 0.11
-    assert body["found"]["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
-    assert body["found"]["significant"] > 0.99
-    error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/error.png").content)), int)
-    assert error.shape == (SIZE[1], SIZE[0], 3)
-    assert np.mean(error[..., 0] > error[..., 2] + 20) > 0.99  # too bright
-    assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE
+    # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth; by all paths it is three quarters
+    assert (body["paths"], body["left_out"], body["untraced"]) == ("all", ["What surfaces reflect."], [])
+    assert body["found"]["error"] == pytest.approx(1 / 3, rel=0.02)
+    found = body["found_of_method"]
+    assert found["error"] == pytest.approx(0.1, rel=0.02)
+    assert 0 < found["standard_error"] < 0.001
+    assert found["error"] < found["limit"] < 0.11
+    assert found["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
+    assert found["significant"] > 0.99
+    for prefix in ("", "method-"):
+        error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/{prefix}error.png").content)), int)
+        assert error.shape == (SIZE[1], SIZE[0], 3)
+        assert np.mean(error[..., 0] > error[..., 2] + 20) > 0.99  # too bright
+    whole, followed = (_brightness(client, f"{url}/{name}.png") for name in ("reference", "method-reference"))
+    assert whole < followed - 4  # of 255
     assert client.get(f"{url}/other.png").status_code == 422
+
+
+def _brightness(client: TestClient, url: str) -> float:
+    image = Image.open(io.BytesIO(client.get(url).content))
+    assert image.size == SIZE
+    return float(np.asarray(image).mean())
+
+
+def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    url = submit(client, baked, 4, paths="method")
+    body = wait_until(client, url, is_done)
+    assert body["paths"] == "method"
+    assert body["found"] == body["found_of_method"]
+    assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
+    assert body["left_out"] == ["What surfaces reflect."]
+    assert _brightness(client, f"{url}/reference.png") == _brightness(client, f"{url}/method-reference.png")
 
 
 @pytest.mark.parametrize(("is_upgraded", "asked"), [(False, [3, 4]), (True, [0, 1, 2, 3, 4])])
@@ -140,6 +163,7 @@ def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control:
         ({"passes": 10**9}, 422),
         ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
         ({"spp": 5}, 422),
+        ({"paths": "some"}, 422),
     ],
 )
 def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[str, Any], status: int) -> None:

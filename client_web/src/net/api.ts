@@ -178,6 +178,8 @@ export async function makeShare(body: ShareRequest): Promise<ShareEntry> {
 }
 export const getShare = (id: string) => getJson<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
 
+export type TruthPicture = "error" | "reference" | "method-error" | "method-reference";
+
 const truthPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
 
 export async function startTruth(body: TruthRequest): Promise<TruthBody> {
@@ -199,5 +201,5 @@ export async function forgetTruth(id: string): Promise<void> {
   await request(`${truthPath(id)}?forget=true`, { method: "DELETE" });
 }
 /** The address of a comparison's picture as it is after so many passes. */
-export const truthPicture = (id: string, name: "error" | "reference", passes: number) =>
+export const truthPicture = (id: string, name: TruthPicture, passes: number) =>
   `${truthPath(id)}/${name}.png?passes=${passes}`;

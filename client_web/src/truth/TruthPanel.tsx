@@ -1,21 +1,35 @@
 /** The error map beside the picture, and what it means. */
 import { useState } from "preact/hooks";
 import { truthPicture } from "../net/api";
+import type { TruthBody } from "../protocol";
 import { IconButton } from "../ui/Button";
+import { type Choice, RadioRow } from "../ui/RadioRow";
 import { askTruth, goOnWithTruth, haltTruth, isGoingOn, judged, toggleTruth, truth, truthPlan } from "./truth";
-import { findings, planWords, progressWords } from "./words";
+import { findings, omissions, type Paths, planWords, progressWords, verdicts } from "./words";
 
-const PICTURES = [
-  ["error", "Error"],
-  ["reference", "Brute force"],
-] as const;
+type Picture = "error" | "reference";
+
+const PICTURES: readonly Choice<Picture>[] = [
+  { value: "error", label: "Error", title: "Where the picture is too dark or too bright" },
+  { value: "reference", label: "Brute force", title: "The picture made the slow way" },
+];
+const PATHS: readonly Choice<Paths>[] = [
+  { value: "all", label: "All light paths", title: "Against all light that the scene has" },
+  { value: "method", label: "The method's", title: "Against the light that the method follows" },
+];
 
 function Scale() {
   return (
     <p class="truth-scale">
-      <i class="too-dark" aria-hidden="true" /> a quarter stop too dark
-      <i class="as-it-is" aria-hidden="true" /> within the noise
-      <i class="too-bright" aria-hidden="true" /> too bright
+      <span>
+        <i class="too-dark" aria-hidden="true" /> a quarter stop too dark
+      </span>
+      <span>
+        <i class="as-it-is" aria-hidden="true" /> within the noise
+      </span>
+      <span>
+        <i class="too-bright" aria-hidden="true" /> too bright
+      </span>
     </p>
   );
 }
@@ -33,8 +47,35 @@ function Steps({ isOld }: { isOld: boolean }) {
   );
 }
 
+/** The pictures of a comparison, and what it has found. */
+function Found({ body }: { body: TruthBody }) {
+  const [picture, setPicture] = useState<Picture>("error");
+  const [chosen, setPaths] = useState<Paths>("all");
+  const paths = body.left_out.length === 0 ? "all" : chosen;
+  const found = paths === "all" ? body.found : body.found_of_method;
+  if (found === null) return null;
+  const file = paths === "all" ? picture : (`method-${picture}` as const);
+  return (
+    <>
+      <ul class="truth-verdicts" aria-live="polite" aria-label="How far it is from brute force">
+        {verdicts(body).map((sentence) => (
+          <li key={sentence}>{sentence}</li>
+        ))}
+      </ul>
+      {body.left_out.length > 0 && <RadioRow label="Light paths" choices={PATHS} chosen={chosen} onChoose={(value) => setPaths(value)} />}
+      <img src={truthPicture(body.id, file, body.passes)} alt={picture === "error" ? "Error map" : "Brute force"} />
+      <RadioRow label="Picture shown" choices={PICTURES} chosen={picture} onChoose={(value) => setPicture(value)} />
+      {picture === "error" && <Scale />}
+      <ul class="truth-notes" aria-live="polite" aria-label="What the map shows">
+        {[...findings(found), ...omissions(body)].map((sentence) => (
+          <li key={sentence}>{sentence}</li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
 export function TruthPanel() {
-  const [shown, setShown] = useState<"error" | "reference">("error");
   const body = truth.value?.body;
   const isOld = truth.value !== null && truth.value.look !== judged();
   return (
@@ -53,24 +94,7 @@ export function TruthPanel() {
         <>
           <p>{progressWords(body)}</p>
           {isGoingOn(body) && <progress max={1} value={body.progress} aria-label="Brute force" />}
-          {body.found !== null && (
-            <>
-              <img src={truthPicture(body.id, shown, body.passes)} alt={shown === "error" ? "Error map" : "Brute force"} />
-              <div class="group" role="group" aria-label="Picture shown">
-                {PICTURES.map(([name, label]) => (
-                  <button key={name} aria-pressed={shown === name} onClick={() => setShown(name)}>
-                    {label}
-                  </button>
-                ))}
-              </div>
-              {shown === "error" && <Scale />}
-              <ul aria-live="polite">
-                {findings(body.found).map((sentence) => (
-                  <li key={sentence}>{sentence}</li>
-                ))}
-              </ul>
-            </>
-          )}
+          {body.found !== null && <Found body={body} />}
         </>
       )}
       {isOld && <p class="truth-old">The look has changed since.</p>}

@@ -2,9 +2,12 @@
 import type { TruthBody } from "../protocol";
 import { formatSeconds } from "../ui/scale";
 
-function percent(share: number): string {
-  const value = 100 * share;
-  return `${value.toFixed(value < 1 ? 2 : 1)} %`;
+/** A share in per cent, with no more digits than its standard error lets it have. */
+export function percent(share: number, error?: number): string {
+  const size = 100 * (error ?? share);
+  const digits = size > 0 ? Math.min(4, Math.max(0, (error === undefined ? 1 : 0) - Math.floor(Math.log10(size)))) : 2;
+  const more = error === undefined ? "" : ` ± ${(100 * error).toFixed(digits)}`;
+  return `${(100 * share).toFixed(digits)}${more} %`;
 }
 
 /** How long it takes, before it begins. */
@@ -33,16 +36,44 @@ export function progressWords(truth: Progress): string {
   }
 }
 
-/** What one test has found: whether pixels differ, by how much the frame errs, and what the noise would hide. */
-export function findings(found: NonNullable<TruthBody["found"]>): string[] {
-  const noise = `The noise of brute force is ${percent(found.noise)}; more passes lower it.`;
-  if (found.significant === 0) {
-    return ["No difference was found.", `The frame's error is less than the noise: below ${percent(found.limit)} (relative RMSE).`, noise];
+type Figures = NonNullable<TruthBody["found"]>;
+export type Paths = TruthBody["paths"];
+
+const AGAINST = { all: "all light paths", method: "the method's light paths" };
+
+function error(found: Figures): string {
+  if (found.error === null || found.standard_error === null) {
+    return `the error is less than the noise, below ${percent(found.limit)}`;
   }
-  const differ = `${percent(found.significant)} of the pixels differ by more than noise explains: they are coloured.`;
-  const error =
-    found.error === null
-      ? `Over the whole picture that is less than the noise: below ${percent(found.limit)} (relative RMSE).`
-      : `The frame errs by ${percent(found.error)} (relative RMSE).`;
-  return [differ, error, noise];
+  return `the frame errs by ${percent(found.error, found.standard_error)}`;
+}
+
+/** How far the frame is from brute force, by both kinds of paths. */
+export function verdicts(body: Pick<TruthBody, "found" | "found_of_method" | "left_out">): string[] {
+  const { found, found_of_method } = body;
+  if (found === null || found_of_method === null) return [];
+  if (body.left_out.length === 0) return [`Against all light paths, which the method follows: ${error(found)} (relative RMSE).`];
+  return [
+    `Against ${AGAINST.all}: ${error(found)} (relative RMSE).`,
+    `Against ${AGAINST.method}: ${error(found_of_method)} (relative RMSE).`,
+  ];
+}
+
+/** What no figure, or only the first, knows of. */
+export function omissions(body: Pick<TruthBody, "left_out" | "untraced">): string[] {
+  return [
+    ...body.left_out.map((what) => `The method leaves out: ${lower(what)}`),
+    ...body.untraced.map((what) => `Brute force leaves out, too: ${lower(what)}`),
+  ];
+}
+
+function lower(sentence: string): string {
+  return sentence.charAt(0).toLowerCase() + sentence.slice(1);
+}
+
+/** What the map shows: whether pixels differ, and what the noise would hide. */
+export function findings(found: Figures): string[] {
+  const noise = `The noise of brute force is ${percent(found.noise)}; more passes lower it.`;
+  if (found.significant === 0) return ["In the map no difference is found.", noise];
+  return [`In the map ${percent(found.significant)} of the pixels differ by more than noise explains: they are coloured.`, noise];
 }
