@@ -18,7 +18,6 @@ from cli import (
     environment_import,
     environment_list,
     import_scene,
-    reference,
     render,
     serve,
     tokens,
@@ -28,6 +27,7 @@ from cli.keeping import backup, restore
 from cli.ledger import draft, upgrade
 from cli.material import exporting, importing, making
 from cli.sentence import sentence
+from cli.truth import reference
 
 app = typer.Typer(
     name="relume",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tiny_scenes import still_life
 
 from cli.main import main
-from cli.truth import percent
+from cli.truth.passes import percent
 from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene

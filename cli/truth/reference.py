@@ -36,7 +36,7 @@ def reference(
     from rich.progress import Progress
 
     from cli.picture import check_output, save
-    from cli.truth import find_baked, find_subject, sentences, traced
+    from cli.truth.passes import find_baked, find_subject, sentences, traced
     from relume.errors import ParameterError
 
     check_output(output)
