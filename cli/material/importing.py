@@ -9,15 +9,15 @@ import typer
 
 from cli.options import Data
 
-_BTF = ".zip"
+_BTFS = (".zip", ".btf")
 
 
 def material_import(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE.binary|FILE.zip",
-            help="Isotropic BRDF in the MERL layout, or images named by light and view (UBO2003).",
+            metavar="FILE.binary|FILE.zip|FILE.btf",
+            help="Isotropic BRDF in the MERL layout, images by light and view (UBO2003), or a container (UBO2014).",
         ),
     ],
     name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
@@ -32,7 +32,7 @@ def material_import(
     from worker.paths import materials_path
 
     folder, called = open_settings(data).data, check_name(name or file.stem)
-    if file.suffix.lower() == _BTF:
+    if file.suffix.lower() in _BTFS:
         _import_btf(folder, file, called, error)
         return
     record = keep(materials_path(folder), file, called)
@@ -47,12 +47,12 @@ def material_import(
 def _import_btf(folder: Path, file: Path, name: str, bound: float) -> None:
     from cli.interrupts import until_interrupted
     from cli.material.words import tell
-    from relume.btf.importing import import_zip
+    from relume.btf.importing import import_btf
     from worker.paths import btfs_path
 
     tell(
         until_interrupted(
             file.name,
-            lambda progress, cancelled: import_zip(btfs_path(folder), file, name, bound, progress, cancelled),
+            lambda progress, cancelled: import_btf(btfs_path(folder), file, name, bound, progress, cancelled),
         )
     )

@@ -1,5 +1,5 @@
-import { describe, expect, it } from "vitest";
-import { isFound } from "../src/library/library";
+import { afterEach, describe, expect, it, vi } from "vitest";
+import { importMaterial, isFound } from "../src/library/library";
 import { placeOf, pointOf, rangeOf } from "../src/library/map";
 
 const POINTS = [
@@ -36,5 +36,31 @@ describe("the search in the library", () => {
   it("finds by any part of the words, in any order, with a blank for a hyphen", () => {
     for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(isFound(brass, typed)).toBe(true);
     for (const typed of ["brass", "bronze 2006"]) expect(isFound(brass, typed)).toBe(false);
+  });
+});
+
+describe("files for the library", () => {
+  afterEach(() => vi.unstubAllGlobals());
+
+  it.each([
+    ["felt.zip", "/api/materials/btf-works"],
+    ["carpet01_W400xH400.BTF", "/api/materials/btf-works"],
+    ["gold.binary", "/api/materials/measured"],
+  ])("%s goes where it is read", async (name, path) => {
+    const asked: string[] = [];
+    class Request {
+      upload = {};
+      onerror?: () => void;
+      open(_method: string, to: string) {
+        asked.push(to);
+      }
+      send() {
+        this.onerror?.();
+      }
+    }
+    vi.stubGlobal("window", globalThis);
+    vi.stubGlobal("XMLHttpRequest", Request);
+    await importMaterial(new File(["!"], name));
+    expect(asked).toEqual([path]);
   });
 });

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from relume.btf.begun import Begun
 from relume.btf.compress import compress
+from relume.btf.container import FIRST_BYTE
+from relume.btf.factored import FactoredBtf
 from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.zips import ZippedBtf
 
 
-def import_zip(
+def import_btf(
     folder: Path,
     file: Path,
     name: str,
@@ -21,19 +23,25 @@ def import_zip(
     cancelled: Callable[[], bool],
     making: Path | None = None,
 ) -> BtfRecord:
-    """Import a zip of images; the same again is the same BTF.
+    """Import a zip of images or a .btf container; the same again is the same BTF.
 
     Args:
-        folder: of the asset store. file: the zip. name: what people call it. bound: relative RMS that may be missed.
-        progress: called with the share done. cancelled: asked now and then.
+        folder: of the asset store. file: what is in it says which of them it is. name: what people call it.
+        bound: relative RMS that may be missed. progress: called with the share done. cancelled: asked now and then.
         making: folder of what was found so far; by default in `folder`, by the file's content.
     Raises:
         MaterialError: it is no such file, or the store is full. CancelledError: `cancelled` said so; what was found
             stays.
     """
-    images = ZippedBtf(file)
+    images = _images(file)
     making = making or folder / "making" / STORE.identity_of(file)
     begun = Begun(making, {"bound": bound})
     record = keep(folder, file, name, None, lambda: compress(images, bound, progress, cancelled, begun))
     shutil.rmtree(making, ignore_errors=True)
     return record
+
+
+def _images(file: Path) -> ZippedBtf | FactoredBtf:
+    with file.open("rb") as begun:
+        is_container = begun.read(1) == FIRST_BYTE
+    return FactoredBtf(file) if is_container else ZippedBtf(file)

@@ -28,15 +28,17 @@ _NO_LESS = 4  # directions of rings but the first: fewer leave no room for a mea
 
 
 class Rings(NamedTuple):
-    """Rings of directions, numbered from the pole outwards, on each from φ = 0 on.
+    """Rings of directions, numbered from the pole outwards, on each by rising φ.
 
     Attributes:
         theta: of each ring, rising from 0, radians. (rings,) float32
         first: number of the first direction of each, then the number of all. (rings + 1,) int32
+        shift: φ of the first direction of each, in steps from one to the next, [0, 1). (rings,) float32
     """
 
     theta: F32
     first: NDArray[np.int32]
+    shift: F32
 
     @property
     def num_directions(self) -> int:
@@ -44,20 +46,26 @@ class Rings(NamedTuple):
         return int(self.first[-1])
 
 
-def rings_of(described: Sequence[tuple[float, int]]) -> Rings:
+def rings_of(described: Sequence[tuple[float, int]], shift: Sequence[float] = ()) -> Rings:
     """Rings from their θ in degrees and how many directions each has.
 
+    Args:
+        described: θ and number of each. shift: as in `Rings`; 0 for all where there is none.
     Raises:
         MaterialError: they do not begin with the pole, do not rise, or are too many.
     """
     theta, count = np.array([row[0] for row in described]), np.array([row[1] for row in described], np.int64)
+    turned = np.array(shift or np.zeros(len(theta)), np.float32)
+    if turned.shape != theta.shape or not ((turned >= 0) & (turned < 1)).all():
+        raise MaterialError("the rings of the BTF's directions are each turned by a share of a step, from 0 to below 1")
     rises = len(theta) >= 2 and theta[0] == 0 and bool((np.diff(theta) > 0).all()) and theta[-1] < 90
     if not rises or count[0] != 1 or (count[1:] < _NO_LESS).any() or count.sum() > MOST_DIRECTIONS:
         raise MaterialError(
             "the directions of the BTF are no rings about the normal: one at the pole, then at least "
             f"{_NO_LESS} on each ring above the horizon, at most {MOST_DIRECTIONS} in all"
         )
-    return Rings(np.radians(theta).astype(np.float32), np.concatenate([[0], np.cumsum(count)]).astype(np.int32))
+    first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    return Rings(np.radians(theta).astype(np.float32), first, turned)
 
 
 @lru_cache(maxsize=1)
@@ -70,7 +78,12 @@ def directions(rings: Rings) -> F64:
     """All of them, unit, local frame, z = normal. (n, 3)"""
     count = np.diff(rings.first)
     theta = np.repeat(rings.theta.astype(np.float64), count)
-    phi = np.concatenate([2 * np.pi * np.arange(n) / n for n in count])
+    phi = np.concatenate([2 * np.pi * (np.arange(n) + start) / n for n, start in zip(count, rings.shift, strict=True)])
+    return polar(theta, phi)
+
+
+def polar(theta: F64, phi: F64) -> F64:
+    """Unit vectors of angles in radians. (n, 3)"""
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
@@ -95,7 +108,9 @@ def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     turn -= math.floor(turn)
     for k in range(2):
         first, count = rings.first[lower + k], rings.first[lower + k + 1] - rings.first[lower + k]
-        place = np.float32(turn * count)
+        place = np.float32(turn * count - rings.shift[lower + k])
+        if place < 0:
+            place += np.float32(count)
         near: Any = min(np.int64(place), count - 1)
         part = np.float32(place - near)
         of_ring = share if k == 1 else np.float32(1) - share
@@ -118,8 +133,9 @@ def taps_numpy(rings: Rings, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
     index, weight = [], []
     for ring, of_ring in ((lower, 1 - share), (lower + 1, share)):
         count = first[ring + 1] - first[ring]
-        near = np.minimum((turn * count).astype(np.int64), count - 1)
-        part = turn * count - near
+        place = (turn * count - rings.shift[ring]) % count
+        near = np.minimum(place.astype(np.int64), count - 1)
+        part = place - near
         index += [first[ring] + near, first[ring] + (near + 1) % count]
         weight += [of_ring * (1 - part), of_ring * part]
     left = np.minimum(np.maximum(w[:, 2], 0) / np.cos(all_theta[-1]), 1)

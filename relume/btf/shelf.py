@@ -83,6 +83,7 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
                 [float(np.degrees(theta)), int(count)]
                 for theta, count in zip(found.rings.theta, np.diff(found.rings.first), strict=True)
             ],
+            "shift": found.rings.shift.tolist(),
             "error": list(found.error),
             "ratio": found.measured_bytes / found.num_bytes,
         }
@@ -121,7 +122,8 @@ def btf(data: str) -> EigenBtf:
 def _load(path: Path) -> EigenBtf:
     document = STORE.read(path)
     try:
-        rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]])
+        shift = [float(one) for one in document.get("shift", [])]  # all rings began at φ = 0 before there was one
+        rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]], shift)
         error = tuple(float(one) for one in document["error"])
         arrays = {name: _array(path, name) for name in _ARRAYS}
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:

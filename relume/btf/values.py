@@ -19,7 +19,8 @@ from relume.replacing import replacing
 F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
-_MOST = 60_000.0  # that half precision holds; what is brighter is a mirror of the lamp
+MOST_VALUE = 60_000.0
+"""That half precision holds; what is brighter is a mirror of the lamp."""
 
 
 class Values:
@@ -64,7 +65,7 @@ class Values:
             if cancelled():
                 raise CancelledError("it was cancelled; the same again goes on from there")
             progress(view / self._shape[0])
-            self._values[view] = np.minimum(images(view), _MOST)
+            self._values[view] = np.minimum(images(view), MOST_VALUE)
             self._values.flush()  # type: ignore[attr-defined]
             with replacing(self._folder / "done") as unfinished:
                 unfinished.write_text(str(view + 1))

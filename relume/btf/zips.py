@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.btf.compress import MOST_TEXELS
-from relume.btf.rings import MOST_DIRECTIONS, Rings, directions, rings_of
+from relume.btf.found import found_rings
+from relume.btf.rings import MOST_DIRECTIONS
 from relume.color import srgb_decode
 from relume.errors import MaterialError
 
@@ -27,7 +28,10 @@ _SUFFIXES = (".jpg", ".jpeg", ".png")
 _MOST_ENTRIES = MOST_DIRECTIONS**2 + 1000
 _MOST_IMAGE_BYTES = 16 << 20
 _FORMATS = ("JPEG", "PNG")
-_WRONG = "the file is not a zip of images that are named by their directions, such as 'tl030 pl060 tv045 pv270.jpg'"
+_WRONG = (
+    "the file is not a zip of images that are named by their directions, such as 'tl030 pl060 tv045 pv270.jpg', "
+    "and no .btf container either"
+)
 
 Direction = tuple[int, int]
 
@@ -52,7 +56,9 @@ class ZippedBtf:
         seen, lit = ({pair[k] for pair in self._by_pair} for k in (0, 1))
         if seen != lit:
             raise MaterialError("light and view directions of the BTF are not the same")
-        self.rings, self._order = _rings(lit)
+        given = sorted(lit)
+        self.rings, order = found_rings(*np.array(given, np.float64).T)
+        self._order = [given[number] for number in order]
         self._check_complete()
         self.size = self._read(self._order[0], self._order[0]).shape[:2]
 
@@ -112,15 +118,3 @@ def _direction(theta: int, phi: int) -> Direction:
     if theta >= 90 or phi > 360:
         raise MaterialError(f"a direction of the BTF lies at θ = {theta}°, φ = {phi}°: at or below the horizon")
     return theta, 0 if theta == 0 else phi % 360
-
-
-def _rings(found: Iterable[Direction]) -> tuple[Rings, Sequence[Direction]]:
-    """Rings of directions, and these in the rings' order. Raises MaterialError where they are not evenly on rings."""
-    order = sorted(found)
-    thetas = sorted({theta for theta, _ in order})
-    rings = rings_of([(float(theta), sum(one == theta for one, _ in order)) for theta in thetas])
-    theta, phi = np.radians(np.array(order, np.float64)).T
-    given = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
-    if np.abs(given - directions(rings)).max() > np.radians(1.5):
-        raise MaterialError("the directions of the BTF are not evenly on rings about the normal, from φ = 0 on")
-    return rings, order

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from relume.btf.importing import import_zip
+from relume.btf.importing import import_btf
 from relume.btf.shelf import BtfRecord
 from relume.errors import CancelledError
 from relume.picture.jobs import Cancelled, Progress
@@ -18,7 +18,7 @@ from server.apart.workshop import Workshop
 from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
 
-IMAGES, FOUND = "images.zip", "found.json"
+IMAGES, FOUND = "images.zip", "found.json"  # a container has the same name: its first byte tells
 _MAKING, _REACHED = "making", "reached.txt"
 _GRID = 3  # places along each side of a texel
 TURN_S = 30.0
@@ -50,7 +50,7 @@ def make(
 
 def _made(asked: BtfRequest, where: Path, shelf: Path, turn: _Turn) -> BtfRecord:
     if asked.geometry is None:
-        return import_zip(shelf, where / IMAGES, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
+        return import_btf(shelf, where / IMAGES, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
     wanted = Made(asked.geometry, asked.size, _GRID, asked.error)
     return make_btf(shelf, wanted, asked.name, turn.tell, turn.is_over, where / _MAKING)
 

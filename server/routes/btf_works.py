@@ -22,7 +22,9 @@ from server.wire.btfs import BOUND, Bound, BtfRequest, BtfWorkBody, SyntheticBtf
 
 PREFIX = "/api/materials/btf-works"
 router = APIRouter(prefix=PREFIX, tags=["materials"])
-ImagesFile = Annotated[UploadFile, File(description="zip of images named by light and view (UBO2003)")]
+ImagesFile = Annotated[
+    UploadFile, File(description="zip of images named by light and view (UBO2003), or .btf container (UBO2014)")
+]
 BtfName = Annotated[str, Form(max_length=200)]
 BoundField = Annotated[Bound, Form()]
 
@@ -36,7 +38,7 @@ async def import_btf(
     name: BtfName = "",
     error: BoundField = BOUND,
 ) -> BtfWorkBody:
-    """Queue the import of a zip of images; what is wrong with it the work says."""
+    """Queue the import of a zip of images or of a .btf container; what is wrong with it the work says."""
     quotas, sent_bytes = services.access.quotas, upload_bytes(images)
     await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
     async with services.import_slots:

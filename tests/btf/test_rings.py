@@ -27,9 +27,12 @@ def dense(index, weight, count):
     return out
 
 
-@pytest.mark.parametrize("described", [UBO_81, ((0.0, 1), (30.0, 4), (80.0, 7))])
-def test_the_kernel_finds_what_plain_numpy_does(described):
-    rings, w = rings_of(described), random_directions(500)
+TURNED = ((0.0, 1), (30.0, 4), (80.0, 7)), (0.0, 0.25, 0.9)  # rings that do not begin at φ = 0
+
+
+@pytest.mark.parametrize(("described", "shift"), [(UBO_81, ()), TURNED])
+def test_the_kernel_finds_what_plain_numpy_does(described, shift):
+    rings, w = rings_of(described, shift), random_directions(500)
     index, weight, left = of_kernel(rings, w)
     expected, of_expected, expected_left = taps_numpy(rings, w)
     found = dense(index, weight, rings.num_directions)
@@ -37,24 +40,24 @@ def test_the_kernel_finds_what_plain_numpy_does(described):
     np.testing.assert_allclose(left, expected_left, atol=1e-5)
 
 
-def test_a_measured_direction_is_itself_alone():
-    rings = ubo_rings()
+@pytest.mark.parametrize("rings", [ubo_rings(), rings_of(*TURNED)])
+def test_a_measured_direction_is_itself_alone(rings):
     found = dense(*taps_numpy(rings, directions(rings))[:2], rings.num_directions)
-    np.testing.assert_allclose(found, np.eye(81), atol=1e-6)
+    np.testing.assert_allclose(found, np.eye(rings.num_directions), atol=1e-6)
 
 
-def test_weights_sum_to_one_and_have_no_seams():
-    rings = ubo_rings()
+@pytest.mark.parametrize("rings", [ubo_rings(), rings_of(*TURNED)])
+def test_weights_sum_to_one_and_have_no_seams(rings):
     theta = np.radians(np.linspace(1, 89, 60))
     for first, second in ((np.pi - 1e-7, -np.pi + 1e-7), (-1e-7, 1e-7)):
         sides = [
             np.stack([np.sin(theta) * np.cos(p), np.sin(theta) * np.sin(p), np.cos(theta)], 1) for p in (first, second)
         ]
-        one, other = (dense(*taps_numpy(rings, side)[:2], 81) for side in sides)
+        one, other = (dense(*taps_numpy(rings, side)[:2], rings.num_directions) for side in sides)
         np.testing.assert_allclose(one, other, atol=1e-5)
         np.testing.assert_allclose(one.sum(axis=1), 1, atol=1e-9)
     pole = np.array([[1e-7, 0, 1.0], [0, -1e-7, 1.0], [-1e-7, 1e-7, 1.0]])
-    np.testing.assert_allclose(dense(*taps_numpy(rings, pole)[:2], 81)[:, 0], 1, atol=1e-5)
+    np.testing.assert_allclose(dense(*taps_numpy(rings, pole)[:2], rings.num_directions)[:, 0], 1, atol=1e-5)
 
 
 def test_below_the_last_ring_the_cosine_goes_on():
@@ -72,6 +75,12 @@ def test_below_the_last_ring_the_cosine_goes_on():
 def test_what_is_no_rings_is_refused(described):
     with pytest.raises(MaterialError, match="rings"):
         rings_of(described)
+
+
+@pytest.mark.parametrize("shift", [(0.0,), (0.0, 1.0), (0.0, -0.1), (0.0, np.nan)])
+def test_turns_that_are_no_shares_of_a_step_are_refused(shift):
+    with pytest.raises(MaterialError, match="turned"):
+        rings_of(((0.0, 1), (30.0, 6)), shift)
 
 
 def test_rings_know_their_number():

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from btf_containers import container
 from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import Control
 
-from relume.btf.importing import import_zip
+from relume.btf.importing import import_btf
 from relume.errors import CancelledError
 from server.settings import Settings
 
@@ -50,6 +51,17 @@ def test_images_become_a_material_of_the_library(client: TestClient, settings: S
     assert client.get(WORKS).json() == []
     assert not (settings.data / "btf-works" / body["id"]).exists()
     assert len(client.get("/api/materials/btf").json()) == 1
+
+
+def test_a_container_becomes_a_material_whatever_it_is_called(client: TestClient, tmp_path: Path) -> None:
+    path, _ = container(tmp_path / "a.btf")
+    body = wait_for(client, send(client, path, error=0.02), "ready", "failed")
+    assert (body["state"], body["problem"]) == ("ready", None)
+    (listed,) = client.get("/api/materials/btf").json()
+    assert (listed["id"], listed["directions"], listed["size"]) == (body["material"], 10, [6, 5])
+    path.write_bytes(path.read_bytes()[:2000])
+    body = wait_for(client, send(client, path), "ready", "failed")
+    assert "cut off" in body["problem"]
 
 
 @pytest.mark.slow
@@ -96,9 +108,9 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
                 time.sleep(0.01)
             has_ended.set()
             raise CancelledError("stopped")
-        return import_zip(folder, file, name, bound, tell, cancelled, making)
+        return import_btf(folder, file, name, bound, tell, cancelled, making)
 
-    monkeypatch.setattr("server.apart.btfs.import_zip", slow)
+    monkeypatch.setattr("server.apart.btfs.import_btf", slow)
     url = send(client, zipped(tmp_path / "a.zip"))
     assert has_begun.wait(WAIT_S)
     assert client.get(url).json()["progress"] == 0.5
@@ -122,7 +134,7 @@ def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
             tell(0.1 * len(done))
             done.append(0.1 * len(done))
             if len(done) == 7:
-                return import_zip(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
+                return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
             if len(done) == 3:
                 images.append(send(client, zipped(tmp_path / "a.zip")))
         raise CancelledError("for now")

@@ -98,8 +98,8 @@ export function LibraryPanel() {
       )}
       {shown.value.length === 0 && query.value === "" && model.value === BTFS && (
         <p class="library-help">
-          No such textures yet. Render one here, or import measured images: a zip whose files are named by the directions of
-          light and view.
+          No such textures yet. Render one here, or import measured ones: a .btf file of UBO2014, or a zip of images that
+          are named by the directions of light and view.
         </p>
       )}
       <ul class="library-balls">

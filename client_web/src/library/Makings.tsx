@@ -4,7 +4,7 @@ import type { BtfWorkBody } from "../protocol";
 import { BTFS, goOn, importMaterial, make, model, sending } from "./library";
 import { forgetMaking, GEOMETRIES, isGoingOn, makings, makingWords, sendingImages, stopMaking } from "./making";
 
-export const MATERIAL_FILES = ".binary,.zip";
+export const MATERIAL_FILES = ".binary,.zip,.btf";
 
 function Making({ work }: { work: BtfWorkBody }) {
   const { id, name, progress, state } = work;

@@ -104,9 +104,11 @@ async function begin(work: () => Promise<void>): Promise<void> {
 export const make = (geometry: Geometry) => begin(() => makeSynthetic(geometry));
 export const goOn = (id: string) => begin(() => goOnMaking(id));
 
-/** A zip of images is a texture from all sides, anything else a MERL file. */
+const BTF_SUFFIXES = [".zip", ".btf"];
+
+/** A zip of images or a container is a texture from all sides, anything else a MERL file. */
 export async function importMaterial(file: File): Promise<void> {
-  if (file.name.toLowerCase().endsWith(".zip")) await begin(() => importImages(file));
+  if (BTF_SUFFIXES.some((suffix) => file.name.toLowerCase().endsWith(suffix))) await begin(() => importImages(file));
   else await importMeasured(file);
 }
 

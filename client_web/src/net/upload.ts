@@ -64,7 +64,7 @@ export function uploadMeasured(file: File, progress: (fraction: number) => void)
   return post("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
 }
 
-/** A zip of images of a texture from all sides; the server compresses them from then on. */
+/** A zip of images of a texture from all sides, or a .btf container; the server compresses them from then on. */
 export function uploadBtf(file: File, progress: (fraction: number) => void): Promise<BtfWorkBody> {
   const form = new FormData();
   form.append("images", file);

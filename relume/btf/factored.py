@@ -1,0 +1,77 @@
+"""A BTF of a .btf container, side after side: products of its matrices, as linear RGB with the light's cosine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.btf.container import read_container
+from relume.btf.found import found_rings
+from relume.btf.rings import directions
+from relume.btf.values import MOST_VALUE
+from relume.errors import MaterialError
+
+F32 = NDArray[np.float32]
+
+_LEAST = np.float32(1e-5)  # that was added before logarithms were taken
+_OFF = 1e-3  # radians that light may come from where no eye is
+_YUV = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]], np.float32)  # to RGB
+_RGB, _OF_YUV, _LOG_Y, _LOG_Y_RATIOS, _LOG_RGB = 0, 1, 9, 11, 12
+_MODELS = (_RGB, _OF_YUV, _LOG_Y, _LOG_Y_RATIOS, _LOG_RGB)
+
+
+class FactoredBtf:
+    """The values of a .btf file; implements `relume.btf.compress.Images`.
+
+    Args:
+        path: of the file.
+    Raises:
+        MaterialError: it is no such file, damaged, too large, or its directions are not those of rings.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = file = read_container(path)
+        if file.model not in _MODELS:
+            raise MaterialError(
+                f"the .btf file has its colours by model {file.model}; {', '.join(map(str, _MODELS))} can be read"
+            )
+        self.size = file.size
+        self.rings, self._views = found_rings(*np.degrees(file.views).T)
+        lit, self._lights = found_rings(*np.degrees(file.lights).T)
+        seen_from, lit_from = directions(self.rings), directions(lit)
+        if lit_from.shape != seen_from.shape or np.abs(lit_from - seen_from).max() > _OFF:
+            raise MaterialError("light and view directions of the BTF are not the same")
+        self._cosine = np.cos(file.lights[self._lights, 0]).astype(np.float32)
+
+    def seen_from(self, view: int) -> F32:
+        """Every texel's values from one direction; what a product has below zero is zero. (lights, texels, 3) float32
+
+        Raises:
+            MaterialError: some are no numbers.
+        """
+        pairs = self._views[view] * len(self._lights) + self._lights
+        out = np.empty((len(pairs), self.size[0] * self.size[1], 3), np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):  # looked for below
+            for channel, factors in enumerate(self._file.channels):
+                out[:, :, channel] = factors.pairs[pairs].astype(np.float32) @ factors.texels.astype(np.float32).T
+            out = _rgb(self._file.model, out)
+        if not np.isfinite(out).all():
+            raise MaterialError("values of the .btf file are no numbers, or too large: it is damaged")
+        if not self._file.has_cosine:
+            out *= self._cosine[:, None, None]
+        return np.clip(out, 0, MOST_VALUE, out=out)
+
+
+def _rgb(model: int, values: F32) -> F32:
+    """What channels mean. values: (..., 3), used up"""
+    if model == _RGB:
+        return values
+    if model == _LOG_RGB:
+        return np.asarray(np.exp(values) - _LEAST)
+    if model in (_LOG_Y, _LOG_Y_RATIOS):
+        values[..., 0] = np.exp(values[..., 0]) - _LEAST
+    if model == _LOG_Y_RATIOS:
+        values[..., 1:] *= values[..., :1] + _LEAST
+    return np.asarray(values @ _YUV.T)

@@ -1,0 +1,145 @@
+"""Containers of the Bonn measurements: read as they are, and refused where they are not what they seem."""
+
+import struct
+
+import numpy as np
+import pytest
+from btf_containers import ANGLES, SIZE, YUV_TO_RGB, container, content, random_factors, values
+
+from cli.main import main
+from relume.btf.factored import FactoredBtf
+from relume.btf.rings import directions
+from relume.errors import MaterialError
+
+LAST = len(ANGLES) - 1  # files have their directions from the last to the first
+
+
+def images(path):
+    found = FactoredBtf(path)
+    return [found.seen_from(view) for view in range(len(ANGLES))]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"kind": "<f4", "version": 1}, {"is_transposed": True, "kind": "<f8", "rotations": 0, "version": 3}],
+)
+def test_values_come_in_the_order_of_the_rings_with_the_cosine(tmp_path, changes):
+    path, file = container(tmp_path / "a.btf", **changes)
+    found = FactoredBtf(path)
+    assert found.size == SIZE
+    theta, phi = np.radians(ANGLES).T
+    expected = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
+    np.testing.assert_allclose(directions(found.rings), expected, atol=1e-6)
+    for view in (0, 3, 9):
+        seen = found.seen_from(view)
+        for light in (0, 2, 7):
+            truth = values(file, LAST - view, LAST - light) * np.cos(theta[light])
+            np.testing.assert_allclose(seen[light], truth, rtol=2e-6)
+
+
+def test_a_cosine_that_is_in_the_values_is_not_put_there_again(tmp_path):
+    path, file = container(tmp_path / "a.btf", cosine=1)
+    np.testing.assert_allclose(FactoredBtf(path).seen_from(4)[9], values(file, LAST - 4, LAST - 9), rtol=2e-6)
+
+
+@pytest.mark.parametrize("model", [0, 1, 9, 11, 12])
+def test_colours_are_told_by_their_model(tmp_path, model):
+    """What is encoded by the model's definition comes back."""
+    rgb = np.array([0.5, 0.25, 0.125])
+    y, u, v = np.linalg.solve(YUV_TO_RGB, rgb)
+    told = {
+        0: rgb, 1: (y, u, v), 9: (np.log(y + 1e-5), u, v), 12: np.log(rgb + 1e-5),
+        11: (np.log(y + 1e-5), u / (y + 1e-5), v / (y + 1e-5)),
+    }[model]  # fmt: skip
+    one = np.ones((SIZE[0] * SIZE[1], 1))
+    channels = [(np.full((len(ANGLES) ** 2, 1), number), one) for number in told]
+    path, _ = container(tmp_path / "a.btf", model=model, kind="<f8", channels=channels)
+    np.testing.assert_allclose(FactoredBtf(path).seen_from(0)[0], np.tile(rgb, (len(one), 1)), rtol=1e-5)
+
+
+def test_what_a_product_has_below_zero_is_zero(tmp_path):
+    (u, v), *others = random_factors()
+    path, _ = container(tmp_path / "a.btf", channels=[(-u, v), *others])
+    seen = FactoredBtf(path).seen_from(0)
+    assert (seen[..., 0] == 0).all()
+    assert (seen[..., 1:] > 0).all()
+
+
+def spoilt(number):
+    """One number of a matrix is none."""
+    (u, v), *others = random_factors()
+    v = v.copy()
+    v[7, 1] = number
+    return {"channels": [(u, v), *others]}
+
+
+def turned(row, theta, phi):
+    other = ANGLES.copy()
+    other[row] = theta, phi
+    return {"views": other, "lights": other}
+
+
+SHORT = random_factors(99)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"signature": b"!BDIF06R2!"}, "!BDIF06R2!.*zip"),
+        ({"signature": b"!FMF12FCER"}, "no decorrelated"),
+        ({"model": 2}, "model 2"),
+        ({"size": (2**31, 2)}, "rows of texels"),
+        ({"size": (100_000, 100_000)}, "can be kept"),
+        ({"size": (0, 5)}, "0 rows of texels"),
+        ({"size": (7, 5)}, "damaged"),
+        ({"channels": SHORT}, "99 × 30 values"),
+        (spoilt(np.nan), "no numbers"),
+        (spoilt(np.inf), "no numbers"),
+        (spoilt(6e4) | {"model": 12}, "no numbers"),
+        (turned(9, 90.0, 0.0), "below the horizon"),
+        (turned(9, np.nan, 0.0), "below the horizon"),
+        (turned(9, 70.5, np.inf), "below the horizon"),
+        (turned(9, 70.5, 200.0), "evenly on rings"),
+        (turned(9, 60.0, 288.0), "rings"),
+        ({"lights": np.concatenate([ANGLES[:5], ANGLES[5:] * [1.05, 1]])}, "not the same"),
+        ({"views": np.tile(ANGLES, (50, 1))}, "view directions"),
+    ],
+)
+def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, changes, said):
+    path, _ = container(tmp_path / "bad.btf", **changes)
+    with pytest.raises(MaterialError, match=said):
+        images(path)
+
+
+def test_every_cut_is_refused(tmp_path):
+    path, file = container(tmp_path / "a.btf")
+    whole = content(file)
+    for length in [1, 9, 12, 100, 250, 262, 300, 310, 400, 1500, *range(1600, len(whole), 997), len(whole) - 1]:
+        path.write_bytes(whole[:length])
+        with pytest.raises(MaterialError):
+            images(path)
+    path.write_bytes(whole + b"\0")
+    with pytest.raises(MaterialError, match="should end"):
+        images(path)
+
+
+def test_sizes_that_are_told_are_bounded_before_anything_is_allocated(tmp_path):
+    """Every aligned number of the first kilobytes, told as the largest there is."""
+    path, file = container(tmp_path / "a.btf")
+    whole = content(file)
+    refused = 0
+    for at in range(len(file.signature), 400, 4):
+        path.write_bytes(whole[:at] + struct.pack("<I", 2**32 - 1) + whole[at + 4 :])
+        try:
+            FactoredBtf(path)
+        except MaterialError:
+            refused += 1
+    assert refused >= 20
+
+
+def test_the_command_line_imports_one(tmp_path, capsys):
+    path, _ = container(tmp_path / "cloth.btf")
+    assert main(["material", "import", str(path), "--error", "0.3", "--data", str(tmp_path / "data")]) == 0
+    first, _, words = capsys.readouterr().out.splitlines()
+    assert first.startswith("btf:")
+    assert "relative RMS" in words

@@ -1,0 +1,74 @@
+"""A .btf container as the Bonn measurements of 2014 have them: small, and written from the layout's description."""
+
+import struct
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+RINGS = [(0.0, 1, 0.0), (40.0, 4, 15.0), (70.5, 5, 0.0)]  # θ, directions, φ of the first, degrees
+ANGLES = np.array([(theta, start + 360 * k / n) for theta, n, start in RINGS for k in range(n)])
+SIZE = (6, 5)
+YUV_TO_RGB = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]])
+
+
+@dataclass(frozen=True)
+class Written:
+    """What is written; tests change parts of it. channels: U and V of each, (pairs, C), (texels, C)"""
+
+    signature: bytes = b"!DFMF08FCR"
+    version: int = 4
+    cosine: int = 0
+    xml: bytes = b"<measured/>"
+    views: np.ndarray = field(default_factory=lambda: ANGLES[::-1])
+    lights: np.ndarray = field(default_factory=lambda: ANGLES[::-1])
+    size: tuple[int, int] = SIZE
+    rotations: int = 1
+    model: int = 0
+    kind: str = "<f2"
+    channels: list = field(default_factory=list)
+    is_transposed: bool = False
+
+
+def random_factors(num=100, ranks=(4, 2, 3)):
+    """Positive ones, as half floats hold them, of 4, 2, 3 components."""
+    rng, texels = np.random.default_rng(0), SIZE[0] * SIZE[1]
+    return [tuple(rng.uniform(0.05, 0.5, (rows, rank)).astype(np.float16) for rows in (num, texels)) for rank in ranks]
+
+
+def described(file):
+    parts = [b"".join(text.ljust(80, b"\0") for text in (b"Dome", b"sensor", b"lamp")), struct.pack("<4f", 1, 1, 1, 1)]
+    if file.version > 1:
+        parts.append(struct.pack("<I", file.cosine))
+    if file.version > 2:
+        parts += [struct.pack("<I", len(file.xml)), file.xml]
+    if file.version > 3:
+        parts += [struct.pack("<I", 3), *(struct.pack("<I", 1) + name for name in (b"R", b"G", b"B"))]
+    body = struct.pack("<I", file.version) + b"".join(parts)
+    return struct.pack("<I", len(body) + 4) + body
+
+
+def content(file):
+    views, lights = (np.radians(some).astype("<f4") for some in (file.views, file.lights))
+    parts = [file.signature, described(file), struct.pack("<I", len(views))]
+    for view in views:
+        parts += [view.tobytes(), struct.pack("<I", len(lights)), lights.tobytes()]
+    parts += [struct.pack("<III", file.size[1], file.size[0], file.rotations), bytes(36 * file.rotations)]
+    parts.append(struct.pack("<Ii12f", max(u.shape[1] for u, _ in file.channels), file.model, *[0.0] * 12))
+    for left, right in file.channels:
+        left, right = (right, left) if file.is_transposed else (left, right)
+        parts.append(struct.pack("<BIII", np.dtype(file.kind).itemsize, left.shape[1], len(left), len(right)))
+        parts += [np.asarray(some, file.kind).tobytes() for some in (np.ones(left.shape[1]), left, right)]
+    return b"".join(parts)
+
+
+def container(path, **changes):
+    """Write one; returns path and what it was written from."""
+    file = replace(Written(channels=random_factors()), **changes)
+    path.write_bytes(content(file))
+    return path, file
+
+
+def values(file, view, light):
+    """Channels of an image, of directions by their numbers in the file. (texels, 3)"""
+    pair = view * len(file.lights) + light
+    return np.stack([v.astype(float) @ u[pair].astype(float) for u, v in file.channels], axis=1)
