@@ -33,22 +33,22 @@ def save_exr(
     view: str,
     look: Any,
     origin: Any,
-    with_layers: bool,
+    layering: Any,
     precision: Literal["half", "float"],
     stills: Any = None,
 ) -> None:
-    """Render a look, with a layer for each light and each kind of light path if asked, and say how far it is."""
+    """Render a look, with the layers that are asked for, see `relume.exr.layers`, and say how far it is."""
     from rich.console import Console
     from rich.progress import Progress
 
     from relume.exr.attributes import attributes_of
-    from relume.exr.layers import layers_of
+    from relume.exr.layers import layers_for
     from relume.exr.picture import export_exr
     from relume.picture.transfer import Axis
     from relume.render.image import render_image
 
     of = transfer.views[view]
-    layers = layers_of(look, reflects=Axis.BOUNCES in transfer.axes) if with_layers else []
+    layers = layers_for(layering, look, reflects=Axis.BOUNCES in transfer.axes)
     attributes = attributes_of(origin, of.camera, (of.width, of.height), look, layers)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("render", total=1.0)

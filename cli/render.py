@@ -18,6 +18,9 @@ def render(
     look: LookFile = None,
     view: View = None,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
+    light_groups: Annotated[
+        bool, typer.Option("--light-groups", help="EXR: layers of direct and of reflected light of each light instead.")
+    ] = False,
     full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
     turntable: Annotated[
         int | None,
@@ -46,8 +49,10 @@ def render(
     else:
         check_frames(output, turntable, resume)
     is_exr = turntable is None and output.suffix.lower() == ".exr"
-    if (layers or full_float) and not is_exr:
-        raise ParameterError("--output", output.name, "a file name that ends in .exr, for --layers and --float")
+    if (layers or light_groups or full_float) and not is_exr:
+        raise ParameterError("--output", output.name, "a file name that ends in .exr, for layers and --float")
+    if layers and light_groups:
+        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
     partial = read_look(look)
     service = open_bakes(open_settings(data))
     try:
@@ -70,7 +75,14 @@ def render(
         elif is_exr:
             origin = Origin(record.id, record.name, bake.id)
             save_exr(
-                output, transfer, view_name, document, origin, layers, "float" if full_float else "half", stills=stills
+                output,
+                transfer,
+                view_name,
+                document,
+                origin,
+                "light_groups" if light_groups else layers,
+                "float" if full_float else "half",
+                stills=stills,
             )
         else:
             image = render_image(transfer, view_name, document, for_display=True, stills=stills)

@@ -114,9 +114,9 @@ export interface TermLook {
   curves: Record<string, DrawnCurve | DrawnCurve[]>;
 }
 
-/** Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any, those with one, or those with more. */
+/** Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any, those with any, those with one, or those with more. */
 export interface TransportLook {
-  show: "all" | "direct" | "first_bounce" | "further_bounces";
+  show: "all" | "direct" | "reflected" | "first_bounce" | "further_bounces";
   bounces: number;
 }
 

@@ -114,7 +114,7 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the picture, and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
@@ -124,7 +124,7 @@ export interface RenderRequest {
   format: "exr" | "png" | "webp" | "mp4";
   size?: [number, number] | null;
   name?: string | null;
-  layers?: boolean;
+  layers?: boolean | "light_groups";
   precision?: "half" | "float";
   path?: Turntable | EyePath | null;
   fps?: number;
@@ -144,7 +144,7 @@ export interface ShareRequest {
 
 /** Light paths that are looked at; as a look's `transport`. */
 export interface SharedPaths {
-  show: "all" | "direct" | "first_bounce" | "further_bounces";
+  show: "all" | "direct" | "reflected" | "first_bounce" | "further_bounces";
   bounces: number;
 }
 

@@ -14,7 +14,7 @@ Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
-Show = Literal["all", "direct", "first_bounce", "further_bounces"]
+Show = Literal["all", "direct", "reflected", "first_bounce", "further_bounces"]
 Backdrop = Literal["map", "blurred", "color", "transparent"]
 
 
@@ -202,7 +202,7 @@ class Paths(NamedTuple):
 
 class TransportLook(_Frozen):
     """Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any,
-    those with one, or those with more."""
+    those with any, those with one, or those with more."""
 
     show: Show
     bounces: int

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from relume.exr.attributes import Origin, attributes_of
-from relume.exr.layers import layers_of
+from relume.exr.layers import layers_for
 from relume.exr.picture import Progress, export_exr
 from relume.imageio.files import write_image
 from relume.imageio.shrink import shrink
@@ -85,7 +85,7 @@ def _export(
     progress: Progress,
 ) -> None:
     view = transfer.views[request.view]
-    layers = layers_of(look, reflects=Axis.BOUNCES in transfer.axes) if request.layers else []
+    layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
     origin = Origin(transfer.scene_id, scene_name, request.bake)
     size = request.size or (view.width, view.height)
     attributes = attributes_of(origin, camera, size, look, layers)

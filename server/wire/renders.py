@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from relume.exr.layers import Layering
 from relume.look.morph import Way
 from server.wire.body import Body, Id, Name
 from server.wire.cameras import CameraFrame
@@ -59,8 +60,9 @@ class RenderRequest(Keyframes):
     """A batch of exact pictures; looks may be partial.
 
     `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
-    default the scene and the view. Of EXR alone: `layers`, one for each light and each kind of light path beside the
-    picture, and `precision` of the values.
+    default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light
+    path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the
+    values.
 
     Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at
     even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format`
@@ -72,7 +74,7 @@ class RenderRequest(Keyframes):
     format: ImageFormat | Literal["mp4"]
     size: tuple[Side, Side] | None = None
     name: Name | None = None
-    layers: bool = False
+    layers: Layering = False
     precision: Literal["half", "float"] = "half"
     path: Turntable | EyePath | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25

@@ -189,6 +189,13 @@ def test_render_writes_layers_and_says_what_cannot_have_them(
     assert set(spec.channelnames) == {"R", "G", "B", *(f"{name}.{c}" for name in layers for c in "RGB")}
     assert str(spec.format) == "half"
     assert json.loads(spec.get_string_attribute("relume:sceneName")) == "quad"
+    assert main(["render", "quad", "--look", str(look), "--light-groups", "--output", str(output)]) == 0
+    found = OpenImageIO.ImageBuf(str(output))
+    assert set(found.spec().channelnames) == {"R", "G", "B", *(f"{n}_direct.{c}" for n in layers for c in "RGB")}
+    red = dict(zip(found.spec().channelnames, np.moveaxis(found.get_pixels(OpenImageIO.FLOAT), 2, 0), strict=True))
+    np.testing.assert_allclose(sum(red[f"{name}_direct.R"] for name in layers), red["R"], rtol=2e-3)
+    assert main(["render", "quad", "--layers", "--light-groups", "--output", str(output)]) == 1
+    assert "--light-groups" in capsys.readouterr().err
     assert main(["render", "quad", "--float", "--output", str(output)]) == 0
     assert str(OpenImageIO.ImageBuf(str(output)).spec().format) == "float"
     assert main(["render", "quad", "--layers", "--output", str(tmp_path / "x.png")]) == 1

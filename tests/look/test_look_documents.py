@@ -125,6 +125,8 @@ def test_light_s_gain_and_geometry_say_all_of_it(default):
         ({"bounces": 1}, (True, 1, 1)),
         ({"bounces": 0}, (True, 1, 0)),
         ({"show": "direct"}, (True, 1, 0)),
+        ({"show": "reflected"}, (False, 1, 24)),
+        ({"show": "reflected", "bounces": 0}, (False, 1, 0)),
         ({"show": "first_bounce"}, (False, 1, 1)),
         ({"show": "first_bounce", "bounces": 0}, (False, 1, 0)),
         ({"show": "further_bounces", "bounces": 3}, (False, 2, 3)),

@@ -8,7 +8,7 @@ import pytest
 from oracle import rendered_afresh
 from sessions import look_of
 
-from relume.exr.layers import layers_of
+from relume.exr.layers import layers_for
 from relume.exr.picture import export_exr
 
 LIGHTS = {
@@ -22,30 +22,48 @@ LIGHTS = {
 
 @pytest.mark.parametrize("background", ["map", "color"])
 def test_layers_of_lights_and_of_paths_each_sum_to_the_picture(gathered, tmp_path, background):
+    layers, channel = exported(gathered, tmp_path, background, True)
+    lights, paths = ([layer.name for layer in layers if layer.name.startswith(group)] for group in ("light_", "path_"))
+    assert (len(lights), len(paths)) == (3 + (background == "color"), 3)
+    assert_sum(channel, lights)
+    assert_sum(channel, paths)
+
+
+def test_light_groups_sum_to_the_picture(gathered, tmp_path):
+    layers, channel = exported(gathered, tmp_path, "color", "light_groups")
+    names = [layer.name for layer in layers]
+    groups = {f"light_{of}_{kind}" for of in ("environment", "Key", "Fill") for kind in ("direct", "reflected")}
+    assert set(names) == {"light_background", *groups}
+    assert_sum(channel, names)
+
+
+def exported(transfer, folder, background, layering):
+    """The layers of a picture under three lights, and the channels of its file by name."""
+
     def change(document):
         document["lights"].update(LIGHTS)
         document["environment"].update(scale=0.7, rotation=30.0)
         document["background"].update(kind=background, color=[0.2, 0.3, 0.1])
 
-    look = look_of(gathered, change)
-    layers = layers_of(look, reflects=True)
+    look = look_of(transfer, change)
+    layers = layers_for(layering, look, reflects=True)
     told: list[float] = []
-    path = tmp_path / "a.exr"
+    path = folder / "a.exr"
     export_exr(
-        path, lambda of, progress: rendered_afresh(gathered, of, progress=progress), look, layers, {},
+        path, lambda of, progress: rendered_afresh(transfer, of, progress=progress), look, layers, {},
         progress=told.append,
     )  # fmt: skip
     assert told == sorted(told)
     assert told[-1] == 1.0
     buffer = OpenImageIO.ImageBuf(str(path))
     pixels, names = buffer.get_pixels(OpenImageIO.FLOAT), buffer.spec().channelnames
-    channel = {name: pixels[..., k] for k, name in enumerate(names)}
-    for group in ("light_", "path_"):
-        of_group = [layer.name for layer in layers if layer.name.startswith(group)]
-        assert len(of_group) == 3 + (group == "light_" and background == "color")
-        for c in "RGB":
-            parts = np.array([channel[f"{name}.{c}"] for name in of_group])
-            assert np.all(parts.reshape(len(parts), -1).max(axis=1) > 0.01)
-            # each value is rounded to eleven bits, the smallest of halves to 2^-25
-            allowed = 2**-11 * (channel[c] + parts.sum(axis=0)) + 2**-23
-            np.testing.assert_array_less(np.abs(parts.sum(axis=0) - channel[c]), allowed + 1e-5)
+    return layers, {name: pixels[..., k] for k, name in enumerate(names)}
+
+
+def assert_sum(channel, names):
+    """Each value is rounded to eleven bits, the smallest of halves to 2^-25; and none of the layers is black."""
+    assert min(max(channel[f"{name}.{c}"].max() for c in "RGB") for name in names) > 0.003
+    for c in "RGB":
+        parts = np.array([channel[f"{name}.{c}"] for name in names])
+        allowed = 2**-11 * (channel[c] + parts.sum(axis=0)) + 2**-23
+        np.testing.assert_array_less(np.abs(parts.sum(axis=0) - channel[c]), allowed + 1e-5)

@@ -35,9 +35,10 @@ def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
     request = {"bake": baked.bake, "view": "front", "looks": [{"lights": lights}], "format": "exr", "size": [32, 16]}
     assert client.post("/api/renders", json=request | {"format": "png", "layers": True}).status_code == 422
     control.render_gate.clear()
-    stopped, url = (
-        client.post("/api/renders", json=request | {"layers": True, "precision": "float"}).headers["location"]
-        for _ in range(2)
+    assert client.post("/api/renders", json=request | {"layers": "all"}).status_code == 422
+    stopped, url, groups = (
+        client.post("/api/renders", json=request | {"layers": of, "precision": "float"}).headers["location"]
+        for of in (True, True, "light_groups")
     )
     while client.get(stopped).json()["progress"] != 0.5 / 4:
         time.sleep(0.02)
@@ -52,4 +53,8 @@ def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
     assert {name.partition(".")[0] for name in spec.channelnames} >= {"light_environment", "light_Key", "light_key_2"}
     assert spec.get_string_attribute("relume:bake") == baked.bake
     assert json.loads(spec.get_string_attribute("relume:look"))["lights"]["key"]["position"] == [0, 1, 0]
-    assert len(list((client.app.state.services.settings.data / "renders").iterdir())) == 1
+    assert wait_until(client, groups, is_done)["state"] == "ready"
+    (tmp_path / "a.exr").write_bytes(client.get(f"{groups}/frames/0").content)
+    names = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).spec().channelnames}
+    assert names == {"R", "G", "B", *(f"light_{of}_direct" for of in ("environment", "Key", "key_2"))}
+    assert len(list((client.app.state.services.settings.data / "renders").iterdir())) == 2

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tiny_scenes import looking, still_life
 
 from relume.exr.attributes import Origin, attributes_of, world_to_ndc
-from relume.exr.layers import layers_of
+from relume.exr.layers import layers_for, layers_of, light_groups_of
 from relume.exr.picture import export_exr
 from relume.imageio.exr import channels_of, write_exr
 from relume.look import Look, default_look, validate
@@ -71,6 +71,30 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
     assert names_of(layers_of(look_with(lights=lights, environment={"scale": 0.0}), reflects=False)) == []
 
 
+def test_light_groups_are_direct_and_reflected_light_of_each_light():
+    look = look_with(lights={"Key": POINT, "Off": POINT | {"on": False}})
+    groups = light_groups_of(look, reflects=True)
+    both = ["light_environment_direct", "light_environment_reflected", "light_Key_direct", "light_Key_reflected"]
+    assert names_of(groups) == both
+    assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
+    assert names_of(light_groups_of(look, reflects=False)) == both[::2]
+    assert names_of(light_groups_of(look_with(), reflects=False)) == both[:1]  # a compositor finds what it asks for
+    shown = look_with(transport={"show": "first_bounce"})
+    (first,) = light_groups_of(shown, reflects=True)
+    assert (first.name, first.look.transport.paths) == (both[1], (False, 1, 1))
+    behind = look_with(background={"kind": "color"})
+    assert names_of(light_groups_of(behind, reflects=True)) == [*both[:2], "light_background"]
+
+
+def test_names_of_light_groups_keep_what_they_end_with():
+    names = ["x" * 79, "x" * 80, "a b", "a_b"]
+    groups = names_of(light_groups_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=True))[2:]
+    assert all(name.endswith(("_direct", "_reflected")) for name in groups)
+    assert len({name.casefold() for name in groups}) == 2 * len(names)
+    assert max(map(len, groups)) == 29
+    assert "light_a_b_2_direct" in groups
+
+
 def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_none():
     look = look_with(lights={"Key": POINT}, background={"kind": "color", "color": [0.2, 0.3, 0.4]})
     *lit, behind = layers_of(look, reflects=False)
@@ -82,7 +106,10 @@ def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_non
     assert layers_of(look_with(background={"kind": "color"}), reflects=False) == []
     catching = look.model_dump()
     catching["materials"]["Floor"]["catcher"] = True
-    assert layers_of(Look.model_validate(catching), reflects=True) == []
+    for layering in (True, "light_groups", False):
+        assert layers_for(layering, Look.model_validate(catching), reflects=True) == []
+    assert names_of(layers_for(True, look, reflects=True)) == names_of(layers_of(look, reflects=True))
+    assert layers_for(False, look, reflects=True) == []
 
 
 def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():

@@ -21,6 +21,11 @@ const PICTURES: Choice[] = [
     help: "One for each light and each kind of light path, beside the picture",
     run: () => exportExr(true),
   },
+  {
+    label: "EXR with light groups",
+    help: "Direct and reflected light of each light; together they are the picture",
+    run: () => exportExr("light_groups"),
+  },
   { label: "EXR, the picture alone", help: "Quicker, and a smaller file", run: () => exportExr(false) },
 ];
 

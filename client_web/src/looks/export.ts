@@ -88,8 +88,8 @@ export async function render(what: string, fetchFrom: string, more: Pick<RenderR
   }).finally(() => (exporting.value = null));
 }
 
-/** With layers: one for each light and each kind of light path, where there are several. */
-export function exportExr(layers: boolean): Promise<void> {
+/** With layers: one for each light and each kind of light path, where there are several; or both of each light. */
+export function exportExr(layers: boolean | "light_groups"): Promise<void> {
   const eye = eyeNow();
   return render("EXR", "frames/0", { format: "exr", layers, path: eye === null ? null : { eyes: [eye] } });
 }

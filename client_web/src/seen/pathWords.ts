@@ -14,8 +14,14 @@ export const PATHS: readonly PathWords[] = [
   { value: "all", label: "All", title: "All light", only: null },
   { value: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
   {
+    value: "reflected",
+    label: "Reflected",
+    title: "Light that surfaces have passed on",
+    only: "reflected light",
+  },
+  {
     value: "first_bounce",
-    label: "First bounce",
+    label: "First",
     title: "Light that one surface has passed on",
     only: "the first bounce",
   },

@@ -35,6 +35,13 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
 
     page.get_by_role("button", name="More ways to export").press("Enter")
     with page.expect_download(timeout=WAIT_MS) as download:
+        page.get_by_role("button", name="EXR with light groups").press("Enter")
+    download.value.save_as(path)
+    layers = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(path)).spec().channelnames}
+    assert layers == {"R", "G", "B", "light_environment_direct", f"{lamp}_direct"}
+
+    page.get_by_role("button", name="More ways to export").press("Enter")
+    with page.expect_download(timeout=WAIT_MS) as download:
         page.get_by_role("button", name="EXR, the picture alone").press("Enter")
     download.value.save_as(path)
     assert OpenImageIO.ImageBuf(str(path)).spec().channelnames == ("R", "G", "B")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     plan = page.locator(".presets .plan").first
     expect(plan).to_contain_text("rays", timeout=WAIT_MS)
     direct = plan.inner_text()
-    page.get_by_role("radio", name="With reflected light").check()
+    page.get_by_role("radio", name=re.compile("^With reflected light")).check()
     expect(plan).not_to_have_text(direct)
     expect(plan).to_contain_text("rays")
     page.get_by_role("checkbox", name="left").uncheck()
@@ -52,9 +53,11 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     expect(steps).to_have_count(2)
     everything = editor.pixels()
     paths = page.get_by_role("radiogroup", name="Light paths")
-    paths.get_by_role("radio", name="First bounce").click()
+    paths.get_by_role("radio", name="First").click()
     assert changed(everything, editor.pixels()) > 0.5
-    paths.get_by_role("radio", name="First bounce").press("ArrowLeft")
+    paths.get_by_role("radio", name="First").press("ArrowLeft")
+    assert changed(everything, editor.pixels()) > 0.5
+    paths.get_by_role("radio", name="Reflected").press("ArrowLeft")
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
     direct_alone = editor.pixels()
     assert direct_alone.mean() < everything.mean()
