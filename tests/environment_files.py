@@ -10,11 +10,14 @@ def dusk():
     return np.ascontiguousarray(np.roll(studio(32), 25, axis=1) * [1.0, 0.4, 0.2], np.float32)
 
 
-def write_map(path, pixels):
-    """An equirectangular image as the file that its name ends in."""
+def write_map(path, pixels, chromaticities=None):
+    """An equirectangular image as the file that its name ends in; `chromaticities`: 8 numbers."""
     height, width, channels = pixels.shape
     output = OpenImageIO.ImageOutput.create(str(path))
-    assert output.open(str(path), OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT))
+    spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
+    if chromaticities is not None:
+        spec.attribute("chromaticities", OpenImageIO.TypeDesc("float[8]"), tuple(chromaticities))
+    assert output.open(str(path), spec)
     assert output.write_image(np.ascontiguousarray(pixels, np.float32))
     output.close()
     return path

@@ -14,6 +14,7 @@ import OpenImageIO as oiio  # noqa: N813  (the name its own documentation gives 
 from numpy.typing import NDArray
 
 from relume.environments.model import Environment
+from relume.environments.primaries import convert, to_rec_709
 from relume.errors import SceneError
 from relume.imageio.shrink import shrink
 from relume.remarks import simplified, wrong
@@ -39,8 +40,9 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
         most_width: it is kept at most so many texels wide, each the mean of those that it stands for.
 
     Returns:
-        The environment with one warning for each thing that was repaired: texels that are not finite become black,
-        negative values 0, and radiance is held below 1e6; and one where it was reduced.
+        The environment, in linear Rec. 709 whatever the primaries that an .exr tells, with one warning for each thing
+        that was repaired: texels that are not finite become black, negative values 0, and radiance is held below 1e6;
+        and one where it was reduced.
 
     Raises:
         SceneError: no such file, neither format, damaged, too large, not 2:1, or without any light.
@@ -139,6 +141,7 @@ def _read_open_image(image: oiio.ImageInput, data: bytes, name: str) -> F32:
     _check_size(spec.width, spec.height, name)
     if spec.depth != 1 or spec.deep or not 1 <= spec.nchannels <= 16:
         raise SceneError(f"environment {name!r} is deep or has {spec.nchannels} channels; save it as plain RGB")
+    matrix = _primaries_of(spec, name)
     names = [channel.rpartition(".")[2].upper() for channel in spec.channelnames]
     order = [names.index(c) for c in "RGB"] if {"R", "G", "B"} <= set(names) else [0, 0, 0]
     first, last = min(order), max(order)
@@ -151,7 +154,21 @@ def _read_open_image(image: oiio.ImageInput, data: bytes, name: str) -> F32:
         _forget_error(image.geterror)
         raise SceneError(f"environment {name!r} ends early or is damaged; export it again")
     found = np.asarray(pixels, np.float32)
-    return found if order == [first, first + 1, first + 2] else found[..., [channel - first for channel in order]]
+    found = found if order == [first, first + 1, first + 2] else found[..., [channel - first for channel in order]]
+    if matrix is not None and last > first:  # grey has no primaries
+        convert(found, matrix)
+    return found
+
+
+def _primaries_of(spec: oiio.ImageSpec, name: str) -> NDArray[np.float64] | None:
+    """What converts the file's colours to ours; None where they are."""
+    told = spec.getattribute("chromaticities")
+    if told is None:
+        return None
+    try:
+        return to_rec_709(told)
+    except (TypeError, ValueError) as problem:
+        raise SceneError(f"environment {name!r} has odd primaries ({problem}); export it as linear Rec. 709") from None
 
 
 def _forget_error(take_error: Callable[[], str]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.environments.primaries import REC_709
 from relume.exr.layers import Layer
 from relume.look import Look
 from relume.scene.model import Camera
@@ -19,7 +20,6 @@ F64 = NDArray[np.float64]
 
 UNITS = "radiance in W/(sr m^2), linear Rec. 709; lengths in m, right-handed, +Y up; angles in degrees"
 _FLIP_Z = np.diag([1.0, 1.0, -1.0, 1.0])
-_REC_709 = np.array([0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290])  # x and y of red, green, blue and white
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def attributes_of(
     seen_from = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
     return {
         "Software": f"relume {version('relume')}",
-        "chromaticities": _REC_709,
+        "chromaticities": np.array(REC_709),
         "worldToCamera": world_to_camera(camera),
         "worldToNDC": world_to_ndc(camera, size),
         "screenWindowWidth": 2 * float(np.tan(camera.yfov / 2)) * size[0] / size[1],

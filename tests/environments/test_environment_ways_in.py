@@ -124,7 +124,7 @@ def test_a_frame_in_another_light_is_judged_in_that_light(client, imported, bake
     request = {"bake": bake, "view": "front", "look": {"environment": {"map": imported["map"]}}, "passes": 2}
     url = client.post("/api/truths", json=request).headers["location"]
     wait(lambda: client.get(url).json()["state"] == "ready")
-    assert client.get(url).json()["found"]["limit"] < 0.25  # in the studio's light it would be above 1
+    assert client.get(url).json()["found_of_method"]["limit"] < 0.25  # in the studio's light it would be above 1
 
 
 def test_what_was_deleted_is_known_no_more(client, bake):

@@ -68,7 +68,7 @@ def test_a_view_of_a_placed_camera_is_compared_with_truth_from_there(real: TestC
     while (truth := real.get(url).json())["state"] not in ("ready", "failed"):
         time.sleep(0.05)
     assert truth["state"] == "ready", truth["problem"]
-    assert truth["found"]["rmse"] < 0.2
+    assert truth["found_of_method"]["rmse"] < 0.2
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,86 @@
+"""Maps in other primaries: published matrices, what is the same colour stays it, and primaries that are none."""
+
+import numpy as np
+import pytest
+from environment_files import dusk, write_map
+
+from relume.environments.primaries import REC_709, to_rec_709
+from relume.environments.reading import read_environment
+from relume.errors import SceneError
+
+D65 = (0.3127, 0.3290)
+REC_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65)
+ACES = (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770, 0.32168, 0.33767)
+
+# ITU-R BT.2087, table 4's inverse; and ACES 2065-1 by Bradford's rule, as OpenColorIO's configurations have it
+OF_2020 = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]]
+OF_ACES = [[2.5217, -1.1341, -0.3876], [-0.2765, 1.3727, -0.0962], [-0.0154, -0.1530, 1.1684]]
+
+
+@pytest.mark.parametrize(("primaries", "published"), [(REC_2020, OF_2020), (ACES, OF_ACES)])
+def test_matrices_are_those_that_are_published(primaries, published):
+    np.testing.assert_allclose(to_rec_709(primaries), published, atol=3e-4)
+
+
+@pytest.mark.parametrize("primaries", [REC_2020, ACES, (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.314, 0.351)])
+def test_white_stays_white(primaries):
+    np.testing.assert_allclose(to_rec_709(primaries).sum(axis=1), 1, atol=1e-9)
+
+
+def test_our_own_primaries_change_nothing():
+    assert to_rec_709(REC_709) is None
+    assert to_rec_709((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.313, 0.329)) is None
+
+
+def test_a_map_in_other_primaries_is_the_same_light(tmp_path):
+    """Written by the inverse of what it is read by, but for texels that are no numbers, which are black as before."""
+    wanted = dusk()
+    other = wanted @ np.linalg.inv(np.array(OF_2020)).T
+    other[3, 4] = np.nan
+    other[5, 6] = [np.inf, 1, -np.inf]
+    found = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
+    wanted[3, 4] = wanted[5, 6] = 0
+    np.testing.assert_allclose(found.radiance, wanted, atol=2e-3 * wanted.max(), rtol=2e-3)
+    assert [warning.effect for warning in found.warnings] == ["wrong"]
+    plain = read_environment(write_map(tmp_path / "b.exr", wanted, REC_709), "dusk")
+    np.testing.assert_array_equal(plain.radiance, wanted)
+
+
+def test_a_grey_map_stays_what_it_is(tmp_path):
+    grey = dusk()[..., :1]
+    found = read_environment(write_map(tmp_path / "a.exr", grey, ACES), "dusk")
+    np.testing.assert_array_equal(found.radiance, np.repeat(grey, 3, axis=2))
+
+
+def test_a_colour_outside_of_ours_is_held_to_it_and_said(tmp_path):
+    green = np.tile(np.array([0, 1, 0], np.float32), (4, 8, 1))
+    found = read_environment(write_map(tmp_path / "a.exr", green, ACES), "green")
+    assert "negative" in found.warnings[0]
+    np.testing.assert_allclose(found.radiance[0, 0], [0, 1.3727, 0], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "primaries",
+    [
+        (0.0,) * 8,
+        (np.nan, *REC_709[1:]),
+        (np.inf, *REC_709[1:]),
+        (1e30, *REC_709[1:]),
+        (0.3, 0.3, 0.4, 0.4, 0.5, 0.5, *D65),  # on a line
+        (0.313, 0.329, 0.3131, 0.3291, 0.3126, 0.3292, *D65),  # in a point
+        (*REC_709[:6], 0.3, 0.0),
+        (*REC_709[:6], 0.7, 0.29),  # not within the triangle
+        (*REC_709[:6], 0.3, -0.3),
+    ],
+)
+def test_primaries_that_tell_no_colours_are_refused_in_words(tmp_path, primaries):
+    with pytest.raises(SceneError, match=r"odd primaries .* Rec\. 709"):
+        read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
+
+
+def test_an_attribute_that_is_no_eight_numbers_is_refused(tmp_path):
+    data = write_map(tmp_path / "a.exr", dusk(), REC_2020).read_bytes()
+    assert b"chromaticities\0chromaticities\0" in data
+    words = data.replace(b"chromaticities\0chromaticities\0\x20\0\0\0", b"chromaticities\0string\0\x20\0\0\0")
+    with pytest.raises(SceneError):
+        read_environment(words, "dusk")
