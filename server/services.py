@@ -26,6 +26,7 @@ from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
 from server.live.sending.bake_news import BakeNews
+from server.live.rooms.rooms import Rooms
 from server.live.session import SessionServices
 from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
@@ -176,6 +177,7 @@ def _live(
         threads=threads,
         metrics=metrics,
         resumes=ResumeStore(settings.resume_seconds),
+        rooms=Rooms(settings.max_rooms, settings.max_people, settings.away_seconds),
         bake_news=BakeNews(service.bakes),
         access=access,
         leave=leave,

@@ -62,6 +62,11 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
     least_free_bytes: int = Field(default=256 * 1024**2, ge=0, description="room on the disk for /readyz")
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")
+    max_rooms: int = Field(default=32, ge=1, description="looks that several people share at once")
+    max_people: int = Field(default=8, ge=1, le=64, description="people who share one")
+    away_seconds: float = Field(
+        default=60.0, gt=0, description="how long the place of somebody whose connection is lost is kept"
+    )
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
     import_bytes: int = Field(default=8 * GIB, gt=0, description="address space a scene import may use")
     waiting_importers: int = Field(default=1, ge=0, le=8, description="processes that wait for files to import")

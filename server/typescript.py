@@ -37,6 +37,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.TouchMessage,
     protocol.EyeMessage,
     protocol.EvaluateMessage,
+    protocol.PresenceMessage,
 )
 SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,
@@ -46,6 +47,8 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.CurveMessage,
     protocol.BakeMessage,
     protocol.LeavingMessage,
+    protocol.RoomMessage,
+    protocol.SharedMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
     protocol.PatchOperation,

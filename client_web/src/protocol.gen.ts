@@ -106,6 +106,13 @@ export interface PatchOperation {
   value?: unknown;
 }
 
+/** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the material in hand. */
+export interface PresenceMessage {
+  type: "presence";
+  name?: string | null;
+  material?: string | null;
+}
+
 /** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`. */
 export interface ProbeMessage {
   type: "probe";
@@ -371,7 +378,7 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. */
 export interface HelloMessage {
   type: "hello";
   session: string;
@@ -389,6 +396,7 @@ export interface HelloMessage {
   materials: string[];
   resume: string;
   role: "view" | "edit" | "admin";
+  room: RoomInfo | null;
 }
 
 /** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
@@ -502,6 +510,16 @@ export interface ParameterBody {
   fixed: boolean;
 }
 
+/** Somebody in a room. `number`: theirs as long as they are in it. `here`: false while their connection is lost. */
+export interface Person {
+  number: number;
+  name: string;
+  color: string;
+  material: string | null;
+  role: "view" | "edit" | "admin";
+  here: boolean;
+}
+
 /** World space, metres; null where nothing is there. */
 export interface PlaceBody {
   position: number[] | null;
@@ -571,6 +589,23 @@ export interface RenderBody {
   problem: string | null;
 }
 
+/** The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that this session brings. */
+export interface RoomInfo {
+  id: string | null;
+  watch: string;
+  seat: string;
+  you: number;
+  created: boolean;
+  people: Person[];
+}
+
+/** server → client: who is in the room now, of these the one at `you`. */
+export interface RoomMessage {
+  type: "room";
+  you: number;
+  people: Person[];
+}
+
 /** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `remarks` are the `warnings` with what each does to the picture, the worst first. */
 export interface SceneBody {
   id: string;
@@ -634,6 +669,21 @@ export interface ShareBody {
 export interface ShareEntry {
   id: string;
   url: string;
+}
+
+/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `by`: numbers of those who edited. */
+export interface SharedMessage {
+  type: "shared";
+  revision: number;
+  patch: SharedOperation[];
+  by: number[];
+}
+
+/** One operation of what a shared look has become. A path may be there already where it says `add`, and gone where it says `remove`. */
+export interface SharedOperation {
+  op: "replace" | "add" | "remove";
+  path: string;
+  value: unknown;
 }
 
 /** server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */
@@ -726,7 +776,8 @@ export type ClientMessage =
   | BrushMessage
   | TouchMessage
   | EyeMessage
-  | EvaluateMessage;
+  | EvaluateMessage
+  | PresenceMessage;
 
 export type ServerMessage =
   | HelloMessage
@@ -735,4 +786,6 @@ export type ServerMessage =
   | ProbeAnswer
   | CurveMessage
   | BakeMessage
-  | LeavingMessage;
+  | LeavingMessage
+  | RoomMessage
+  | SharedMessage;

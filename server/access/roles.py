@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Annotated, Literal
 
@@ -35,7 +35,7 @@ class Caller:
         name: by which quotas, turns and the audit know them; empty where nobody logs in.
         role: what they may do. address: where the request came from.
         by: how they are known: no login is asked for, they have not logged in, a token, a proxy.
-        token: id of the token.
+        token: id of the token. watches: they have come by a link that lets nobody edit.
     """
 
     name: str
@@ -43,6 +43,11 @@ class Caller:
     address: str
     by: Literal["open", "nobody", "token", "proxy"]
     token: str | None = None
+    watches: bool = False
+
+    def watching(self) -> Caller:
+        """The same, who only looks."""
+        return replace(self, role=Role.VIEW, watches=True)
 
     @property
     def shown(self) -> str:

@@ -94,6 +94,7 @@ MESSAGES: Mapping[str, Role] = {
     "ack": VIEW,
     "probe": VIEW,
     "brush": VIEW,
+    "presence": VIEW,
 }
 """What the messages of a live session need."""
 
@@ -118,6 +119,8 @@ def is_change(method: str, path: str) -> bool:
 
 def check_message(caller: Caller, kind: str) -> None:
     """Raises ForbiddenError where a caller may not send messages of that kind."""
+    if caller.role < MESSAGES[kind] and caller.watches:
+        raise ForbiddenError("this link is for watching; ask who sent it for the one to work together")
     if caller.role < MESSAGES[kind]:
         raise ForbiddenError(
             f"{caller.shown} may look at this picture but not edit it; ask an admin for a token with the role edit"

@@ -29,7 +29,7 @@ class Reception:
     def __init__(self, websocket: WebSocket, state: SessionState) -> None:
         self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
         self._window, self._look, self._transfer = state.window, state.look, state.transfer
-        self._metrics, self._caller = state.metrics, state.caller
+        self._metrics, self._caller, self._guest = state.metrics, state.caller, state.guest
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -93,6 +93,13 @@ class Reception:
                 self._see_from(message, received_s)
             case protocol.EvaluateMessage():
                 self._pending.evaluator = message.by
+            case protocol.PresenceMessage():
+                self._present(message)
+
+    def _present(self, message: protocol.PresenceMessage) -> None:
+        if self._guest is None:
+            raise ProtocolError("nobody shares this session; open it with ?room=… to work together", CLOSE_POLICY)
+        self._guest.present(message, self._caller.name)
 
     def _touch(self, message: protocol.TouchMessage) -> None:
         if message.curve is not None:
@@ -108,6 +115,8 @@ class Reception:
         except RelumeError:
             self._metrics.edits.labels("refused").inc()
             raise
+        if self._guest is not None:
+            self._guest.edited(self._pending.target)
         self._metrics.edits.labels("applied").inc()
 
     def _see_from(self, message: protocol.EyeMessage, received_s: float) -> None:

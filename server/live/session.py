@@ -22,13 +22,15 @@ from server.errors import close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
+from server.live.rooms.guest import Guest
+from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.sending.frame_loop import FrameLoop
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
 from server.live.state.pending_requests import PendingRequests
-from server.live.state.resume import ResumeStore
+from server.live.state.resume import Kept, ResumeStore
 from server.live.state.session_state import SessionState
 from server.live.state.shown_views import ShownViews
 from server.live.state.visit import Visit
@@ -52,6 +54,7 @@ class SessionServices:
     threads: Threads
     metrics: Metrics
     resumes: ResumeStore
+    rooms: Rooms
     bake_news: BakeNews
     access: Access
     leave: Leave
@@ -62,35 +65,57 @@ class SessionServices:
 async def serve(services: SessionServices, websocket: WebSocket, bake: str, transfer: Opened, visit: Visit) -> None:
     """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
     kept = services.resumes.take(visit.resume, bake, time.monotonic()) if visit.resume else None
-    default: dict[str, Any] = transfer.default_look
-    begun = visit.look or default
-    look = LookState(default, kept.document, kept.revision, kept.solo) if kept else LookState(default, begun, 0)
-    first = next(iter(transfer.views))
-    shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
-    socket = ClientSocket(websocket, services.ack_seconds)
-    window = FrameWindow(services.ack_seconds)
-    pending = PendingRequests(look.target())
-    state = SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller)
+    begun = kept.document if kept else visit.look or transfer.default_look
+    guest = _enter(services, transfer.scene_id, visit, begun, has_own=kept is not None)
+    state = _state(services, websocket, transfer, visit, kept, begun, guest)
+    look, shown = state.look, state.shown
     token, session = services.resumes.open(bake, look, shown), secrets.token_hex(8)
     SESSION.set(session)
     BAKE.set(bake)
     services.metrics.sessions.inc()
     try:
-        await socket.send(_hello(session, bake, state, token, kept is not None))
+        await state.socket.send(_hello(session, bake, state, token, kept is not None))
         await _run(services, websocket, bake, state)
     except WebSocketDisconnect:
         log.debug("session of bake %s: the client left", bake)
     except (RelumeError, OSError, *AWAY) as error:
         if row_of(error).status >= 500:
             log.error("session of bake %s ends (%s)", bake, told(error))
-        await socket.close(close_code_of(error), problem_of(error).detail)
+        await state.socket.close(close_code_of(error), problem_of(error).detail)
     except Exception as error:
         log.exception("session of bake %s ends by a defect", bake)
-        await socket.close(close_code_of(error), problem_of(error).detail)
+        await state.socket.close(close_code_of(error), problem_of(error).detail)
     finally:
         services.metrics.sessions.dec()
+        if guest is not None:
+            guest.leave()
         services.resumes.close(token, time.monotonic())
         await _write_down(services.access.audit, visit.caller, bake, look.num_edits)
+
+
+def _enter(
+    services: SessionServices, scene: str, visit: Visit, begun: dict[str, Any], *, has_own: bool
+) -> Guest | None:
+    """Into the room that was asked for; None where none was."""
+    if visit.door is None:
+        return None
+    return services.rooms.enter(visit.door, scene, visit.caller, begun, has_own=has_own)
+
+
+def _state(
+    services: SessionServices, websocket: WebSocket, transfer: Opened, visit: Visit, kept: Kept | None,
+    begun: dict[str, Any], guest: Guest | None,
+) -> SessionState:  # fmt: skip
+    """What the halves of the session begin with: what was kept of a lost one, in a room with the look that it has."""
+    default, document = transfer.default_look, begun if guest is None else guest.document
+    look = LookState(default, document, kept.revision, kept.solo) if kept else LookState(default, document, 0)
+    first = next(iter(transfer.views))
+    shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
+    pending = PendingRequests(look.target())
+    if guest is not None:
+        guest.begin(look, pending)
+    socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
+    return SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller, guest)
 
 
 async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -> None:
@@ -119,6 +144,7 @@ def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bo
         materials=list(transfer.material_names),
         resume=token,
         role=state.caller.role.word,
+        room=None if state.guest is None else state.guest.info(),
     )
 
 
@@ -141,6 +167,8 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
         asyncio.create_task(services.access.until_revoked(state.caller)),
         asyncio.create_task(_say_goodbye(services, state.socket)),
     ]
+    if state.guest is not None:
+        tasks.append(asyncio.create_task(state.guest.tell(state.socket)))
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:

@@ -14,6 +14,7 @@ from relume.look import complete
 from relume.picture.transfer import Opened
 from server.access.roles import caller_of
 from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of, row_of
+from server.live.rooms.door import door_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
 from server.live.state.visit import Visit
@@ -54,7 +55,9 @@ async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
                 raise NotFoundError("this bake has no views; bake again")
             asked = websocket.query_params
             look = await run_in_threadpool(_look, services, transfer, asked.get("look"), asked.get("share"))
-            visit = Visit(caller, asked.get("resume"), look)
+            door = door_of(asked)
+            caller = caller.watching() if door is not None and door.room is None else caller
+            visit = Visit(caller, asked.get("resume"), look, door)
             await serve(services.live, websocket, status.id, transfer, visit)
 
 

@@ -19,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from relume.look.patch import MAX_OPERATIONS
 from relume.picture.fidelity import Word
 from relume.scene.checks import MAX_LIGHTS
+from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleWord
+from server.wire.rooms import PresenceMessage, RoomInfo, RoomMessage, SharedMessage
 from worker.status import Phase
 
 SUBPROTOCOL = "relume.v1"
@@ -29,27 +31,10 @@ MAX_EYE_PIXELS = 1920 * 1200
 # of GET /api/bakes/{id}/surface/…, kept for ever: clients name it, lest what an earlier release gave be taken for it
 SURFACE_LAYOUT = 2
 
-Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
-Name = Annotated[str, Field(min_length=1, max_length=256)]
 Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
-Revision = Annotated[int, Field(ge=0, le=2**53)]
 Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
 Pixel = Annotated[int, Field(ge=0, le=65535)]
 Coordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
-
-
-class Message(BaseModel):
-    """The base of all messages: immutable, nothing beyond what is declared."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PatchOperation(Message):
-    """One operation of a JSON Patch (RFC 6902) on the look."""
-
-    op: Literal["replace", "add", "remove", "test"]
-    path: Annotated[str, Field(max_length=512)]
-    value: Any = None
 
 
 class EditMessage(Message):
@@ -186,7 +171,8 @@ ClientMessage = Annotated[
     | BrushMessage
     | TouchMessage
     | EyeMessage
-    | EvaluateMessage,
+    | EvaluateMessage
+    | PresenceMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -226,7 +212,8 @@ class HelloMessage(Message):
     """server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null.
 
     `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
-    light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits.
+    light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`:
+    where others share the look, null for a session of one.
     """
 
     type: Literal["hello"] = "hello"
@@ -244,7 +231,8 @@ class HelloMessage(Message):
     views: list[ViewInfo]
     materials: list[str]
     resume: str
-    role: Literal["view", "edit", "admin"]
+    role: RoleWord
+    room: RoomInfo | None
 
 
 class StatusMessage(Message):
@@ -316,7 +304,15 @@ class LeavingMessage(Message):
 
 
 ServerMessage = (
-    HelloMessage | StatusMessage | ProblemMessage | ProbeAnswer | CurveMessage | BakeMessage | LeavingMessage
+    HelloMessage
+    | StatusMessage
+    | ProblemMessage
+    | ProbeAnswer
+    | CurveMessage
+    | BakeMessage
+    | LeavingMessage
+    | RoomMessage
+    | SharedMessage
 )
 
 

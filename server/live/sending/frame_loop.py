@@ -37,6 +37,7 @@ class FrameLoop:
     def __init__(self, state: SessionState, library: Library, threads: Threads) -> None:
         self._socket, self._pending, self._shown, self._window = state.socket, state.pending, state.shown, state.window
         self._look, self._transfer, self._metrics = state.look, state.transfer, state.metrics
+        self._guest = state.guest
         self._library, self._work = library, OneAtATime(threads)
         self._freezer = Freezer(state.socket, threads, state.metrics, state.pending.news)
         self._answers = Answers(state.socket, self._work)
@@ -256,12 +257,20 @@ class FrameLoop:
         self._metrics.frame_bytes.inc(len(frame))
 
     async def _take_back(self, target: Target, error: RelumeError) -> None:
-        """Go back to the look before; where there is none, or that one itself fails, the session cannot go on."""
+        """Go back to the look before; where there is none, or that one itself fails, the session cannot go on.
+
+        In a room whoever made the edit takes it back for all, with what others edited in the same moment; another,
+        whose bake cannot follow it, keeps the picture that there was and tries again with the next edit.
+        """
         before = self._accepted
         if before is None or before is target:
             raise error
-        await self._socket.refuse(error, target.revision)
+        is_own = self._guest is None or target.revision > before.revision
+        await self._socket.refuse(error, target.revision if is_own else None)
         if self._pending.target is target:  # a newer one stands on this and is refused itself
             self._pending.target = before
-            self._look.revert(before)
+            if is_own:
+                self._look.revert(before)
+            if is_own and self._guest is not None:
+                self._guest.taken_back(before)
         await self._work.quick(painter.accept, self._pictures(), before)

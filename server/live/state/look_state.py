@@ -49,6 +49,11 @@ class LookState:
             self.solo = None if message.solo is None else frozenset(message.solo)
         return Target(look, document, message.revision, received_s, message.hand, self.solo)
 
+    def follow(self, document: dict[str, Any], of: Target) -> Target:
+        """Show a document that somebody else's edit led to, as they see it; the revision stays."""
+        self.document = document
+        return Target(self._read(document), document, self.revision, of.received_s, of.hand, self.solo)
+
     def revert(self, shown: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""
         self.document, self.solo = shown.document, shown.solo

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from relume.picture.transfer import Opened
 from server.access.roles import Caller
+from server.live.rooms.guest import Guest
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
@@ -19,7 +20,7 @@ class SessionState:
     """The receiving half fills them, the sending half follows; all on the event loop.
 
     Attributes:
-        caller: who is at the other end.
+        caller: who is at the other end. guest: the session in its room; None where nobody shares it.
     """
 
     socket: ClientSocket
@@ -30,3 +31,4 @@ class SessionState:
     transfer: Opened
     metrics: Metrics
     caller: Caller
+    guest: Guest | None

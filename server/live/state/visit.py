@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from server.access.roles import Caller
+from server.live.rooms.door import Door
 
 
 @dataclass(frozen=True)
@@ -15,8 +16,10 @@ class Visit:
     Attributes:
         resume: token of a session that was lost. look: complete document that the session begins with; None: the
             scene's own.
+        door: of the room that they come into; None: they are alone.
     """
 
     caller: Caller
     resume: str | None
     look: dict[str, Any] | None
+    door: Door | None

@@ -1,0 +1,63 @@
+"""What has become of a look, path by path: how edits of several people are told to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
+
+import jsonpointer
+
+Operation = dict[str, Any]
+
+
+def difference(before: Mapping[str, Any], after: Mapping[str, Any], but: Collection[str] = ()) -> list[Operation]:
+    """The operations `add`, `remove` and `replace` of a JSON Patch that lead from a look to another.
+
+    Lists of objects of one length are compared object by object; any other list is one value, as is what has been edited
+    of a term's curves: half of a drawn curve never travels alone. Parts that both share are not looked into.
+
+    Args:
+        before: a look document. after: another. but: sections that are left out.
+    """
+    names = [name for name in {**before, **after} if name not in but]
+    return list(_members((), before, after, names))
+
+
+def _members(
+    path: tuple[str, ...], before: Mapping[str, Any], after: Mapping[str, Any], names: Collection[str]
+) -> Iterator[Operation]:
+    for name in names:
+        inner = (*path, name)
+        if name not in after:
+            yield {"op": "remove", "path": _pointer(inner)}
+        elif name not in before:
+            yield {"op": "add", "path": _pointer(inner), "value": after[name]}
+        else:
+            yield from _changes(inner, before[name], after[name])
+
+
+def _changes(path: tuple[str, ...], before: Any, after: Any) -> Iterator[Operation]:
+    if before is after:
+        return
+    is_curve = len(path) > 1 and path[-2] == "curves"
+    if isinstance(before, Mapping) and isinstance(after, Mapping) and not is_curve:
+        yield from _members(path, before, after, list({**before, **after}))
+    elif _are_alike(before, after):
+        for k, (old, new) in enumerate(zip(before, after, strict=True)):
+            yield from _changes((*path, str(k)), old, new)
+    elif before != after:
+        yield {"op": "replace", "path": _pointer(path), "value": after}
+
+
+def _are_alike(before: Any, after: Any) -> bool:
+    """Whether both are lists of as many objects."""
+    return (
+        isinstance(before, Sequence)
+        and isinstance(after, Sequence)
+        and len(before) == len(after)
+        and all(isinstance(each, Mapping) for each in (*before, *after))
+    )
+
+
+def _pointer(path: Sequence[str]) -> str:
+    return str(jsonpointer.JsonPointer.from_parts(path).path)

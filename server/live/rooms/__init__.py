@@ -1,0 +1,1 @@
+"""Several people on one look: rooms, the places in them, and the sessions that share what a room has."""

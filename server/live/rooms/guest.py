@@ -1,0 +1,127 @@
+"""One session in a room: its edits go to all others, theirs come to it.
+
+What a client is told is the difference between what it was told last and what there is now, its own edits in it. It is
+found when it can be sent: however much others edit and however slowly a client reads, nothing piles up.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from relume.errors import ParameterError
+from relume.look.difference import difference
+from server.live.rooms.door import Door, check_person
+from server.live.rooms.room import OWN, Room, seen_by
+from server.live.rooms.seat import Seat
+from server.live.state.client_socket import ClientSocket
+from server.live.state.look_state import LookState
+from server.live.state.pending_requests import PendingRequests
+from server.live.state.target import Target
+from server.wire.rooms import PresenceMessage, RoomInfo, RoomMessage, SharedMessage, SharedOperation
+
+PACE_S = 1 / 60
+
+
+class Guest:
+    """Sits between a session and its room; on the event loop.
+
+    Attributes:
+        document: complete look that the session begins with.
+        news: something is to be told to the client.
+    """
+
+    def __init__(self, room: Room, seat: Seat, door: Door, document: dict[str, Any], *, is_new: bool) -> None:
+        self._room, self._seat, self._door, self._is_new = room, seat, door, is_new
+        self.document = document
+        self.news = asyncio.Event()
+        self._look: LookState | None = None
+        self._pending: PendingRequests | None = None
+        self._told, self._told_revision = room.document, 0
+        self._told_people = room.people()
+        self._authors: set[int] = set()
+        self._has_others = False
+
+    def begin(self, look: LookState, pending: PendingRequests) -> None:
+        """From now on edits come to this look and are to be shown."""
+        self._look, self._pending, self._told_revision = look, pending, look.revision
+        self._room.guests.append(self)
+
+    def info(self) -> RoomInfo:
+        """What hello says of the room."""
+        return RoomInfo(
+            id=self._door.room,
+            watch=self._door.watch,
+            seat=self._seat.token,
+            you=self._seat.number,
+            created=self._is_new,
+            people=self._told_people,
+        )
+
+    def edited(self, target: Target) -> None:
+        """The session's own edit was accepted: everybody else follows, where it is more than another way of looking."""
+        is_seen = bool(difference(self._room.document, target.document, OWN))
+        self._room.document = target.document
+        self._note(self._seat.number, is_own=True)
+        if not is_seen:
+            return
+        for other in self._room.guests:
+            if other is not self:
+                other._follow(target, self._seat.number)
+
+    def taken_back(self, target: Target) -> None:
+        """An edit of this session turned out not to be possible: all, and its own client, go back to this look."""
+        self.edited(target)
+        self._has_others = True
+
+    def _follow(self, target: Target, author: int) -> None:
+        assert self._look is not None and self._pending is not None
+        document = seen_by(target.document, self._look.document)
+        self._pending.target = self._look.follow(document, target)
+        self._pending.news.set()
+        self._note(author, is_own=False)
+
+    def _note(self, author: int, *, is_own: bool) -> None:
+        self._authors.add(author)
+        self._has_others = self._has_others or not is_own
+        self.news.set()
+
+    def present(self, message: PresenceMessage, caller_name: str) -> None:
+        """Take note of a name, where nobody logs in, and of the material in hand. Raises ParameterError."""
+        materials = self._room.document["materials"]
+        if message.material is not None and message.material not in materials:
+            raise ParameterError("material", message.material, "one of " + ", ".join(materials)[:400])
+        if message.name is not None and not caller_name:
+            self._seat.name = check_person(message.name)
+        self._seat.material = message.material
+        self._room.tell_people()
+
+    async def tell(self, socket: ClientSocket) -> None:
+        """Run as long as the session does."""
+        while True:
+            await self.news.wait()
+            self.news.clear()
+            people = self._room.people()
+            if people != self._told_people:
+                self._told_people = people
+                await socket.send(RoomMessage(you=self._seat.number, people=people))
+            if (shared := self._shared()) is not None:
+                await socket.send(shared)
+            await asyncio.sleep(PACE_S)
+
+    def _shared(self) -> SharedMessage | None:
+        """What the look has become; of what the client did by itself only how far that was accepted."""
+        assert self._look is not None
+        document, revision = self._room.document, self._look.revision
+        patch = difference(self._told, document, OWN) if self._has_others else []
+        authors, self._authors, self._has_others = sorted(self._authors), set(), False
+        if not patch and revision == self._told_revision:
+            return None
+        self._told, self._told_revision = document, revision
+        return SharedMessage(revision=revision, patch=[SharedOperation(**each) for each in patch], by=authors)
+
+    def leave(self) -> None:
+        """The session has ended."""
+        if self in self._room.guests:
+            self._room.guests.remove(self)
+        self._room.stand_up(self._seat)

@@ -1,0 +1,49 @@
+"""All rooms of this process. They live as long as somebody has a place in them; what they show is in nobody's database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from server.access.roles import Caller, Role
+from server.errors import BusyError
+from server.live.rooms.door import Door
+from server.live.rooms.guest import Guest
+from server.live.rooms.room import Room, seen_by
+
+Key = tuple[str, str]
+
+
+class Rooms:
+    """Rooms by scene and by what opens them to watch. Used from the event loop only."""
+
+    def __init__(self, max_rooms: int, max_people: int, away_seconds: float) -> None:
+        self._max_rooms, self._max_people, self._away_seconds = max_rooms, max_people, away_seconds
+        self._rooms: dict[Key, Room] = {}
+
+    def enter(self, door: Door, scene: str, caller: Caller, begun: Mapping[str, Any], *, has_own: bool) -> Guest:
+        """A session comes in; whoever may edit and finds nobody makes the room, with the look that they bring.
+
+        Args:
+            scene: id. begun: the complete look that the session would show by itself.
+            has_own: its ways of looking are the person's own, of a session that was lost.
+        Raises:
+            BusyError: there are as many rooms, or people in this one, as may be; or nobody has made it yet.
+        """
+        key = scene, door.watch
+        room = self._rooms.get(key)
+        is_new = room is None
+        if room is None:
+            if caller.role < Role.EDIT:
+                raise BusyError("nobody is in this room now; it opens when somebody comes who may edit in it")
+            if len(self._rooms) >= self._max_rooms:
+                raise BusyError(f"{self._max_rooms} rooms are open; one of them has to be left first")
+            room = Room(dict(begun), self._max_people, self._away_seconds, lambda: self._rooms.pop(key))
+        seat = room.sit(door, caller)
+        self._rooms[key] = room
+        return Guest(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new=is_new)
+
+    def close(self) -> None:
+        """Forget all of them."""
+        for room in self._rooms.values():
+            room.close()

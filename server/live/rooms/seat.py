@@ -1,0 +1,41 @@
+"""The place of somebody in a room. It outlives a lost connection, and two sessions of one editor share it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+
+from server.access.roles import Role
+from server.wire.rooms import Person
+
+COLORS = ("#6cb2ff", "#ffb454", "#8fd67a", "#e58ce0", "#5fd8d0", "#ff8f80", "#d9d36a", "#b3a4ff")
+
+
+@dataclass
+class Seat:
+    """Who somebody is to the others.
+
+    Attributes:
+        number: from 1 on, in the order of coming. num_sessions: that are open now.
+        leaving: takes the place away in a while, where none is.
+    """
+
+    token: str
+    number: int
+    color: str
+    name: str
+    role: Role
+    material: str | None = None
+    num_sessions: int = 0
+    leaving: asyncio.TimerHandle | None = field(default=None, repr=False)
+
+    def person(self) -> Person:
+        """As it is told."""
+        return Person(
+            number=self.number,
+            name=self.name,
+            color=self.color,
+            material=self.material,
+            role=self.role.word,
+            here=self.num_sessions > 0,
+        )

@@ -1,0 +1,72 @@
+"""Messages between people who work on one look: who is here, and what the look has become."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from server.wire.message import Message, Name, Revision, RoleWord
+
+MAX_PERSON_NAME = 40
+PersonName = Annotated[str, Field(min_length=1, max_length=MAX_PERSON_NAME)]
+
+
+class PresenceMessage(Message):
+    """client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and
+    the material in hand."""
+
+    type: Literal["presence"]
+    name: PersonName | None = None
+    material: Name | None = None
+
+
+class Person(Message):
+    """Somebody in a room. `number`: theirs as long as they are in it. `here`: false while their connection is lost."""
+
+    number: int
+    name: str
+    color: str
+    material: str | None
+    role: RoleWord
+    here: bool
+
+
+class RoomInfo(Message):
+    """The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token
+    that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that
+    this session brings."""
+
+    id: str | None
+    watch: str
+    seat: str
+    you: int
+    created: bool
+    people: list[Person]
+
+
+class RoomMessage(Message):
+    """server → client: who is in the room now, of these the one at `you`."""
+
+    type: Literal["room"] = "room"
+    you: int
+    people: list[Person]
+
+
+class SharedOperation(Message):
+    """One operation of what a shared look has become. A path may be there already where it says `add`, and gone where it
+    says `remove`."""
+
+    op: Literal["replace", "add", "remove"]
+    path: str
+    value: Any = None
+
+
+class SharedMessage(Message):
+    """server → client: what the room's look has become since the last such message, or `hello`, with this session's own
+    edits up to `revision` in it. The `patch` is empty where there were no others. `by`: numbers of those who edited."""
+
+    type: Literal["shared"] = "shared"
+    revision: Revision
+    patch: list[SharedOperation]
+    by: list[int]
