@@ -25,8 +25,8 @@ from server.library.disk import free_bytes
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
-from server.live.sending.bake_news import BakeNews
 from server.live.rooms.rooms import Rooms
+from server.live.sending.bake_news import BakeNews
 from server.live.session import SessionServices
 from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
@@ -121,6 +121,7 @@ async def open_services(
     for queue in queues:
         queue.start()
     rounds = asyncio.create_task(caretaker.run())
+    rooms = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds)
     try:
         yield Services(
             settings=settings,
@@ -135,12 +136,13 @@ async def open_services(
             transfers=transfers,
             caretaker=caretaker,
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
-            live=_live(settings, metrics, library, threads, service, access, leave),
+            live=_live(settings, metrics, library, threads, service, access, leave, rooms),
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
         rounds.cancel()
+        rooms.close()
         ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
         for end in ends:
             await asyncio.to_thread(end)
@@ -169,7 +171,7 @@ def _queues(settings: Settings, service: BakeService, batch: Batches) -> _Queues
 
 def _live(
     settings: Settings, metrics: Metrics, library: Library, threads: Threads, service: BakeService, access: Access,
-    leave: Leave,
+    leave: Leave, rooms: Rooms,
 ) -> SessionServices:  # fmt: skip
     """What live sessions need of all this."""
     return SessionServices(
@@ -177,7 +179,7 @@ def _live(
         threads=threads,
         metrics=metrics,
         resumes=ResumeStore(settings.resume_seconds),
-        rooms=Rooms(settings.max_rooms, settings.max_people, settings.away_seconds),
+        rooms=rooms,
         bake_news=BakeNews(service.bakes),
         access=access,
         leave=leave,

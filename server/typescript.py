@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import access, bodies, btfs, cameras, models, protocol, renders, surface
+from server.wire import access, bodies, btfs, cameras, message, models, protocol, renders, rooms, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -37,7 +37,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.TouchMessage,
     protocol.EyeMessage,
     protocol.EvaluateMessage,
-    protocol.PresenceMessage,
+    rooms.PresenceMessage,
 )
 SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,
@@ -47,11 +47,11 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.CurveMessage,
     protocol.BakeMessage,
     protocol.LeavingMessage,
-    protocol.RoomMessage,
-    protocol.SharedMessage,
+    rooms.RoomMessage,
+    rooms.SharedMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
-    protocol.PatchOperation,
+    message.PatchOperation,
     *CLIENT_MESSAGES,
     bodies.BakeRequest,
     renders.Keyframes,
@@ -101,6 +101,7 @@ def generate_protocol() -> str:
     for name in ("SUBPROTOCOL", *limits, "SURFACE_LAYOUT"):
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
+    parts.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
     for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in of_mode], by_alias=True)  # type: ignore[misc]
         parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))

@@ -13,6 +13,8 @@ export const MAX_EYE_PIXELS = 2304000;
 
 export const SURFACE_LAYOUT = 2;
 
+export const MAX_PERSON_NAME = 40;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";

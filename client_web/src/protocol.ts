@@ -28,16 +28,19 @@ export type {
   ModelBody,
   ParameterBody,
   PlaceBody,
+  Person,
   PlanBody,
   ProbeAnswer,
   Problem,
   ProblemMessage,
   RenderBody,
   RenderRequest,
+  RoomMessage,
   SceneView,
   ServerMessage,
   ShareEntry,
   ShareRequest,
+  SharedMessage,
   SyntheticBtfRequest,
   StatusMessage,
   SurfaceBody,
@@ -46,7 +49,7 @@ export type {
   TruthRequest,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
-export { MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
+export { MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

@@ -35,7 +35,7 @@ class FakeSocket {
   }
 
   hello(look: Look, revision: number, resume = "token"): void {
-    this.says({ type: "hello", look, revision, resume, solo: null, role: this.role });
+    this.says({ type: "hello", look, revision, resume, solo: null, role: this.role, room: null });
   }
 
   get edits() {
@@ -52,6 +52,8 @@ const handlers = {
   probe: vi.fn(),
   curve: vi.fn(),
   bake: vi.fn(),
+  room: vi.fn(),
+  shared: vi.fn(),
   sent: vi.fn(),
   readOnly: vi.fn(),
   ended: vi.fn(),
@@ -139,7 +141,7 @@ test("a server that is being stopped is left, and the look goes to the one that 
   greet();
   const left = socket();
   left.says({ type: "leaving", seconds: 10 });
-  expect(handlers.connection).toHaveBeenLastCalledWith("reconnecting", expect.any(Number));
+  expect(handlers.connection).toHaveBeenLastCalledWith("reconnecting", expect.any(Number), undefined);
   const look = edit(LOOK, SIGMA, 0.3);
   left.onclose({ code: 1000, reason: "" });
   vi.advanceTimersByTime(1000);
@@ -152,7 +154,7 @@ test("a server that is being stopped is left, and the look goes to the one that 
 });
 
 test("a session begins with what it is asked to, each time it connects", () => {
-  new Session("b1", handlers, { look: "Red & blue" }).connect();
+  new Session("b1", handlers, () => ({ look: "Red & blue" })).connect();
   expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?look=Red+%26+blue");
 });
 

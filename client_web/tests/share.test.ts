@@ -44,7 +44,7 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
     seenPaths.value = sent ?? null;
     await share();
     seenPaths.value = visitors ?? null;
-    await openShare("a");
+    await openShare("a", { room: null, watch: null });
     expect(seenPaths.value).toEqual(sent);
   }
 });

@@ -162,6 +162,9 @@ test("a place survives the URL", () => {
     term: 2,
     curve: "theta_h",
     light: "Desk lamp",
+    room: "a1",
+    watch: null,
+    share: null,
   };
   expect(placeFromUrl(placeToUrl(place))).toEqual(place);
   const several = { ...place, beside: ["front & left", "a, b", "c=d"] };
@@ -175,6 +178,9 @@ test("a place survives the URL", () => {
     term: 0,
     curve: null,
     light: null,
+    room: null,
+    watch: null,
+    share: null,
   });
   expect(placeFromUrl("?term=zzz").term).toBe(0);
 });

@@ -13,8 +13,8 @@ Operation = dict[str, Any]
 def difference(before: Mapping[str, Any], after: Mapping[str, Any], but: Collection[str] = ()) -> list[Operation]:
     """The operations `add`, `remove` and `replace` of a JSON Patch that lead from a look to another.
 
-    Lists of objects of one length are compared object by object; any other list is one value, as is what has been edited
-    of a term's curves: half of a drawn curve never travels alone. Parts that both share are not looked into.
+    Lists of objects of one length are compared object by object; any other list is one value, as is each edited curve
+    of a term: half of a drawn curve never travels alone. Parts that both share are not looked into.
 
     Args:
         before: a look document. after: another. but: sections that are left out.
@@ -52,8 +52,8 @@ def _changes(path: tuple[str, ...], before: Any, after: Any) -> Iterator[Operati
 def _are_alike(before: Any, after: Any) -> bool:
     """Whether both are lists of as many objects."""
     return (
-        isinstance(before, Sequence)
-        and isinstance(after, Sequence)
+        isinstance(before, list | tuple)
+        and isinstance(after, list | tuple)
         and len(before) == len(after)
         and all(isinstance(each, Mapping) for each in (*before, *after))
     )

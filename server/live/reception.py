@@ -19,6 +19,7 @@ from server.live.state.pointers import check_held, find_curve
 from server.live.state.session_state import SessionState
 from server.live.state.target import Eye
 from server.wire import protocol
+from server.wire.rooms import PresenceMessage
 
 MAX_BAD_MESSAGES = 50
 
@@ -93,10 +94,10 @@ class Reception:
                 self._see_from(message, received_s)
             case protocol.EvaluateMessage():
                 self._pending.evaluator = message.by
-            case protocol.PresenceMessage():
+            case PresenceMessage():
                 self._present(message)
 
-    def _present(self, message: protocol.PresenceMessage) -> None:
+    def _present(self, message: PresenceMessage) -> None:
         if self._guest is None:
             raise ProtocolError("nobody shares this session; open it with ?room=… to work together", CLOSE_POLICY)
         self._guest.present(message, self._caller.name)

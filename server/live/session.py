@@ -22,7 +22,7 @@ from server.errors import close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
-from server.live.rooms.guest import Guest
+from server.live.rooms.guest import Guest, Place
 from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.sending.frame_loop import FrameLoop
@@ -66,8 +66,8 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
     """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
     kept = services.resumes.take(visit.resume, bake, time.monotonic()) if visit.resume else None
     begun = kept.document if kept else visit.look or transfer.default_look
-    guest = _enter(services, transfer.scene_id, visit, begun, has_own=kept is not None)
-    state = _state(services, websocket, transfer, visit, kept, begun, guest)
+    place = _enter(services, transfer.scene_id, visit, begun, has_own=kept is not None)
+    state = _state(services, websocket, transfer, visit, kept, begun if place is None else place.document, place)
     look, shown = state.look, state.shown
     token, session = services.resumes.open(bake, look, shown), secrets.token_hex(8)
     SESSION.set(session)
@@ -87,15 +87,15 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
         await state.socket.close(close_code_of(error), problem_of(error).detail)
     finally:
         services.metrics.sessions.dec()
-        if guest is not None:
-            guest.leave()
+        if state.guest is not None:
+            state.guest.leave()
         services.resumes.close(token, time.monotonic())
         await _write_down(services.access.audit, visit.caller, bake, look.num_edits)
 
 
 def _enter(
     services: SessionServices, scene: str, visit: Visit, begun: dict[str, Any], *, has_own: bool
-) -> Guest | None:
+) -> Place | None:
     """Into the room that was asked for; None where none was."""
     if visit.door is None:
         return None
@@ -104,16 +104,15 @@ def _enter(
 
 def _state(
     services: SessionServices, websocket: WebSocket, transfer: Opened, visit: Visit, kept: Kept | None,
-    begun: dict[str, Any], guest: Guest | None,
+    document: dict[str, Any], place: Place | None,
 ) -> SessionState:  # fmt: skip
-    """What the halves of the session begin with: what was kept of a lost one, in a room with the look that it has."""
-    default, document = transfer.default_look, begun if guest is None else guest.document
+    """What the halves of the session begin with: what was kept of a lost one, and this look."""
+    default = transfer.default_look
     look = LookState(default, document, kept.revision, kept.solo) if kept else LookState(default, document, 0)
     first = next(iter(transfer.views))
     shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
     pending = PendingRequests(look.target())
-    if guest is not None:
-        guest.begin(look, pending)
+    guest = None if place is None else Guest(place, look, pending)
     socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
     return SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller, guest)
 

@@ -13,8 +13,8 @@ PersonName = Annotated[str, Field(min_length=1, max_length=MAX_PERSON_NAME)]
 
 
 class PresenceMessage(Message):
-    """client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and
-    the material in hand."""
+    """client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was),
+    and the material in hand."""
 
     type: Literal["presence"]
     name: PersonName | None = None
@@ -33,9 +33,9 @@ class Person(Message):
 
 
 class RoomInfo(Message):
-    """The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token
-    that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that
-    this session brings."""
+    """The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a
+    token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look
+    that this session brings."""
 
     id: str | None
     watch: str
@@ -54,8 +54,8 @@ class RoomMessage(Message):
 
 
 class SharedOperation(Message):
-    """One operation of what a shared look has become. A path may be there already where it says `add`, and gone where it
-    says `remove`."""
+    """One operation of what a shared look has become. A path may be there already where it says `add`, and gone where
+    it says `remove`."""
 
     op: Literal["replace", "add", "remove"]
     path: str

@@ -15,9 +15,10 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
+from server.live.rooms import door
 from server.records import looks, shares
 from server.settings import Settings
-from server.wire import bodies, protocol, renders
+from server.wire import bodies, protocol, renders, rooms
 from worker import cameras
 
 KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
@@ -50,6 +51,7 @@ ROWS = {
     "operations of a patch; text message of a session": (
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
     ),
+    "name of somebody in a room; name of a room": f"{rooms.MAX_PERSON_NAME}; {door.MAX_ROOM} characters",
     "views shown at once; frames that are not acknowledged": (
         f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
     ),

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from typing import Any
+
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from session_client import IOR, SIGMA, Baked, Session, open_session
+from session_client import SIGMA, Baked, Session, open_session
+
+from server.live.rooms.door import watch_of
+from server.settings import Settings
 
 ROOM = "?room=together"
+EXPOSURE = "/display/exposure"
+EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 
 
-def param(name: str) -> str:
-    return f"/materials/Paper/terms/1/params/{name}"
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    settings.max_sessions, settings.max_people, settings.max_rooms, settings.away_seconds = 8, 3, 2, 0.05
+    return settings
 
 
-def shared_with(session: Session, path: str) -> dict[str, object]:
-    """Wait for the message that tells of a path."""
+def told(session: Session, path: str) -> dict[str, Any]:
+    """Wait for the message that tells what has become of a path."""
     while True:
         message = session.text("shared")
         for operation in message["patch"]:
@@ -23,26 +33,207 @@ def shared_with(session: Session, path: str) -> dict[str, object]:
                 return {**message, "value": operation["value"]}
 
 
-def pixel(session: Session, revision: int, value: int) -> None:
+def people(session: Session, done: Any) -> list[dict[str, Any]]:
+    """Wait until who is here is as it should be."""
+    while not done(found := session.text("room")["people"]):
+        pass
+    return found
+
+
+def picture(session: Session, revision: int, value: int) -> None:
     """Wait for an exact picture of that value."""
-    while np.frombuffer(session.exact(revision).payload, "<u4")[0] != value:
+    while value not in np.frombuffer(session.exact(revision).payload, "<u4")[:1]:
         pass
 
 
-def test_an_edit_of_one_is_in_the_picture_of_the_other(client: TestClient, baked: Baked) -> None:
-    with (
-        open_session(client, baked.bake, query=ROOM) as ann,
-        open_session(client, baked.bake, query=ROOM) as bob,
-        open_session(client, baked.bake) as alone,
-    ):
+def refused(client: TestClient, baked: Baked, query: str) -> tuple[Any, ...]:
+    with open_session(client, baked.bake, query=query) as session, pytest.raises(ConnectionError) as ended:
+        session.receive()
+    return ended.value.args
+
+
+def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client: TestClient, baked: Baked) -> None:
+    with ExitStack() as stack:
+        opened = (stack.enter_context(open_session(client, baked.bake, query=query)) for query in (ROOM, ROOM, ""))
+        ann = next(opened)
         assert ann.text("hello")["room"]["created"]
+        bob, alone = opened
         assert not bob.text("hello")["room"]["created"]
         assert alone.text("hello")["room"] is None
-        bob.exact(0)
         ann.edit(1, SIGMA, 0.31)
-        told = shared_with(bob, SIGMA)
-        assert (told["revision"], told["by"], told["value"]) == (0, [1], 0.31)
-        pixel(bob, 0, 810)
+        picture(bob, 0, 810)
         assert ann.text("shared") == {"type": "shared", "revision": 1, "patch": [], "by": [1]}
-        bob.edit(1, IOR, 1.7)
-        assert shared_with(ann, IOR)["revision"] == 1
+        bob.edit(1, EXTINCTION, 1.7)
+        assert told(ann, EXTINCTION)["revision"] == 1
+        alone.edit(1, EXTINCTION, 1.2)
+        alone.exact(1)
+        ann.edit(2, SIGMA, 0.4)
+        news = told(bob, SIGMA)
+        assert (news["revision"], news["by"], news["value"]) == (1, [1], 0.4)
+        with open_session(client, baked.bake, query=ROOM) as late:
+            params = late.text("hello")["look"]["materials"]["Paper"]["terms"][1]["params"]
+            assert (params["sigma"], params["extinction"]) == (0.4, 1.7)
+
+
+def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        bob.text("hello")
+        for k in range(1, 21):
+            ann.edit(k, SIGMA, 0.2 + k / 100)
+            bob.edit(k, SIGMA, 0.6 + k / 100)
+        has = [_sigma_after(session, own, 20) for session, own in ((ann, 0.2), (bob, 0.6))]
+        with open_session(client, baked.bake, query=ROOM) as late:
+            last = late.text("hello")["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"]
+            late.edit(1, EXTINCTION, 1.9)
+            for k, session in enumerate((ann, bob)):
+                patch: dict[str, float] = {}
+                while EXTINCTION not in patch:
+                    patch = {each["path"]: each["value"] for each in session.text("shared")["patch"]}
+                    has[k] = patch.get(SIGMA, has[k])
+        assert last in (0.4, 0.8)
+        assert has == [last, last]
+
+
+def _sigma_after(session: Session, own: float, revision: int) -> float:
+    """What a client has when all its edits, which count up from `own`, are known to be in the room's look."""
+    while True:
+        message = session.text("shared")
+        sigma = next((each["value"] for each in message["patch"]), own + message["revision"] / 100)
+        if message["revision"] == revision:
+            return round(sigma, 6)
+
+
+def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        bob.text("hello")
+        ann.edit(1, EXPOSURE, 2.0)
+        ann.edit(2, SIGMA, 0.31)
+        assert [each["path"] for each in told(bob, SIGMA)["patch"]] == [SIGMA]
+        with open_session(client, baked.bake, query=ROOM) as late:
+            assert late.text("hello")["look"]["display"]["exposure"] == 2.0
+
+
+def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, query=f"{ROOM}&name=Ann") as ann:
+        (first,) = ann.text("hello")["room"]["people"]
+        assert (first["name"], first["role"], first["here"], first["material"]) == ("Ann", "admin", True, None)
+        with open_session(client, baked.bake, query=ROOM) as bob:
+            room = bob.text("hello")["room"]
+            assert (room["you"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
+            bob.send(type="presence", name="Bob", material="Paper")
+            found = people(ann, lambda them: them[-1]["name"] == "Bob")
+            assert found[1]["material"] == "Paper"
+            assert found[1]["color"] != found[0]["color"]
+            bob.send(type="presence", material="Nothing")
+            assert "one of Paper" in bob.text("problem")["problem"]["detail"]
+            bob.send(type="presence", name="\u202e\n")
+            assert "printable" in bob.text("problem")["problem"]["detail"]
+        people(ann, lambda them: [each["here"] for each in them] == [True, False])
+        people(ann, lambda them: len(them) == 1)
+
+
+def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.send(type="presence", name="Ann")
+        assert "?room=" in session.text("problem")["problem"]["detail"]
+
+
+class TestComingBack:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.away_seconds, settings.max_people = 60.0, 2
+        return settings
+
+    def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
+        with open_session(client, baked.bake, query=ROOM) as ann:
+            seat = ann.text("hello")["room"]["seat"]
+            ann.send(type="presence", name="Ann")
+            ann.edit(1, SIGMA, 0.31)
+            ann.exact(1)
+        with open_session(client, baked.bake, query=f"{ROOM}&seat={seat}") as again:
+            hello = again.text("hello")
+            assert (hello["room"]["you"], hello["room"]["created"], hello["revision"]) == (1, False, 0)
+            assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]
+            assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
+
+    def test_a_lost_session_has_its_own_exposure_and_the_look_that_the_room_has_now(
+        self, client: TestClient, baked: Baked
+    ) -> None:
+        with open_session(client, baked.bake, query=ROOM) as ann, ExitStack() as stack:
+            bob = stack.enter_context(open_session(client, baked.bake, query=ROOM))
+            hello = bob.text("hello")
+            bob.edit(1, EXPOSURE, 1.0)
+            bob.edit(2, SIGMA, 0.5)
+            told(ann, SIGMA)
+            stack.close()
+            ann.edit(1, EXTINCTION, 1.9)
+            ann.exact(1)
+            query = f"{ROOM}&seat={hello['room']['seat']}&resume={hello['resume']}"
+            with open_session(client, baked.bake, query=query) as again:
+                back = again.text("hello")
+                params = back["look"]["materials"]["Paper"]["terms"][1]["params"]
+                assert (back["resumed"], back["revision"], back["look"]["display"]["exposure"]) == (True, 2, 1.0)
+                assert (params["sigma"], params["extinction"]) == (0.5, 1.9)
+
+    def test_more_people_than_may_be_are_refused(self, client: TestClient, baked: Baked) -> None:
+        with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+            ann.text("hello")
+            bob.text("hello")
+            assert refused(client, baked, ROOM) == (1013, "2 people are in this room; one of them has to leave first")
+
+
+def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -> None:
+    watch = watch_of("together")
+    assert refused(client, baked, f"?watch={watch}")[0] == 1013
+    with (
+        open_session(client, baked.bake, query=ROOM) as ann,
+        open_session(client, baked.bake, query=f"?watch={watch}") as vera,
+    ):
+        assert ann.text("hello")["room"]["watch"] == watch
+        hello = vera.text("hello")
+        assert (hello["role"], hello["room"]["id"]) == ("view", None)
+        assert "together" not in str(hello)
+        vera.exact(0)
+        vera.edit(1, SIGMA, 0.9)
+        problem = vera.text("problem")["problem"]
+        assert (problem["status"], problem["detail"][:26]) == (403, "this link is for watching;")
+        ann.edit(1, SIGMA, 0.31)
+        picture(vera, 0, 810)
+        assert people(ann, lambda them: len(them) == 2)[1]["role"] == "view"
+
+
+@pytest.mark.parametrize("query", ["?room=", "?room=a%20b", f"?room={'a' * 65}", "?watch=ä", f"{ROOM}&name={'a' * 41}"])
+def test_names_are_bounded(client: TestClient, baked: Baked, query: str) -> None:
+    assert refused(client, baked, query)[0] == 1008
+
+
+def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, baked: Baked) -> None:
+    with (
+        open_session(client, baked.bake, query="?room=a") as first,
+        open_session(client, baked.bake, query="?room=b") as second,
+    ):
+        first.text("hello")
+        second.text("hello")
+        assert refused(client, baked, "?room=c") == (1013, "2 rooms are open; one of them has to be left first")
+    while True:  # those who have left have their place for a moment
+        with open_session(client, baked.bake, query="?room=c") as third:
+            message = third.websocket.receive()
+            if message["type"] != "websocket.close":
+                break
+
+
+def test_an_edit_that_cannot_be_shown_is_taken_back_for_all(client: TestClient, baked: Baked) -> None:
+    rotation = "/environment/rotation"  # the bake cannot follow that
+    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        ann.exact(0)
+        bob.exact(0)
+        ann.edit(1, EXTINCTION, 1.7)
+        ann.exact(1)
+        ann.edit(2, rotation, 1.0)
+        assert ann.text("problem")["revision"] == 2
+        ann.edit(3, SIGMA, 0.31)
+        picture(bob, 0, 810)
+        with open_session(client, baked.bake, query=ROOM) as late:
+            look = late.text("hello")["look"]
+        assert look["environment"]["rotation"] == 0.0
+        assert look["materials"]["Paper"]["terms"][1]["params"]["extinction"] == 1.7

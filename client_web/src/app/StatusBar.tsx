@@ -6,7 +6,7 @@ import { cancelBake } from "../net/api";
 import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
 import { limits } from "../seen/limits";
 import { coming } from "../state/bakes";
-import { connection, freezing, retryInMs } from "../state/connection";
+import { connection, freezing, refusedBecause, retryInMs } from "../state/connection";
 import { settled } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
 import { bakedLight, look } from "../state/look";
@@ -25,7 +25,7 @@ function connectionWords(): string {
       return "Connecting…";
     case "reconnecting":
       return retryInMs.value > 0
-        ? `Connection lost. Edits are kept; trying again in ${formatSeconds(retryInMs.value / 1000)}`
+        ? `${refusedBecause.value === null ? "Connection lost. Edits are kept" : `Not let in: ${refusedBecause.value}`}; trying again in ${formatSeconds(retryInMs.value / 1000)}`
         : "Reconnecting…";
     case "closed":
       return "Not connected";

@@ -13,6 +13,7 @@ import { filmstripOpen, helpOpen } from "../state/panels";
 import { shownPanels, togglePanel, type SidePanel } from "../state/room";
 import { scene } from "../state/scene";
 import { showAlone, sideBySide, toggleSideBySide, viewName, views } from "../state/views";
+import { Together } from "../together/Together";
 import { IconButton } from "../ui/Button";
 import { Slider } from "../ui/Slider";
 import { Switch } from "../ui/Switch";
@@ -163,6 +164,7 @@ export function TopBar() {
       <RemarksMenu />
       <BakeMenu />
       <Overflow controls={controls} />
+      <Together />
       <Panels />
       <Account />
       <IconButton

@@ -13,6 +13,7 @@ import { followTimeline } from "../looks/keyframes";
 import { followRoom } from "../state/room";
 import { me } from "../state/me";
 import { page } from "../state/scene";
+import { followName } from "../state/together";
 import { Toasts } from "../ui/toasts";
 import { Editor } from "./Editor";
 import "../ui/base.css";
@@ -29,6 +30,7 @@ import "../lights/lights.css";
 import "../timeline/timeline.css";
 import "../truth/truth.css";
 import "../account/account.css";
+import "../together/together.css";
 import "./layout.css";
 import "./bars.css";
 
@@ -50,8 +52,8 @@ async function start(): Promise<void> {
 
 function open(): void {
   const place = placeFromUrl(location.search);
-  const shared = new URLSearchParams(location.search).get("share");
-  if (shared !== null) void openShare(shared);
+  followName();
+  if (place.share !== null) void openShare(place.share, place);
   else if (place.scene !== null) void openScene(place.scene, place);
   followPlace();
   followPanels();

@@ -62,3 +62,14 @@ export function changeTo(look: Look, next: Look): Change {
 export function joined(first: Change, then: Change): Change {
   return { ...changeBy(first.before, [...first.patch, ...then.patch]), after: then.after };
 }
+
+/** A look after a patch that was made for another state of it: operations that find no place any more are left out. */
+export function rebased(look: Look, patch: readonly PatchOp[]): Look {
+  return patch.reduce((to, operation) => {
+    try {
+      return changeBy(to, [operation]).after;
+    } catch {
+      return to; // somebody else has removed what it is in
+    }
+  }, look);
+}

@@ -71,8 +71,9 @@ function present({ steps, cursor }: Story): Look | null {
   return steps.slice(0, cursor).findLast(isLookStep)?.after ?? steps.slice(cursor).find(isLookStep)?.before ?? null;
 }
 
-/** The story of a text, null where it does not lead to `look`; `give` takes the pictures of its looks. */
-export function fromText(text: string, look: Look, give: (of: Look, picture: string) => void): Story | null {
+/** The story of a text, null where it does not lead to `look`; where that is null others edit it as well, and the story is
+ * of what this one did. `give` takes the pictures of its looks. */
+export function fromText(text: string, look: Look | null, give: (of: Look, picture: string) => void): Story | null {
   const kept = JSON.parse(text) as KeptStory;
   const pictures: [Look, string | null][] = [];
   let last = kept.start as Look;
@@ -87,7 +88,7 @@ export function fromText(text: string, look: Look, give: (of: Look, picture: str
   });
   const story = { steps, cursor: kept.cursor };
   const now = present(story);
-  if (now !== null && !isSame(now, look)) return null;
+  if (now !== null && look !== null && !isSame(now, look)) return null;
   for (const [of, picture] of pictures) if (picture !== null) give(of, picture);
   return story;
 }

@@ -4,11 +4,19 @@ import { Arrivals } from "../picture/arrival";
 import type { ClientMessage, HelloMessage } from "../protocol";
 import { watched } from "../state/me";
 import { scene } from "../state/scene";
+import { door, ownName, seatIn } from "../state/together";
 
-/** Of one who only looks: with what a session begins. */
-function begins(): Record<string, string> {
-  const { scene: of, ...look } = watched.peek() ?? { scene: null };
-  return of !== null && of === scene.peek()?.id ? look : {};
+/** Of one who only looks: with what a session begins; of those who work together: the room, and the place in it. */
+function asked(): Record<string, string> {
+  const of = scene.peek()?.id;
+  const room = door.peek();
+  if (room !== null && room.scene === of) {
+    const { room: id, watch, share } = room;
+    const said = { ...(id !== null ? { room: id } : { watch }), share, seat: seatIn(room), name: ownName.peek() || null };
+    return Object.fromEntries(Object.entries(said).filter((entry): entry is [string, string] => entry[1] !== null));
+  }
+  const { scene: watchedScene, ...look } = watched.peek() ?? { scene: null };
+  return watchedScene !== null && watchedScene === of ? look : {};
 }
 
 /** A session with a bake, and what is on its way from it. */
@@ -27,7 +35,7 @@ export class BakeConnection {
     readonly bake: string,
     handlersOf: (self: BakeConnection) => SessionHandlers,
   ) {
-    this.session = new Session(bake, handlersOf(this), begins());
+    this.session = new Session(bake, handlersOf(this), asked);
   }
 
   /** The server is there, perhaps again: it knows of no views yet, and nothing of it has come. */

@@ -7,7 +7,7 @@ import { LOGIN_CODE } from "../net/socket";
 import type { HelloMessage, Look } from "../protocol";
 import { wholeOf } from "../seen/paths";
 import { coming } from "../state/bakes";
-import { connection, freezing, retryInMs } from "../state/connection";
+import { connection, freezing, refusedBecause, retryInMs } from "../state/connection";
 import { showShape } from "../state/curveShape";
 import { exact } from "../state/fidelity";
 import { editSent } from "../state/latency";
@@ -15,6 +15,7 @@ import { defaultLook, look } from "../state/look";
 import { loginWords, mayEdit, readOnlyWords } from "../state/me";
 import { probe } from "../state/probe";
 import { curvePath } from "../state/selection";
+import { door, people, you } from "../state/together";
 import { focusedView } from "../state/views";
 import { showError } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
@@ -22,6 +23,7 @@ import { take } from "./drawing";
 import { answered } from "./probing";
 import { showBake } from "./swap";
 import { shownOf, tellViews } from "./tellViews";
+import { comeIn, followShared } from "./together";
 import { want } from "./want";
 
 let onBakeReady: (bake: string) => void = () => undefined;
@@ -42,8 +44,8 @@ function takeUp(own: Look): Look {
 
 /** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function welcome(of: BakeConnection, hello: HelloMessage): void {
-  want(of, takeUp(hello.look as unknown as Look), performance.now());
   of.greeted(hello);
+  if (!comeIn(of, hello)) want(of, takeUp(hello.look as unknown as Look), performance.now());
   tellViews(of, shownOf(hello), focusedView.peek());
   if (of === connections.shown) {
     freezing.value = null;
@@ -66,10 +68,11 @@ function takeBack(of: BakeConnection, lastGood: Look | null): void {
 export function handlersOf(self: BakeConnection): SessionHandlers {
   const isShown = () => self === connections.shown;
   return {
-    connection(state, retryIn) {
+    connection(state, retryIn, reason) {
       if (!isShown()) return;
       connection.value = state;
       retryInMs.value = retryIn;
+      refusedBecause.value = reason ?? null;
     },
     hello: (message) => welcome(self, message),
     frame: (frame) => take(self, frame),
@@ -77,7 +80,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       if (isShown()) freezing.value = state === "ready" ? null : { state, view, what, progress };
     },
     problem({ problem, revision }, lastGood) {
-      showError(`${problemText(problem)} The look is as it was before.`);
+      showError(revision === null ? problemText(problem) : `${problemText(problem)} The look is as it was before.`);
       if (isShown() && revision !== null) takeBack(self, lastGood);
     },
     probe(message) {
@@ -88,6 +91,12 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
     curve(message) {
       if (isShown() && message.curve === curvePath.peek()) showShape(message);
     },
+    room(message) {
+      if (!isShown() || door.peek() === null) return;
+      people.value = message.people;
+      you.value = message.you;
+    },
+    shared: (message, shared) => followShared(self, message, shared),
     bake({ bake: id, state, progress, phase, seconds_left }) {
       if (state === "ready") onBakeReady(id);
       else coming.value = { id, state: state as "running", progress, phase, seconds_left, problem: null };

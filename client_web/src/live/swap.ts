@@ -14,6 +14,7 @@ import { attempt, note, showError } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { noteShown, nothingIsExact } from "./exactness";
 import { activeOf, shownOf } from "./tellViews";
+import { takeOver } from "./together";
 
 async function loadIds(of: string, view: string, arrival: Arrival): Promise<void> {
   await attempt(async () => {
@@ -85,6 +86,7 @@ async function swap(to: BakeConnection): Promise<void> {
   const old = connections.shown;
   connections.shown = to;
   connections.incoming = null;
+  takeOver(old, to);
   old?.session.close();
   freezing.value = null;
   forgetWaiting();

@@ -23,9 +23,10 @@ export function want(of: BakeConnection | null, wanted: Look, inputTime: number,
   of?.session.want(asked, seen === wanted ? change : null);
 }
 
+/** In a room, what is on its way to take over hears of edits from there. */
 function wantEverywhere(wanted: Look, inputTime: number, change: Change | null = null): void {
   want(connections.shown, wanted, inputTime, change);
-  want(connections.incoming, wanted, inputTime, change);
+  if (connections.incoming?.hello?.room == null) want(connections.incoming, wanted, inputTime, change);
 }
 
 onChange((change, inputTime) => wantEverywhere(change.after, inputTime, change));

@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
 import { getShare, makeShare } from "../net/api";
-import type { ShareBody } from "../protocol";
+import type { ShareBody, ShareEntry } from "../protocol";
 import { openScene } from "../scene/open";
 import type { Place } from "../scene/url";
 import { seenPaths } from "../seen/paths";
@@ -17,21 +17,25 @@ import { attempt, note } from "../ui/toasts";
 /** A link that the browser did not let us copy: it is shown to be copied by hand. */
 export const linkToCopy = signal<string | null>(null);
 
+/** Save what is seen now. */
+export async function saveShare(): Promise<ShareEntry> {
+  const [id, current] = [bake.value, look.value];
+  if (id === null || current === null) throw new Error("There is no picture to share yet.");
+  return makeShare({
+    bake: id,
+    view: viewName.value,
+    views: shownViews.value,
+    look: { ...current },
+    solo: solo.value,
+    solo_light: soloLight.value,
+    paths: seenPaths.value,
+  });
+}
+
 /** Save what is seen now, and copy the link to it. */
 export async function share(): Promise<void> {
-  const [id, current] = [bake.value, look.value];
-  if (id === null || current === null) return;
   await attempt(async () => {
-    const made = await makeShare({
-      bake: id,
-      view: viewName.value,
-      views: shownViews.value,
-      look: { ...current },
-      solo: solo.value,
-      solo_light: soloLight.value,
-      paths: seenPaths.value,
-    });
-    const link = new URL(made.url, location.href).href;
+    const link = new URL((await saveShare()).url, location.href).href;
     try {
       await navigator.clipboard.writeText(link);
       note("The link is copied. It shows this picture as it is now, whatever you change later.");
@@ -41,9 +45,10 @@ export async function share(): Promise<void> {
   });
 }
 
-function placeOf(shared: ShareBody): Place {
+function placeOf(shared: ShareBody, room: string | null, watch: string | null): Place {
   const beside = shared.views.length > 1 ? shared.views : [];
-  return { scene: shared.scene, bake: shared.bake, view: shared.view, beside, material: null, term: 0, curve: null, light: null };
+  const nothing = { material: null, term: 0, curve: null, light: null };
+  return { scene: shared.scene, bake: shared.bake, view: shared.view, beside, ...nothing, room, watch, share: shared.id };
 }
 
 /** Take over what was seen: the look is a step, which undo takes back to the visitor's own. */
@@ -55,13 +60,15 @@ function takeOver(shared: ShareBody): void {
   seenPaths.value = shared.paths;
 }
 
-/** Open what a link carries. */
-export async function openShare(id: string): Promise<void> {
+/** Open what a link carries. In a room that it names it is what the room begins with. */
+export async function openShare(id: string, { room, watch }: Pick<Place, "room" | "watch">): Promise<void> {
   await attempt(async () => {
     const shared = await getShare(id);
     if (shared.lacking.length > 0) throw new Error(shared.lacking.join(" "));
+    const isAlone = room === null && watch === null;
     watched.value = mayEdit.value ? null : { scene: shared.scene, share: id };
-    await openScene(shared.scene, placeOf(shared), undefined, () => mayEdit.value && takeOver(shared));
+    const arrived = () => isAlone && mayEdit.value && takeOver(shared);
+    await openScene(shared.scene, placeOf(shared, room, watch), undefined, arrived);
     if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
       note("The bake of this link is gone. Its look is shown in another bake of the scene.");
   });

@@ -1,6 +1,6 @@
 /** Edits on their way to the server: only the newest look counts, each message has its revision. What an edit changed is
  * known from where it was made; looks are compared only where no edit leads from what the server holds. */
-import { changeBy, type Change } from "../document/change";
+import { changeBy, rebased, type Change } from "../document/change";
 import { differenceOf } from "../document/difference";
 import { escapeToken } from "../document/pointer";
 import { MAX_OPERATIONS } from "../look.gen";
@@ -27,6 +27,13 @@ export interface Edit extends Omit<Wanted, "look"> {
 
 function messageBytes(patch: readonly PatchOp[]): number {
   return new TextEncoder().encode(JSON.stringify(patch)).length;
+}
+
+/** An edit that the server has yet to show, or in a room to tell of. */
+interface Outstanding {
+  revision: number;
+  look: Look;
+  patch: readonly PatchOp[];
 }
 
 function chunked(patch: readonly PatchOp[]): PatchOp[][] {
@@ -62,20 +69,64 @@ export class EditQueue {
   private wanted: Wanted | null = null;
   /** From `sent` to the wanted look; null where no edits lead there. */
   private way: readonly PatchOp[] | null = null;
-  private outstanding: { revision: number; look: Look }[] = [];
-  /** The newest look that the server has shown a frame of. */
+  private outstanding: Outstanding[] = [];
+  /** The newest look that the server has shown a frame of; in a room, that it has told of. */
   private confirmed: Look | null = null;
+  /** Others edit the look as well: the server tells what has become of it, and frames say nothing of that. */
+  private isShared = false;
   revision = 0;
 
   /** Start afresh: the server holds `look` at `revision` (null: unknown, so the next edit is the whole look), and shows
    * these sources of light. */
-  reset(look: Look | null, revision = 0, solo: readonly string[] | null = null): void {
+  reset(look: Look | null, revision = 0, solo: readonly string[] | null = null, isShared = false): void {
     this.sent = look;
     this.sentSolo = solo;
     this.way = null;
     this.confirmed = look;
     this.revision = Math.max(this.revision, revision);
     this.outstanding = [];
+    this.isShared = isShared;
+  }
+
+  /** Come, perhaps again, into a room that has this look: what was edited meanwhile goes on top of it. */
+  join(look: Look, revision: number, solo: readonly string[] | null): void {
+    const patch = this.isShared ? this.unconfirmed(revision) : [];
+    this.reset(look, revision, solo, true);
+    this.way = patch;
+    if (this.wanted !== null) this.wanted = { ...this.wanted, look: patch.length > 0 ? rebased(look, patch) : look };
+  }
+
+  /** What was edited and is not known to be in the room's look, after a revision. */
+  unconfirmed(after = 0): readonly PatchOp[] {
+    const edits = this.outstanding.filter(({ revision }) => revision > after);
+    return [...edits.flatMap(({ patch }) => patch), ...(this.way ?? [])];
+  }
+
+  /** The room's look has become another, with the own edits up to a revision in it; an empty patch: by those alone. Gives
+   * what is wanted now: the own edits after them stay on top. */
+  follow(patch: readonly PatchOp[], revision: number): Look | null {
+    const own = this.outstanding.findLast((edit) => edit.revision <= revision);
+    this.confirmed = own?.look ?? this.confirmed;
+    this.outstanding = this.outstanding.filter((edit) => edit.revision > revision);
+    if (patch.length > 0 && this.confirmed !== null) {
+      this.confirmed = rebased(this.confirmed, patch);
+      this.rebase();
+    }
+    return this.look;
+  }
+
+  /** The look that is wanted; until one is, that of the server. */
+  get look(): Look | null {
+    return this.wanted?.look ?? this.confirmed;
+  }
+
+  /** Put what is not confirmed on top of what is. */
+  private rebase(): void {
+    let look = this.confirmed as Look;
+    this.outstanding = this.outstanding.map((edit) => ({ ...edit, look: (look = rebased(look, edit.patch)) }));
+    this.sent = look;
+    if (this.wanted !== null) this.wanted = { ...this.wanted, look: this.way?.length ? rebased(look, this.way) : look };
+    this.way ??= [];
   }
 
   /** The user wants this now; `change` is the edit that made the look, where one did. */
@@ -109,21 +160,27 @@ export class EditQueue {
     this.sentSolo = solo;
     return splitPatch(patch).map((part) => {
       this.revision += 1;
-      this.outstanding.push({ revision: this.revision, look });
+      this.outstanding.push({ revision: this.revision, look, patch: part });
       return { revision: this.revision, patch: part, hand, solo, inputTime };
     });
   }
 
   /** A frame of this revision has come: everything up to it was accepted. */
   confirm(revision: number): void {
+    if (this.isShared) return;
     while (this.outstanding[0] && this.outstanding[0].revision <= revision) {
-      this.confirmed = (this.outstanding.shift() as { look: Look }).look;
+      this.confirmed = (this.outstanding.shift() as Outstanding).look;
     }
   }
 
-  /** The server refused a revision: what it holds is no longer known; returns the last look it accepted. */
+  /** The server refused a revision: what it holds is no longer known; returns the last look it accepted. In a room, the
+   * look without that edit. */
   refuse(revision: number): Look | null {
     this.outstanding = this.outstanding.filter((entry) => entry.revision !== revision);
+    if (this.isShared) {
+      this.rebase();
+      return this.wanted?.look ?? null;
+    }
     this.sent = this.way = null;
     return this.confirmed;
   }

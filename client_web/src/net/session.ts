@@ -6,19 +6,22 @@ import type {
   CurveMessage,
   HelloMessage,
   Look,
+  PatchOp,
   ProbeAnswer,
   ProblemMessage,
+  RoomMessage,
+  SharedMessage,
   StatusMessage,
 } from "../protocol";
 import { FrameError, parseFrame, type Frame } from "./binaryFrame";
 import { EditQueue, type Wanted } from "./editQueue";
 import { deliver, MessageError, type MessageHandlers } from "./messages";
-import { LiveSocket, type Connection } from "./socket";
+import { LiveSocket, type Asked, type Connection } from "./socket";
 
 const MAX_BUFFERED_BYTES = 1 << 20;
 
 export interface SessionHandlers {
-  connection(state: Connection, retryInMs: number): void;
+  connection(state: Connection, retryInMs: number, reason?: string): void;
   hello(message: HelloMessage): void;
   /** Resolves when the frame is on the screen. */
   frame(frame: Frame): Promise<void>;
@@ -27,6 +30,9 @@ export interface SessionHandlers {
   probe(message: ProbeAnswer): void;
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
+  room(message: RoomMessage): void;
+  /** Others have edited the look; it has become this one, where there is one yet. */
+  shared(message: SharedMessage, look: Look | null): void;
   sent(revision: number, inputTime: number): void;
   /** The look cannot be changed: the server lets this one only look. */
   readOnly(): void;
@@ -47,10 +53,10 @@ export class Session {
   constructor(
     readonly bake: string,
     private readonly handlers: SessionHandlers,
-    asked: Readonly<Record<string, string>> = {},
+    asked?: Asked,
   ) {
     this.socket = new LiveSocket(bake, {
-      connection: (state, retryInMs) => handlers.connection(state, retryInMs),
+      connection: (state, retryInMs, reason) => handlers.connection(state, retryInMs, reason),
       received: (data) => this.receive(data),
       ended: (reason, code) => handlers.ended(reason, code),
     }, asked);
@@ -61,6 +67,8 @@ export class Session {
       probe: (message) => handlers.probe(message),
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
+      room: (message) => handlers.room(message),
+      shared: (message) => this.follow(message),
       leaving: () => this.socket.moveOn(),
     };
   }
@@ -112,10 +120,28 @@ export class Session {
     this.socket.greet(message.resume);
     const look = message.look as unknown as Look;
     this.fixed = message.role === "view" ? look : null;
-    this.queue.reset(look, message.revision, message.solo);
+    if (message.room === null || message.room.created) {
+      this.queue.reset(look, message.revision, message.solo, message.room !== null);
+    } else this.queue.join(look, message.revision, message.solo);
     this.handlers.hello(message);
     this.handlers.connection("open", 0);
     this.flush();
+  }
+
+  private follow(message: SharedMessage): void {
+    const look = this.queue.follow(message.patch as PatchOp[], message.revision);
+    if (this.fixed !== null) this.fixed = look;
+    if (message.patch.length > 0) this.handlers.shared(message, look);
+  }
+
+  /** The look that is wanted, with what others made of it. */
+  get look(): Look | null {
+    return this.queue.look;
+  }
+
+  /** What was edited and may not have come to the room. */
+  get unconfirmed(): readonly PatchOp[] {
+    return this.queue.unconfirmed();
   }
 
   /** What to show from now on, and the edit that made it; sent at once, then at most once per animation frame. */

@@ -6,13 +6,19 @@ import { backoffMs } from "./backoff";
 export const LOGIN_CODE = 4401;
 /** Another version of the protocol, no such bake, not ready, damaged: trying again gives the same. */
 const FINAL_CODES = new Set([1002, LOGIN_CODE, 4403, 4404, 4409, 4410]);
+/** As many sessions or people as may be, or nobody in a room yet: later there may be room. */
+const BUSY_CODE = 1013;
 /** A token that was refused so often is not tried for ever. */
 const MAX_RESUMES = 3;
 
 export type Connection = "connecting" | "open" | "reconnecting" | "closed";
 
+/** With what a session is to begin, and in which room. */
+export type Asked = () => Readonly<Record<string, string>>;
+
 export interface SocketHandlers {
-  connection(state: Connection, retryInMs: number): void;
+  /** `reason`: what the server said where it has no room now. */
+  connection(state: Connection, retryInMs: number, reason?: string): void;
   received(data: string | ArrayBuffer): void;
   /** The server will not have this session again; no use in trying. */
   ended(reason: string, code: number): void;
@@ -30,15 +36,15 @@ export class LiveSocket {
   constructor(
     readonly bake: string,
     private readonly handlers: SocketHandlers,
-    /** What the session is to begin with, as the address says it. */
-    private readonly asked: Readonly<Record<string, string>> = {},
+    /** What is asked of the server with each connection. */
+    private readonly asked: Asked = () => ({}),
   ) {}
 
   connect(): void {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
     url.protocol = url.protocol.replace("http", "ws");
-    for (const [name, value] of Object.entries(this.asked)) url.searchParams.set(name, value);
+    for (const [name, value] of Object.entries(this.asked())) url.searchParams.set(name, value);
     if (this.resume !== null) url.searchParams.set("resume", this.resume);
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
@@ -65,7 +71,7 @@ export class LiveSocket {
     }
     const wait = backoffMs(this.attempt++);
     if (this.attempt > MAX_RESUMES) this.resume = null;
-    this.handlers.connection("reconnecting", wait);
+    this.handlers.connection("reconnecting", wait, event.code === BUSY_CODE ? event.reason : undefined);
     this.retry = window.setTimeout(() => this.connect(), wait);
   }
 

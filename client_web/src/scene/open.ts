@@ -14,6 +14,7 @@ import { fidelity } from "../state/fidelity";
 import { defaultLook, look } from "../state/look";
 import { models, page, scene } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../state/selection";
+import { door, people, you, type Door } from "../state/together";
 import { availableOf, pointedView, shownViews, viewName } from "../state/views";
 import { attempt } from "../ui/toasts";
 import { bakesOf, viewsToBake, type BakeChoice } from "./bakeChoice";
@@ -40,7 +41,14 @@ function reset(to: SceneBody): void {
   connection.value = "connecting";
   freezing.value = null;
   fidelity.value = "exact";
+  people.value = [];
+  you.value = null;
   page.value = "editor";
+}
+
+/** The room that an address names. */
+function doorOf(scene: string, { room, watch, share }: Place): Door | null {
+  return room === null && watch === null ? null : { scene, room, watch: room === null ? watch : null, share };
 }
 
 /** Take up what this tab kept of a scene. */
@@ -92,6 +100,7 @@ export async function openScene(
     const [opened, known] = await Promise.all([getScene(id), listModels()]);
     models.value = known;
     reset(opened);
+    door.value = doorOf(opened.id, place);
     restoreKept(opened.id);
     restorePlace(opened, place);
     if (arrived !== undefined) onceThereIsALook(opened, arrived);
@@ -115,6 +124,7 @@ export function leave(): void {
   remember();
   disconnect();
   stopFollowing();
+  door.value = null;
   page.value = "start";
   window.history.pushState(null, "", "/");
 }

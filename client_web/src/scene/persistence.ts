@@ -13,6 +13,7 @@ import { bake } from "../state/bakes";
 import { look } from "../state/look";
 import { page, scene } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../state/selection";
+import { door, watching } from "../state/together";
 import { giveThumbnail, lookThumbnail } from "../state/thumbnails";
 import { shownViews, sideBySide, viewName } from "../state/views";
 import { placeToUrl } from "./url";
@@ -45,7 +46,7 @@ export function recall(scene: string): Kept | null {
 export function recallHistory(scene: string, look: Look): void {
   try {
     const text = sessionStorage.getItem(HISTORY + scene);
-    const story = text === null ? null : fromText(text, look, giveThumbnail);
+    const story = text === null ? null : fromText(text, door.peek() === null ? look : null, giveThumbnail);
     if (story !== null) history.restore(story.steps, story.cursor);
   } catch {
     // of an older editor, or forbidden: a new one begins
@@ -95,6 +96,9 @@ export function followPlace(): void {
       term: selectedTerm.value,
       curve: selectedCurve.value,
       light: selectedLight.value,
+      room: door.value?.room ?? null,
+      watch: watching.value ? (door.value?.watch ?? null) : null,
+      share: null,
     });
     window.history.replaceState(null, "", url);
   });

@@ -10,6 +10,11 @@ export interface Place {
   term: number;
   curve: string | null;
   light: string | null;
+  /** What opens the room that the look is shared in, to edit or only to watch. */
+  room: string | null;
+  watch: string | null;
+  /** The shared look that it begins with. */
+  share: string | null;
 }
 
 export function placeFromUrl(search: string): Place {
@@ -23,12 +28,15 @@ export function placeFromUrl(search: string): Place {
     term: Math.max(0, Math.trunc(Number(query.get("term") ?? 0)) || 0),
     curve: query.get("curve"),
     light: query.get("light"),
+    room: query.get("room"),
+    watch: query.get("watch"),
+    share: query.get("share"),
   };
 }
 
 export function placeToUrl(place: Place): string {
   const query = new URLSearchParams();
-  for (const key of ["scene", "bake", "view", "material", "curve", "light"] as const) {
+  for (const key of ["scene", "bake", "view", "material", "curve", "light", "room", "watch"] as const) {
     if (place[key] !== null && place[key] !== "") query.set(key, place[key]);
   }
   for (const view of place.beside) query.append("beside", view);

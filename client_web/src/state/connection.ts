@@ -4,6 +4,8 @@ import type { Connection } from "../net/socket";
 
 export const connection = signal<Connection>("connecting");
 export const retryInMs = signal(0);
+/** What the server said where it has no room for this session now; null where it said nothing. */
+export const refusedBecause = signal<string | null>(null);
 /** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
 export const freezing = signal<{
   state: "freezing" | "shading";

@@ -1,16 +1,23 @@
 /** Who is here, and what they may do. */
 import { computed, signal } from "@preact/signals";
 import type { MeBody } from "../protocol";
+import { watching } from "./together";
 
 export const me = signal<MeBody>({ login: false, name: "", role: "admin", by: "open" });
 
-export const mayEdit = computed(() => me.value.role === "edit" || me.value.role === "admin");
+const hasRole = computed(() => me.value.role === "edit" || me.value.role === "admin");
+
+export const mayEdit = computed(() => hasRole.value && !watching.value);
+
+const WATCHING = "You watch this look: what others edit is shown here. Who sent the link can send you one to edit with them.";
 
 /** Why nothing can be edited; null where it can. */
 export const readOnlyWords = computed(() =>
   mayEdit.value
     ? null
-    : `${me.value.name} may look, but not edit: the role is “view”. An admin can hand out a token with the role “edit”.`,
+    : hasRole.value
+      ? WATCHING
+      : `${me.value.name} may look, but not edit: the role is “view”. An admin can hand out a token with the role “edit”.`,
 );
 
 /** Counts edits of somebody who may not. */

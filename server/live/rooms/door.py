@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from relume.errors import ParameterError
 from server.wire.rooms import MAX_PERSON_NAME
 
-MAX_SEAT = 64
-_ROOM = re.compile(r"[A-Za-z0-9_-]{1,64}")
+MAX_ROOM = 64
+_MAX_SEAT = 64
+_ROOM = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_ROOM}}}")
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,8 @@ def door_of(asked: Mapping[str, str]) -> Door | None:
     name = None if asked.get("name") is None else check_person(asked["name"])
     for field, value in (("room", room), ("watch", watch)):
         if value is not None and not _ROOM.fullmatch(value):
-            raise ParameterError(field, value[:80], "1 to 64 letters, digits, hyphens and underscores")
-    seat = None if seat is None else seat[:MAX_SEAT]
+            raise ParameterError(field, value[:80], f"1 to {MAX_ROOM} letters, digits, hyphens and underscores")
+    seat = None if seat is None else seat[:_MAX_SEAT]
     if room is not None:
         return Door(room, watch_of(room), seat, name)
     return None if watch is None else Door(None, watch, seat, name)

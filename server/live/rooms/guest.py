@@ -7,6 +7,7 @@ found when it can be sent: however much others edit and however slowly a client 
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass
 from typing import Any
 
 from relume.errors import ParameterError
@@ -23,38 +24,48 @@ from server.wire.rooms import PresenceMessage, RoomInfo, RoomMessage, SharedMess
 PACE_S = 1 / 60
 
 
+@dataclass(frozen=True)
+class Place:
+    """Where a session has come to.
+
+    Attributes:
+        document: complete look that it begins with. is_new: nobody was in the room.
+    """
+
+    room: Room
+    seat: Seat
+    door: Door
+    document: dict[str, Any]
+    is_new: bool
+
+
 class Guest:
     """Sits between a session and its room; on the event loop.
 
+    Args:
+        look, pending: where others' edits come to, and are asked to be shown.
     Attributes:
-        document: complete look that the session begins with.
         news: something is to be told to the client.
     """
 
-    def __init__(self, room: Room, seat: Seat, door: Door, document: dict[str, Any], *, is_new: bool) -> None:
-        self._room, self._seat, self._door, self._is_new = room, seat, door, is_new
-        self.document = document
+    def __init__(self, place: Place, look: LookState, pending: PendingRequests) -> None:
+        self._place, self._room, self._seat = place, place.room, place.seat
+        self._look, self._pending = look, pending
         self.news = asyncio.Event()
-        self._look: LookState | None = None
-        self._pending: PendingRequests | None = None
-        self._told, self._told_revision = room.document, 0
-        self._told_people = room.people()
+        self._told, self._told_revision = place.room.document, look.revision
+        self._told_people = place.room.people()
         self._authors: set[int] = set()
         self._has_others = False
-
-    def begin(self, look: LookState, pending: PendingRequests) -> None:
-        """From now on edits come to this look and are to be shown."""
-        self._look, self._pending, self._told_revision = look, pending, look.revision
         self._room.guests.append(self)
 
     def info(self) -> RoomInfo:
         """What hello says of the room."""
         return RoomInfo(
-            id=self._door.room,
-            watch=self._door.watch,
+            id=self._place.door.room,
+            watch=self._place.door.watch,
             seat=self._seat.token,
             you=self._seat.number,
-            created=self._is_new,
+            created=self._place.is_new,
             people=self._told_people,
         )
 
@@ -67,15 +78,15 @@ class Guest:
             return
         for other in self._room.guests:
             if other is not self:
-                other._follow(target, self._seat.number)
+                other.follow(target, self._seat.number)
 
     def taken_back(self, target: Target) -> None:
         """An edit of this session turned out not to be possible: all, and its own client, go back to this look."""
         self.edited(target)
         self._has_others = True
 
-    def _follow(self, target: Target, author: int) -> None:
-        assert self._look is not None and self._pending is not None
+    def follow(self, target: Target, author: int) -> None:
+        """Show what somebody else has made of the look."""
         document = seen_by(target.document, self._look.document)
         self._pending.target = self._look.follow(document, target)
         self._pending.news.set()
@@ -111,7 +122,6 @@ class Guest:
 
     def _shared(self) -> SharedMessage | None:
         """What the look has become; of what the client did by itself only how far that was accepted."""
-        assert self._look is not None
         document, revision = self._room.document, self._look.revision
         patch = difference(self._told, document, OWN) if self._has_others else []
         authors, self._authors, self._has_others = sorted(self._authors), set(), False
@@ -122,6 +132,5 @@ class Guest:
 
     def leave(self) -> None:
         """The session has ended."""
-        if self in self._room.guests:
-            self._room.guests.remove(self)
+        self._room.guests.remove(self)
         self._room.stand_up(self._seat)

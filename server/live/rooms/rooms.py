@@ -1,14 +1,15 @@
-"""All rooms of this process. They live as long as somebody has a place in them; what they show is in nobody's database."""
+"""All rooms of this process. They live as long as somebody has a place in them, and in memory alone."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from server.access.roles import Caller, Role
 from server.errors import BusyError
 from server.live.rooms.door import Door
-from server.live.rooms.guest import Guest
+from server.live.rooms.guest import Place
 from server.live.rooms.room import Room, seen_by
 
 Key = tuple[str, str]
@@ -21,7 +22,7 @@ class Rooms:
         self._max_rooms, self._max_people, self._away_seconds = max_rooms, max_people, away_seconds
         self._rooms: dict[Key, Room] = {}
 
-    def enter(self, door: Door, scene: str, caller: Caller, begun: Mapping[str, Any], *, has_own: bool) -> Guest:
+    def enter(self, door: Door, scene: str, caller: Caller, begun: Mapping[str, Any], *, has_own: bool) -> Place:
         """A session comes in; whoever may edit and finds nobody makes the room, with the look that they bring.
 
         Args:
@@ -38,10 +39,13 @@ class Rooms:
                 raise BusyError("nobody is in this room now; it opens when somebody comes who may edit in it")
             if len(self._rooms) >= self._max_rooms:
                 raise BusyError(f"{self._max_rooms} rooms are open; one of them has to be left first")
-            room = Room(dict(begun), self._max_people, self._away_seconds, lambda: self._rooms.pop(key))
+            room = Room(dict(begun), self._max_people, self._away_seconds, partial(self._forget, key))
         seat = room.sit(door, caller)
         self._rooms[key] = room
-        return Guest(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new=is_new)
+        return Place(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new)
+
+    def _forget(self, key: Key) -> None:
+        del self._rooms[key]
 
     def close(self) -> None:
         """Forget all of them."""
