@@ -28,6 +28,7 @@ from server.routes import (
     built_ins,
     cameras,
     client,
+    comments,
     comparisons,
     environments,
     finder,
@@ -52,6 +53,7 @@ from worker.paths import btfs_path, environments_path, materials_path
 ROUTE_GROUPS = (
     scenes,
     cameras,
+    comments,
     finder,
     built_ins,
     models,

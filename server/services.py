@@ -35,6 +35,7 @@ from server.queues.comparisons import ComparisonQueue
 from server.queues.counting import count_work
 from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
+from server.records.comments import CommentStore
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
 from server.running.leave import Leave
@@ -62,6 +63,7 @@ class Services:
     bakes: BakeService
     looks: LookStore
     shares: ShareStore
+    comments: CommentStore
     renders: RenderQueue
     comparisons: ComparisonQueue
     btfs: BtfQueue
@@ -131,6 +133,7 @@ async def open_services(
             bakes=service,
             looks=LookStore(sessions),
             shares=ShareStore(sessions),
+            comments=CommentStore(sessions),
             **queues._asdict(),
             threads=threads,
             transfers=transfers,

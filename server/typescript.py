@@ -20,7 +20,7 @@ from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import access, bodies, btfs, cameras, message, models, protocol, renders, rooms, surface
+from server.wire import access, bodies, btfs, cameras, comments, message, models, protocol, renders, rooms, surface
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -49,6 +49,7 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.LeavingMessage,
     rooms.RoomMessage,
     rooms.SharedMessage,
+    rooms.CommentsMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
     message.PatchOperation,
@@ -59,6 +60,8 @@ INPUTS: tuple[type[BaseModel], ...] = (
     models.TermsRequest,
     bodies.TruthRequest,
     bodies.ShareRequest,
+    comments.CommentRequest,
+    comments.CommentChange,
     btfs.SyntheticBtfRequest,
 )
 OUTPUTS: tuple[type[BaseModel], ...] = (
@@ -91,6 +94,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.LookEntry,
     bodies.ShareEntry,
     bodies.ShareBody,
+    comments.CommentBody,
 )
 
 
@@ -102,6 +106,7 @@ def generate_protocol() -> str:
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
     parts.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
+    parts.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
     for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in of_mode], by_alias=True)  # type: ignore[misc]
         parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))

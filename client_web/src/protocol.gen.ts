@@ -15,6 +15,8 @@ export const SURFACE_LAYOUT = 2;
 
 export const MAX_PERSON_NAME = 40;
 
+export const MAX_COMMENT = 2000;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";
@@ -53,6 +55,24 @@ export interface CameraBody {
 export interface CameraFrame {
   to_world: number[];
   yfov: number;
+}
+
+/** Whether a comment is settled. */
+export interface CommentChange {
+  resolved: boolean;
+}
+
+/** Pin words to a pixel. `x`, `y`: of the picture of `view` as it was `size` large, from its upper left corner. `camera`: where a view was seen from whose eye moves. `text`: plain. `author`: taken where nobody logs in. `picture`: of the moment, a PNG, JPEG or WebP in Base64, at most 1024 pixels a side. */
+export interface CommentRequest {
+  bake: string;
+  view: string;
+  x: number;
+  y: number;
+  size: [number, number];
+  camera?: CameraFrame | null;
+  text: string;
+  author?: string | null;
+  picture?: string | null;
 }
 
 /** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
@@ -307,6 +327,28 @@ export interface CameraEntry {
 export interface CameraInfo {
   to_world: number[];
   yfov: number;
+}
+
+/** A comment. `picture`: address of the picture of the moment, relative to the server, null where there is none. */
+export interface CommentBody {
+  id: string;
+  bake: string;
+  view: string;
+  x: number;
+  y: number;
+  size: [number, number];
+  camera: CameraFrame | null;
+  text: string;
+  author: string;
+  created: string;
+  resolved: boolean;
+  resolved_by: string | null;
+  picture: string | null;
+}
+
+/** server → client: somebody has written, settled or deleted a comment on the scene; read the list again. */
+export interface CommentsMessage {
+  type: "comments";
 }
 
 /** An editable factor of a term; an outgoing one multiplies the finished pixel. */
@@ -790,4 +832,5 @@ export type ServerMessage =
   | BakeMessage
   | LeavingMessage
   | RoomMessage
-  | SharedMessage;
+  | SharedMessage
+  | CommentsMessage;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Text
+from sqlalchemy import LargeBinary, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from worker.database.models import Base
@@ -64,3 +64,26 @@ class ComparisonRow(WorkRow):
     """A comparison with brute force; `done` passes are finished."""
 
     __tablename__ = "truths"
+
+
+class CommentRow(Base):
+    """Words pinned to a pixel, see `server.records.comments`.
+
+    Attributes:
+        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all that.
+        created, resolved: seconds since 1970; None: open.
+    """
+
+    __tablename__ = "comments"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    scene: Mapped[str] = mapped_column(index=True)
+    pin: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+    author: Mapped[str]
+    created: Mapped[float]
+    resolved: Mapped[float | None]
+    resolved_by: Mapped[str | None]
+    picture: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    has_picture: Mapped[bool]
+    num_bytes: Mapped[int]

@@ -135,6 +135,7 @@ def delete_one(scene: Id, services: Shared) -> Response:
     """Delete a scene and its bakes."""
     bakes = [status.id for status in services.bakes.bakes(scene)]
     delete_scene(services.settings.data, services.bakes.ledger, scene)
+    services.comments.forget(scene)
     services.access.quotas.disown("scene", scene)
     services.access.quotas.disown("bake", *bakes)
     return Response(status_code=204)

@@ -20,7 +20,7 @@ from relume.look.patch import MAX_OPERATIONS
 from relume.picture.fidelity import Word
 from relume.scene.checks import MAX_LIGHTS
 from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleWord
-from server.wire.rooms import PresenceMessage, RoomInfo, RoomMessage, SharedMessage
+from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage
 from worker.status import Phase
 
 SUBPROTOCOL = "relume.v1"
@@ -313,6 +313,7 @@ ServerMessage = (
     | LeavingMessage
     | RoomMessage
     | SharedMessage
+    | CommentsMessage
 )
 
 

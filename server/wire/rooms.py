@@ -53,6 +53,12 @@ class RoomMessage(Message):
     people: list[Person]
 
 
+class CommentsMessage(Message):
+    """server → client: somebody has written, settled or deleted a comment on the scene; read the list again."""
+
+    type: Literal["comments"] = "comments"
+
+
 class SharedOperation(Message):
     """One operation of what a shared look has become. A path may be there already where it says `add`, and gone where
     it says `remove`."""

@@ -202,9 +202,9 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
         assert people(ann, lambda them: len(them) == 2)[1]["role"] == "view"
 
 
-@pytest.mark.parametrize("query", ["?room=", "?room=a%20b", f"?room={'a' * 65}", "?watch=ä", f"{ROOM}&name={'a' * 41}"])
-def test_names_are_bounded(client: TestClient, baked: Baked, query: str) -> None:
-    assert refused(client, baked, query)[0] == 1008
+def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
+    for query in ("?room=", "?room=a%20b", f"?room={'a' * 65}", "?watch=ä", f"{ROOM}&name={'a' * 41}"):
+        assert refused(client, baked, query)[0] == 1008
 
 
 def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, baked: Baked) -> None:

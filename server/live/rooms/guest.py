@@ -19,7 +19,7 @@ from server.live.state.client_socket import ClientSocket
 from server.live.state.look_state import LookState
 from server.live.state.pending_requests import PendingRequests
 from server.live.state.target import Target
-from server.wire.rooms import PresenceMessage, RoomInfo, RoomMessage, SharedMessage, SharedOperation
+from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage, SharedOperation
 
 PACE_S = 1 / 60
 
@@ -45,13 +45,13 @@ class Guest:
     Args:
         look, pending: where others' edits come to, and are asked to be shown.
     Attributes:
-        news: something is to be told to the client.
+        news: something is to be told to the client. has_comments: such as that there are comments.
     """
 
     def __init__(self, place: Place, look: LookState, pending: PendingRequests) -> None:
         self._place, self._room, self._seat = place, place.room, place.seat
         self._look, self._pending = look, pending
-        self.news = asyncio.Event()
+        self.news, self.has_comments = asyncio.Event(), False
         self._told, self._told_revision = place.room.document, look.revision
         self._told_people = place.room.people()
         self._authors: set[int] = set()
@@ -116,6 +116,9 @@ class Guest:
             if people != self._told_people:
                 self._told_people = people
                 await socket.send(RoomMessage(you=self._seat.number, people=people))
+            if self.has_comments:
+                self.has_comments = False
+                await socket.send(CommentsMessage())
             if (shared := self._shared()) is not None:
                 await socket.send(shared)
             await asyncio.sleep(PACE_S)

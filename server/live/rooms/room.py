@@ -88,6 +88,12 @@ class Room:
         for guest in self.guests:
             guest.news.set()
 
+    def tell_comments(self) -> None:
+        """Somebody has commented."""
+        for guest in self.guests:
+            guest.has_comments = True
+            guest.news.set()
+
     def close(self) -> None:
         """Forget whoever may still come back."""
         for seat in self._seats.values():

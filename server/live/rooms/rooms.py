@@ -44,6 +44,12 @@ class Rooms:
         self._rooms[key] = room
         return Place(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new)
 
+    def commented(self, scene: str) -> None:
+        """Tell everybody who works on a scene together that its comments have changed."""
+        for (of, _), room in self._rooms.items():
+            if of == scene:
+                room.tell_comments()
+
     def _forget(self, key: Key) -> None:
         del self._rooms[key]
 

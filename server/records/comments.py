@@ -1,0 +1,135 @@
+"""Comments: words that somebody pinned to a pixel of a scene's picture, with a small picture of that moment."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.errors import NotFoundError, ParameterError
+from server.errors import BusyError
+from server.records.tables import CommentRow
+
+MAX_COMMENTS, MAX_OF_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
+
+
+@dataclass(frozen=True)
+class Comment:
+    """One of them, without its picture; times in seconds since 1970. `pin`: as it was sent."""
+
+    id: str
+    pin: dict[str, Any]
+    text: str
+    author: str
+    created: float
+    resolved: float | None
+    resolved_by: str | None
+    has_picture: bool
+
+
+def check_text(text: str) -> str:
+    """Words as they are stored. Raises ParameterError where nothing can be read, or something in them is no text."""
+    text = unicodedata.normalize("NFC", text).strip()
+    if not text or any(unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t" for each in text):
+        raise ParameterError("text", text[:80], "words, in any number of lines, without control characters")
+    return text
+
+
+class CommentStore:
+    """Comments by scene."""
+
+    def __init__(self, sessions: sessionmaker[Session]) -> None:
+        self._sessions = sessions
+
+    def list(self, scene: str) -> list[Comment]:
+        """Of a scene, oldest first."""
+        with self._sessions() as session:
+            of_scene = select(CommentRow).where(CommentRow.scene == scene)
+            return [_comment(row) for row in session.scalars(of_scene.order_by(CommentRow.created, CommentRow.id))]
+
+    def add(self, scene: str, pin: Mapping[str, Any], text: str, author: str, picture: bytes | None) -> Comment:
+        """Keep one.
+
+        Args:
+            scene: id. pin: where it is, as JSON. text: checked. author: who says it. picture: WebP of the moment.
+        Raises:
+            BusyError: there are as many as may be.
+        """
+        where = json.dumps(dict(pin), allow_nan=False)
+        num_bytes = len(where.encode()) + len(text.encode()) + len(picture or b"")
+        with self._sessions.begin() as session:
+            _check_room(session, scene, num_bytes)
+            row = CommentRow(
+                id=secrets.token_hex(8),
+                scene=scene,
+                pin=where,
+                text=text,
+                author=author,
+                created=time.time(),
+                picture=picture,
+                has_picture=picture is not None,
+                num_bytes=num_bytes,
+            )
+            session.add(row)
+            session.flush()
+            return _comment(row)
+
+    def settle(self, scene: str, comment: str, who: str | None) -> None:
+        """Settle one, by somebody, or with None open it again. Raises NotFoundError."""
+        with self._sessions.begin() as session:
+            row = _row(session, scene, comment)
+            row.resolved, row.resolved_by = (None, None) if who is None else (time.time(), who)
+
+    def picture(self, scene: str, comment: str) -> bytes:
+        """The picture of its moment, WebP. Raises NotFoundError."""
+        with self._sessions() as session:
+            found = _row(session, scene, comment).picture
+        if found is None:
+            raise NotFoundError("this comment has no picture")
+        return found
+
+    def delete(self, scene: str, comment: str) -> None:
+        """Forget one. Raises NotFoundError."""
+        with self._sessions.begin() as session:
+            session.delete(_row(session, scene, comment))
+
+    def forget(self, scene: str) -> None:
+        """Forget all of a scene that is gone."""
+        with self._sessions.begin() as session:
+            session.execute(delete(CommentRow).where(CommentRow.scene == scene))
+
+
+def _check_room(session: Session, scene: str, num_bytes: int) -> None:
+    held = session.execute(select(func.count(), func.coalesce(func.sum(CommentRow.num_bytes), 0))).one()
+    of_scene = select(func.count()).select_from(CommentRow).where(CommentRow.scene == scene)
+    if (session.scalar(of_scene) or 0) >= MAX_OF_SCENE:
+        raise BusyError(f"a scene has at most {MAX_OF_SCENE} comments; delete some first")
+    if held[0] >= MAX_COMMENTS or held[1] + num_bytes > MAX_BYTES:
+        raise BusyError("no more comments can be kept; delete some first")
+
+
+def _row(session: Session, scene: str, comment: str) -> CommentRow:
+    row = session.get(CommentRow, comment)
+    if row is None or row.scene != scene:
+        raise NotFoundError(f"there is no comment {comment[:40]}; somebody may have deleted it")
+    return row
+
+
+def _comment(row: CommentRow) -> Comment:
+    return Comment(
+        id=row.id,
+        pin=json.loads(row.pin),
+        text=row.text,
+        author=row.author,
+        created=row.created,
+        resolved=row.resolved,
+        resolved_by=row.resolved_by,
+        has_picture=row.has_picture,
+    )

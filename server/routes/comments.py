@@ -1,0 +1,100 @@
+"""/api/scenes/{id}/comments: words pinned to pixels. Rooms of the scene are told of each change."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume.errors import ParameterError
+from relume.scene.placed_camera import placed_camera
+from server.access.roles import Caller, Who
+from server.files.moments import small_picture
+from server.files.png import A_DAY
+from server.live.rooms.door import check_person
+from server.records.comments import Comment, check_text
+from server.routes.bakes import ready_bake
+from server.services import Services, Shared
+from server.wire.bodies import moment
+from server.wire.body import Id
+from server.wire.comments import CommentBody, CommentChange, CommentRequest
+from worker.scenes import get_scene
+
+router = APIRouter(prefix="/api/scenes/{scene}/comments", tags=["comments"])
+CommentId = Annotated[str, Path(min_length=16, max_length=16, pattern=r"^[0-9a-f]+$")]
+
+
+@router.get("")
+def list_comments(scene: Id, services: Shared) -> list[CommentBody]:
+    """Of a scene, oldest first."""
+    get_scene(services.bakes.ledger, scene)
+    return [_body(scene, comment) for comment in services.comments.list(scene)]
+
+
+@router.post("", status_code=201)
+async def add_comment(
+    scene: Id, request: CommentRequest, services: Shared, caller: Who, response: Response
+) -> CommentBody:
+    """Pin words to a pixel."""
+    comment = await run_in_threadpool(_add, services, scene, request, caller)
+    services.live.rooms.commented(scene)
+    response.headers["Location"] = f"/api/scenes/{scene}/comments/{comment.id}"
+    return _body(scene, comment)
+
+
+def _add(services: Services, scene: str, request: CommentRequest, caller: Caller) -> Comment:
+    get_scene(services.bakes.ledger, scene)
+    status = ready_bake(services, request.bake)
+    if status.scene != scene:
+        raise ParameterError("/bake", request.bake, "a bake of this scene")
+    if request.view not in status.recipe.views:
+        raise ParameterError("/view", request.view, "one of " + ", ".join(status.recipe.views)[:400])
+    if request.x >= request.size[0] or request.y >= request.size[1]:
+        raise ParameterError("/x", [request.x, request.y], "a pixel of a picture of that size")
+    if request.camera is not None:
+        placed_camera("eye", request.camera.to_world, request.camera.yfov)
+    picture = None if request.picture is None else small_picture(request.picture)
+    pin = request.model_dump(include={"bake", "view", "x", "y", "size", "camera"})
+    author = caller.name or check_person(request.author or "Guest")
+    return services.comments.add(scene, pin, check_text(request.text), author, picture)
+
+
+@router.patch("/{comment}", status_code=204)
+async def settle_comment(
+    scene: Id, comment: CommentId, change: CommentChange, services: Shared, caller: Who
+) -> Response:
+    """Settle a comment, or open it again."""
+    who = (caller.name or "somebody") if change.resolved else None
+    await run_in_threadpool(services.comments.settle, scene, comment, who)
+    services.live.rooms.commented(scene)
+    return Response(status_code=204)
+
+
+@router.delete("/{comment}", status_code=204)
+async def delete_comment(scene: Id, comment: CommentId, services: Shared) -> Response:
+    """Forget a comment."""
+    await run_in_threadpool(services.comments.delete, scene, comment)
+    services.live.rooms.commented(scene)
+    return Response(status_code=204)
+
+
+@router.get(
+    "/{comment}/picture.webp",
+    response_class=Response,
+    responses={200: {"content": {"image/webp": {}}}},
+)
+def get_picture(scene: Id, comment: CommentId, services: Shared) -> Response:
+    """The picture of the moment, at most 320 pixels a side."""
+    return Response(services.comments.picture(scene, comment), media_type="image/webp", headers=A_DAY)
+
+
+def _body(scene: str, comment: Comment) -> CommentBody:
+    picture = f"/api/scenes/{scene}/comments/{comment.id}/picture.webp" if comment.has_picture else None
+    return CommentBody.of(
+        comment,
+        **comment.pin,
+        created=moment(comment.created),
+        resolved=comment.resolved is not None,
+        picture=picture,
+    )

@@ -1,0 +1,117 @@
+"""Comments: words pinned to a pixel, with a picture of the moment."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from problems import problem_of
+from server_fakes import SIZE
+from session_client import Baked, open_session
+
+from server.records import comments
+
+
+def image(size: tuple[int, int] = (640, 384), form: str = "JPEG") -> str:
+    written = io.BytesIO()
+    Image.fromarray(np.full((size[1], size[0], 3), 90, np.uint8)).save(written, form)
+    return base64.b64encode(written.getvalue()).decode()
+
+
+@pytest.fixture
+def path(baked: Baked) -> str:
+    return f"/api/scenes/{baked.scene}/comments"
+
+
+@pytest.fixture
+def pin(baked: Baked) -> dict[str, Any]:
+    return {"bake": baked.bake, "view": "front", "x": 12, "y": 40, "size": SIZE, "text": "Too bright here"}
+
+
+def test_a_comment_is_kept_listed_settled_opened_and_deleted(
+    client: TestClient, path: str, pin: dict[str, Any]
+) -> None:
+    sent = {**pin, "text": "  Too <b>bright</b>\nhere ", "author": "Ann", "picture": image()}
+    answer = client.post(path, json=sent)
+    assert answer.status_code == 201
+    made = answer.json()
+    assert answer.headers["location"] == f"{path}/{made['id']}"
+    assert (made["text"], made["author"], made["resolved"], made["x"], made["size"]) == (
+        "Too <b>bright</b>\nhere", "Ann", False, 12, list(SIZE),
+    )  # fmt: skip
+    client.post(path, json={**pin, "text": "And here"})
+    first, second = client.get(path).json()
+    assert first == made
+    assert (second["text"], second["author"], second["picture"]) == ("And here", "Guest", None)
+    picture = client.get(made["picture"])
+    assert picture.headers["content-type"] == "image/webp"
+    with Image.open(io.BytesIO(picture.content)) as kept:
+        assert (kept.format, kept.size) == ("WEBP", (320, 192))
+
+    one = f"{path}/{made['id']}"
+    assert client.patch(one, json={"resolved": True}).status_code == 204
+    settled = client.get(path).json()[0]
+    assert (settled["resolved"], settled["resolved_by"]) == (True, "somebody")
+    client.patch(one, json={"resolved": False})
+    assert not client.get(path).json()[0]["resolved"]
+    assert client.delete(one).status_code == 204
+    assert [each["text"] for each in client.get(path).json()] == ["And here"]
+    assert problem_of(client.delete(one))["status"] == 404
+    assert problem_of(client.patch(one, json={"resolved": True}))["status"] == 404
+    assert problem_of(client.get(made["picture"]))["status"] == 404
+
+
+def test_comments_go_with_their_scene(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
+    client.post(path, json=pin)
+    store = client.app.state.services.comments  # type: ignore[attr-defined]
+    assert len(store.list(baked.scene)) == 1
+    client.delete(f"/api/scenes/{baked.scene}")
+    assert store.list(baked.scene) == []
+    assert problem_of(client.get(path))["status"] == 404
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"text": "  "}, "words"),
+    ({"text": "a\x00b"}, "control characters"),
+    ({"text": "a" * 2001}, "2000"),
+    ({"author": "\n"}, "printable"),
+    ({"x": 160}, "a pixel"),
+    ({"view": "top"}, "front"),
+    ({"bake": "0" * 16}, "no bake"),
+    ({"picture": "no"}, "Base64"),
+    ({"picture": base64.b64encode(b"<svg/>").decode()}, "PNG, JPEG or WebP"),
+    ({"picture": image((16, 16), "GIF")}, "PNG, JPEG or WebP"),
+    ({"picture": image((1025, 16))}, "at most 1024"),
+    ({"picture": image()[:-400]}, "PNG, JPEG or WebP"),
+    ({"camera": {"to_world": [0.0] * 16, "yfov": 40.0}}, "to_world"),
+]
+
+
+def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any]) -> None:
+    for wrong, word in WRONG:
+        answer = client.post(path, json={**pin, **wrong})
+        assert problem_of(answer)["status"] in (404, 422), wrong
+        assert word in answer.text
+    assert client.get(path).json() == []
+
+
+def test_a_scene_has_so_many_comments(
+    client: TestClient, path: str, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(comments, "MAX_OF_SCENE", 1)
+    client.post(path, json=pin)
+    assert problem_of(client.post(path, json=pin))["status"] == 503
+
+
+def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
+    with open_session(client, baked.bake, query="?room=a") as ann:
+        ann.text("hello")
+        made = client.post(path, json=pin).json()
+        assert ann.text("comments") == {"type": "comments"}
+        client.delete(f"{path}/{made['id']}")
+        ann.text("comments")
