@@ -10,6 +10,8 @@ export type {
   BtfWorkBody,
   BuiltInBody,
   CameraEntry,
+  CommentBody,
+  CommentRequest,
   ClientMessage,
   CurveBody,
   CurveMessage,
@@ -49,7 +51,7 @@ export type {
   TruthRequest,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
-export { MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
+export { MAX_COMMENT, MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

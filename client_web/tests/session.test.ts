@@ -53,6 +53,7 @@ const handlers = {
   curve: vi.fn(),
   bake: vi.fn(),
   room: vi.fn(),
+  comments: vi.fn(),
   shared: vi.fn(),
   sent: vi.fn(),
   readOnly: vi.fn(),

@@ -15,10 +15,12 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
+from server.files import moments
 from server.live.rooms import door
-from server.records import looks, shares
+from server.records import comments, looks, shares
 from server.settings import Settings
 from server.wire import bodies, protocol, renders, rooms
+from server.wire import comments as wire_comments
 from worker import cameras
 
 KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
@@ -50,6 +52,12 @@ ROWS = {
     "points of a drawn curve": f"{terms.MAX_POINTS:,}",
     "operations of a patch; text message of a session": (
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
+    ),
+    "comments on a scene; in all; their pictures and words together": (
+        f"{comments.MAX_OF_SCENE}; {comments.MAX_COMMENTS:,}; {comments.MAX_BYTES // MIB} MiB"
+    ),
+    "words of a comment; side of its picture as it is sent; as it is kept": (
+        f"{wire_comments.MAX_COMMENT:,} characters; {moments.MAX_SIDE:,}; {moments.KEPT_SIDE} pixels"
     ),
     "name of somebody in a room; name of a room": f"{rooms.MAX_PERSON_NAME}; {door.MAX_ROOM} characters",
     "views shown at once; frames that are not acknowledged": (

@@ -1,5 +1,6 @@
 /** The editor's layout: what stands where. Everything but the picture collapses. */
 import { ReadOnly } from "../account/Account";
+import { CommentsPanel } from "../comments/CommentsPanel";
 import { Inspector } from "../inspector/Inspector";
 import { LibraryPanel } from "../library/LibraryPanel";
 import { Filmstrip } from "../looks/Filmstrip";
@@ -20,8 +21,8 @@ import { useKeyboard } from "./keyboard";
 
 export function Editor() {
   useKeyboard();
-  const { outline, library, truth } = panelWidths.value;
-  const widths = { outline, library, truth, inspector: inspectorShownWidth.value };
+  const { outline, library, truth, comments } = panelWidths.value;
+  const widths = { outline, library, truth, comments, inspector: inspectorShownWidth.value };
   const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
   const shown = (name: SidePanel) => shownPanels.value.includes(name);
   const over = useFileDrop((files) => void take(files.map(({ file }) => file)));
@@ -33,6 +34,7 @@ export function Editor() {
         <PictureView />
         {shown("library") && mayEdit.value && <LibraryPanel />}
         {shown("truth") && <TruthPanel />}
+        {shown("comments") && <CommentsPanel />}
         {shown("inspector") && (
           <aside class="side" aria-label="Inspector">
             <Splitter />

@@ -1,4 +1,5 @@
 /** Everything that has a key: the keyboard and the help page read the same list. */
+import { beginComment } from "../comments/comments";
 import { logarithmic, tool } from "../curve/settings";
 import { edit } from "../edit/edit";
 import { markA, saveLook, swapA, toggleWipe } from "../looks/compare";
@@ -71,6 +72,7 @@ export const ACTIONS: readonly Action[] = [
   { group: "Curve", label: "Draw", keys: ["d"], run: () => (tool.value = "draw") },
   { group: "Curve", label: "Scale and shift a stretch", keys: ["t"], run: () => (tool.value = "stretch") },
   { group: "Curve", label: "Logarithmic values", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
+  { group: "Picture", label: "Comment on the pixel under the pointer", keys: ["n"], run: beginComment },
   { group: "Panels", label: "Only the picture", keys: ["\\"], run: togglePanels },
   { group: "Panels", label: "These keys", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
 ];
@@ -85,6 +87,7 @@ export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Stretch: scale, shift", "↑ ↓  ← →"],
   ["Handle of a light: move", "← → ↑ ↓"],
   ["Handle of a light: away, near", "Shift ↑ ↓"],
+  ["Pin of a new comment: move, by ten", "← → ↑ ↓  Shift"],
   ["Picture: pan", "← → ↑ ↓"],
   ["One of several views: show it alone", "Enter, double-click"],
 ];

@@ -31,6 +31,7 @@ import "../timeline/timeline.css";
 import "../truth/truth.css";
 import "../account/account.css";
 import "../together/together.css";
+import "../comments/comments.css";
 import "./layout.css";
 import "./bars.css";
 

@@ -33,6 +33,13 @@ export function whenBakeIsReady(take: typeof onBakeReady): void {
   onBakeReady = take;
 }
 
+let onComments: () => void = () => undefined;
+
+/** Who is told that others have commented. */
+export function whenCommented(take: typeof onComments): void {
+  onComments = take;
+}
+
 /** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. */
 function takeUp(own: Look): Look {
   defaultLook.value ??= own;
@@ -96,6 +103,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       people.value = message.people;
       you.value = message.you;
     },
+    comments: () => onComments(),
     shared: (message, shared) => followShared(self, message, shared),
     bake({ bake: id, state, progress, phase, seconds_left }) {
       if (state === "ready") onBakeReady(id);

@@ -44,9 +44,9 @@ function canvasOf(image: ImageData): HTMLCanvasElement {
 }
 
 /** A small JPEG as a data URL. */
-export function thumbnail(pixels: Pixels, display: Display): string {
-  const step = pixels.width / THUMBNAIL_WIDTH;
-  const image = new ImageData(THUMBNAIL_WIDTH, Math.max(1, Math.round(pixels.height / step)));
+export function thumbnail(pixels: Pixels, display: Display, width = THUMBNAIL_WIDTH): string {
+  const step = pixels.width / width;
+  const image = new ImageData(width, Math.max(1, Math.round(pixels.height / step)));
   for (let y = 0; y < image.height; y++) {
     for (let x = 0; x < image.width; x++) put(image, y * image.width + x, sample(pixels, x, y, step), display);
   }

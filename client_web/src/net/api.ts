@@ -4,6 +4,8 @@ import type {
   BakeBody,
   BakeRequest,
   BuiltInBody,
+  CommentBody,
+  CommentRequest,
   DryRunBody,
   EnvironmentBody,
   InOutBody,
@@ -179,6 +181,20 @@ export async function makeShare(body: ShareRequest): Promise<ShareEntry> {
 export const getShare = (id: string) => getJson<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
 
 export type TruthPicture = "error" | "reference" | "method-error" | "method-reference";
+
+const commentsPath = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}/comments`;
+const commentPath = (scene: string, id: string) => `${commentsPath(scene)}/${encodeURIComponent(id)}`;
+
+export const listComments = (scene: string) => getJson<CommentBody[]>(commentsPath(scene));
+export async function addComment(scene: string, body: CommentRequest): Promise<CommentBody> {
+  return (await (await request(commentsPath(scene), json("POST", body))).json()) as CommentBody;
+}
+export async function settleComment(scene: string, id: string, resolved: boolean): Promise<void> {
+  await request(commentPath(scene, id), json("PATCH", { resolved }));
+}
+export async function deleteComment(scene: string, id: string): Promise<void> {
+  await request(commentPath(scene, id), { method: "DELETE" });
+}
 
 const truthPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
 

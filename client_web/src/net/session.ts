@@ -31,6 +31,8 @@ export interface SessionHandlers {
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
   room(message: RoomMessage): void;
+  /** Somebody has commented on the scene. */
+  comments(): void;
   /** Others have edited the look; it has become this one, where there is one yet. */
   shared(message: SharedMessage, look: Look | null): void;
   sent(revision: number, inputTime: number): void;
@@ -68,6 +70,7 @@ export class Session {
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
       room: (message) => handlers.room(message),
+      comments: () => handlers.comments(),
       shared: (message) => this.follow(message),
       leaving: () => this.socket.moveOn(),
     };

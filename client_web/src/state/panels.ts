@@ -6,6 +6,7 @@ export const inspectorOpen = signal(true);
 /** These are closed again at the next visit. */
 export const libraryOpen = signal(false);
 export const truthOpen = signal(false);
+export const commentsOpen = signal(false);
 export const timelineOpen = signal(false);
 export const filmstripOpen = signal(true);
 export const inspectorWidth = signal(320);

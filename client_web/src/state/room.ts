@@ -1,9 +1,9 @@
 /** Which panels have room beside the picture: where a window is narrow, those that were opened longest ago fold away, and
  * come back when there is room again. */
 import { computed, effect, signal, type Signal } from "@preact/signals";
-import { inspectorOpen, inspectorWidth, libraryOpen, outlineOpen, truthOpen } from "./panels";
+import { commentsOpen, inspectorOpen, inspectorWidth, libraryOpen, outlineOpen, truthOpen } from "./panels";
 
-export type SidePanel = "outline" | "library" | "truth" | "inspector";
+export type SidePanel = "outline" | "library" | "truth" | "comments" | "inspector";
 
 const LEAST_PICTURE = 240;
 const SPLITTER = 5;
@@ -12,6 +12,7 @@ const OPEN: Record<SidePanel, Signal<boolean>> = {
   outline: outlineOpen,
   library: libraryOpen,
   truth: truthOpen,
+  comments: commentsOpen,
   inspector: inspectorOpen,
 };
 
@@ -34,6 +35,7 @@ export const panelWidths = computed<Record<SidePanel, number>>(() => ({
   outline: 250,
   library: between(280, 400, 0.24),
   truth: between(280, 480, 0.26),
+  comments: between(240, 340, 0.2),
   inspector: inspectorShownWidth.value + SPLITTER,
 }));
 

@@ -3,6 +3,8 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { eyeOf } from "../cameras/eye";
 import { approached, panned, turned } from "../cameras/orbit";
 import { nearer, step, TURN } from "../cameras/useHand";
+import { pinAt } from "../comments/comments";
+import { Pins } from "../comments/Pins";
 import { acceptMaterials } from "../library/drop";
 import { LightHandles } from "../lights/LightHandles";
 import { placeAt, placing } from "../lights/placing";
@@ -13,6 +15,7 @@ import { stage } from "../picture/stage";
 import { pan, zoomAt } from "../picture/transform";
 import { moveTo, transformOf } from "../picture/viewTransforms";
 import type { Triple } from "../protocol";
+import { pinning } from "../state/comments";
 import { wipe } from "../state/display";
 import { scene } from "../state/scene";
 import { hoveredMaterial, select } from "../state/selection";
@@ -136,6 +139,7 @@ function usePointer(screen: Screen | null, view: string) {
     if (screen === null || !released || drag.current.moved || event.button !== 0) return;
     const { px, py, material } = hitAt(screen, event);
     if (placing.peek() !== null) void placeAt(view, px, py);
+    else if (pinning.peek() !== null) pinAt(view, px, py);
     else if (eyeOf(view) !== null) void selectAt(view, px, py);
     else if (material !== null) select(material);
   };
@@ -199,6 +203,7 @@ export function Cell({ view }: { view: string }) {
       />
       {failure !== null && <p class="failure">{failure}</p>}
       {screen !== null && <LightHandles screen={screen} />}
+      {screen !== null && <Pins screen={screen} />}
       {wipe.value.on && screen !== null && <WipeHandle screen={screen} />}
       <Waiting picture={stage.of(view)} />
       {beside && <Name view={view} />}

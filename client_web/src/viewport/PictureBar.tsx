@@ -2,10 +2,12 @@
 import { toDisplay } from "../color/tonemap";
 import { stage } from "../picture/stage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../picture/zoom";
+import { openComments } from "../state/comments";
 import { drawn, falseColour } from "../state/display";
 import { exposure, toneMap } from "../state/look";
 import { histogramOpen } from "../state/panels";
 import { probe } from "../state/probe";
+import { shownPanels, togglePanel } from "../state/room";
 import { formatNumber } from "../ui/scale";
 
 function Probe() {
@@ -43,6 +45,13 @@ export function PictureBar() {
     <div class="picture-bar">
       <Probe />
       <span class="spacer" />
+      <button
+        aria-pressed={shownPanels.value.includes("comments")}
+        title="Words that people pinned to pixels (N: a new one)"
+        onClick={() => togglePanel("comments")}
+      >
+        Comments{openComments.value.length > 0 && <span class="count">{openComments.value.length}</span>}
+      </button>
       <button
         aria-pressed={histogramOpen.value}
         title="How often each brightness occurs (H)"

@@ -84,6 +84,16 @@ def test_two_edit_one_look_and_a_third_watches(editor: Editor, others: tuple[Pag
     assert changed(ann.pixels(), undone) > 0.01
     assert changed(bob.pixels(), undone) == 0
 
+    # what one pins to a pixel the others see
+    ann.page.keyboard.press("n")
+    ann.page.get_by_role("complementary", name="Comments").get_by_role("textbox").fill("Softer here?")
+    ann.page.keyboard.press("Control+Enter")
+    vera_page.get_by_role("button", name="Comments 1").click()
+    expect(vera_page.locator(".comment")).to_contain_text(["Ann"])
+    expect(vera_page.locator(".comment").get_by_role("button", name="Resolve")).to_have_count(0)
+    ann.page.get_by_role("button", name="Delete comment 1").click()
+    expect(vera_page.locator(".comment")).to_have_count(0)
+
     # a reload comes back to the same place
     bob_page.reload()
     assert changed(bob.pixels(), undone) == 0
