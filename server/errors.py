@@ -25,6 +25,7 @@ from worker.database.faults import database_away, is_away, told
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
 
+CLOSE_NORMAL = 1000
 CLOSE_GOING_AWAY = 1001
 CLOSE_PROTOCOL = 1002
 CLOSE_POLICY = 1008

@@ -395,10 +395,11 @@ export interface FinderBody {
   framing: CameraFrame;
 }
 
-/** Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
+/** Header of a binary frame. `shared`: as in the last `SharedMessage` whose look it shows. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
 export interface FrameHeader {
   frame: number;
   revision: number;
+  shared: number;
   view: string;
   width: number;
   height: number;
@@ -715,10 +716,11 @@ export interface ShareEntry {
   url: string;
 }
 
-/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `by`: numbers of those who edited. */
+/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and frames say which they show. `by`: numbers of those who edited. */
 export interface SharedMessage {
   type: "shared";
   revision: number;
+  shared: number;
   patch: SharedOperation[];
   by: number[];
 }

@@ -6,6 +6,7 @@ import { applyFrame, brushImage, emptyPixels, normalised } from "../src/picture/
 const HEADER = {
   frame: 12,
   revision: 7,
+  shared: 0,
   view: "front",
   width: 4,
   height: 3,

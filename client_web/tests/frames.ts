@@ -6,6 +6,7 @@ export function onePixel(view: string, complete: boolean, at = 0, width = 1): Fr
     header: {
       frame: 1,
       revision: at,
+      shared: 0,
       view,
       width,
       height: 1,

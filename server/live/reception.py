@@ -112,12 +112,11 @@ class Reception:
 
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
-            self._pending.target = self._look.apply(message, received_s)
+            target = self._look.apply(message, received_s)
         except RelumeError:
             self._metrics.edits.labels("refused").inc()
             raise
-        if self._guest is not None:
-            self._guest.edited(self._pending.target)
+        self._pending.target = target if self._guest is None else self._guest.edited(target)
         self._metrics.edits.labels("applied").inc()
 
     def _see_from(self, message: protocol.EyeMessage, received_s: float) -> None:

@@ -18,7 +18,7 @@ from relume.picture.transfer import AnyView, Eyes, Opened
 from server.access.access import Access
 from server.access.audit import Audit, Change
 from server.access.roles import Caller
-from server.errors import close_code_of, problem_of, row_of
+from server.errors import CLOSE_NORMAL, close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
@@ -73,10 +73,12 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
     SESSION.set(session)
     BAKE.set(bake)
     services.metrics.sessions.inc()
+    is_for_good = False
     try:
         await state.socket.send(_hello(session, bake, state, token, kept is not None))
         await _run(services, websocket, bake, state)
-    except WebSocketDisconnect:
+    except WebSocketDisconnect as gone:
+        is_for_good = gone.code == CLOSE_NORMAL
         log.debug("session of bake %s: the client left", bake)
     except (RelumeError, OSError, *AWAY) as error:
         if row_of(error).status >= 500:
@@ -88,7 +90,7 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
     finally:
         services.metrics.sessions.dec()
         if state.guest is not None:
-            state.guest.leave()
+            state.guest.leave(is_for_good=is_for_good)
         services.resumes.close(token, time.monotonic())
         await _write_down(services.access.audit, visit.caller, bake, look.num_edits)
 
@@ -111,7 +113,7 @@ def _state(
     look = LookState(default, document, kept.revision, kept.solo) if kept else LookState(default, document, 0)
     first = next(iter(transfer.views))
     shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
-    pending = PendingRequests(look.target())
+    pending = PendingRequests(look.target(0 if place is None else place.room.num_changes))
     guest = None if place is None else Guest(place, look, pending)
     socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
     return SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller, guest)

@@ -352,12 +352,13 @@ class TablesInfo(Message):
 
 
 class FrameHeader(Message):
-    """Header of a binary frame. `eye`: number of the eye that it shows, null before the first and of fixed views.
-    `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS.
-    `tables`: of kind "tables" alone."""
+    """Header of a binary frame. `shared`: as in the last `SharedMessage` whose look it shows. `eye`: number of the eye
+    that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how
+    far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone."""
 
     frame: int
     revision: int
+    shared: int = 0
     view: str
     width: int
     height: int

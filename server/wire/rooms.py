@@ -70,9 +70,11 @@ class SharedOperation(Message):
 
 class SharedMessage(Message):
     """server → client: what the room's look has become since the last such message, or `hello`, with this session's own
-    edits up to `revision` in it. The `patch` is empty where there were no others. `by`: numbers of those who edited."""
+    edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and
+    frames say which they show. `by`: numbers of those who edited."""
 
     type: Literal["shared"] = "shared"
     revision: Revision
+    shared: int
     patch: list[SharedOperation]
     by: list[int]

@@ -14,6 +14,7 @@ from server.live.rooms.door import watch_of
 from server.settings import Settings
 
 ROOM = "?room=together"
+LOST = 1001
 EXPOSURE = "/display/exposure"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 
@@ -40,10 +41,11 @@ def people(session: Session, done: Any) -> list[dict[str, Any]]:
     return found
 
 
-def picture(session: Session, revision: int, value: int) -> None:
-    """Wait for an exact picture of that value."""
-    while value not in np.frombuffer(session.exact(revision).payload, "<u4")[:1]:
+def picture(session: Session, revision: int, value: int) -> int:
+    """Wait for an exact picture of that value; which change of the look it shows."""
+    while value not in np.frombuffer((frame := session.exact(revision)).payload, "<u4")[:1]:
         pass
+    return int(frame.header["shared"])
 
 
 def refused(client: TestClient, baked: Baked, query: str) -> tuple[Any, ...]:
@@ -61,15 +63,15 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
         assert not bob.text("hello")["room"]["created"]
         assert alone.text("hello")["room"] is None
         ann.edit(1, SIGMA, 0.31)
-        picture(bob, 0, 810)
-        assert ann.text("shared") == {"type": "shared", "revision": 1, "patch": [], "by": [1]}
+        assert picture(bob, 0, 810) == 1
+        assert ann.text("shared") == {"type": "shared", "revision": 1, "shared": 1, "patch": [], "by": [1]}
         bob.edit(1, EXTINCTION, 1.7)
         assert told(ann, EXTINCTION)["revision"] == 1
         alone.edit(1, EXTINCTION, 1.2)
         alone.exact(1)
         ann.edit(2, SIGMA, 0.4)
         news = told(bob, SIGMA)
-        assert (news["revision"], news["by"], news["value"]) == (1, [1], 0.4)
+        assert (news["revision"], news["shared"], news["by"], news["value"]) == (1, 3, [1], 0.4)
         with open_session(client, baked.bake, query=ROOM) as late:
             params = late.text("hello")["look"]["materials"]["Paper"]["terms"][1]["params"]
             assert (params["sigma"], params["extinction"]) == (0.4, 1.7)
@@ -128,8 +130,25 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
             assert "one of Paper" in bob.text("problem")["problem"]["detail"]
             bob.send(type="presence", name="\u202e\n")
             assert "printable" in bob.text("problem")["problem"]["detail"]
+            bob.websocket.close(LOST)
         people(ann, lambda them: [each["here"] for each in them] == [True, False])
         people(ann, lambda them: len(them) == 1)
+
+
+def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann:
+        ann.text("hello")
+        with open_session(client, baked.bake, query=ROOM) as bob:
+            seat = bob.text("hello")["room"]["seat"]
+            with open_session(client, baked.bake, query=f"{ROOM}&seat={seat}") as finer:
+                assert finer.text("hello")["room"]["you"] == 2
+                bob.websocket.close(1000)
+                finer.send(type="presence", name="Bob")
+                found = people(ann, lambda them: them[-1]["name"] == "Bob")
+                assert [each["here"] for each in found] == [True, True]
+                finer.websocket.close(1000)
+                while len(found := ann.text("room")["people"]) == 2:
+                    assert found[1]["here"]
 
 
 def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
@@ -150,6 +169,7 @@ class TestComingBack:
             ann.send(type="presence", name="Ann")
             ann.edit(1, SIGMA, 0.31)
             ann.exact(1)
+            ann.websocket.close(LOST)
         with open_session(client, baked.bake, query=f"{ROOM}&seat={seat}") as again:
             hello = again.text("hello")
             assert (hello["room"]["you"], hello["room"]["created"], hello["revision"]) == (1, False, 0)
@@ -165,6 +185,7 @@ class TestComingBack:
             bob.edit(1, EXPOSURE, 1.0)
             bob.edit(2, SIGMA, 0.5)
             told(ann, SIGMA)
+            bob.websocket.close(LOST)
             stack.close()
             ann.edit(1, EXTINCTION, 1.9)
             ann.exact(1)
@@ -185,11 +206,10 @@ class TestComingBack:
 def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -> None:
     watch = watch_of("together")
     assert refused(client, baked, f"?watch={watch}")[0] == 1013
-    with (
-        open_session(client, baked.bake, query=ROOM) as ann,
-        open_session(client, baked.bake, query=f"?watch={watch}") as vera,
-    ):
+    with ExitStack() as stack:
+        ann = stack.enter_context(open_session(client, baked.bake, query=ROOM))
         assert ann.text("hello")["room"]["watch"] == watch
+        vera = stack.enter_context(open_session(client, baked.bake, query=f"?watch={watch}"))
         hello = vera.text("hello")
         assert (hello["role"], hello["room"]["id"]) == ("view", None)
         assert "together" not in str(hello)

@@ -11,6 +11,7 @@ import { settled } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
 import { bakedLight, look } from "../state/look";
 import { shownPanels } from "../state/room";
+import { companyWords } from "../state/together";
 import { moves } from "../state/views";
 import { toggleTruth } from "../truth/truth";
 import { formatBytes, formatSeconds } from "../ui/scale";
@@ -56,6 +57,7 @@ export function StatusBar() {
     [
       connection.value === "open" ? "Connected" : connectionWords(),
       freezing.value && pictureWords(),
+      companyWords.value,
       ...limits.value.map((limit) => limit.words),
     ]
       .filter(Boolean)

@@ -13,7 +13,7 @@ function sayFidelity(): void {
 /** What is shown of these views is not what the server has. */
 export function nothingIsExact(shown: string[]): void {
   for (const picture of shown.map((view) => stage.of(view))) {
-    picture.exactRevision = -1;
+    picture.exactRevision = picture.exactShared = -1;
     picture.fidelity = "approximate";
   }
   exact.value = false;
@@ -24,10 +24,17 @@ export function nothingIsExact(shown: string[]): void {
 export function noteShown(of: BakeConnection, header: FrameHeader): void {
   const picture = stage.of(header.view);
   picture.exactRevision = header.exact ? header.revision : -1;
+  picture.exactShared = header.exact ? header.shared : -1;
   picture.fidelity = header.fidelity;
   if (header.was_off !== null) movingError.value = header.was_off;
-  exact.value = stage.shown.every((each) => each.exactRevision >= of.session.revision);
   sayFidelity();
+  sayExact(of);
+}
+
+/** Say whether all that is on the screens is exact for what was sent, and for what others have made of the look. */
+export function sayExact(of: BakeConnection): void {
+  const { revision, shared } = of.session;
+  exact.value = stage.shown.every((each) => each.exactRevision >= revision && each.exactShared >= shared);
   if (exact.value) for (const done of waiters.splice(0)) done();
 }
 

@@ -7,10 +7,9 @@ import type { HelloMessage, Look, PatchOp, SharedMessage } from "../protocol";
 import { connection } from "../state/connection";
 import { defaultLook, look } from "../state/look";
 import { selectedMaterial } from "../state/selection";
-import { shownViews } from "../state/views";
 import { door, keepSeat, ownName, people, seatIn, you } from "../state/together";
 import { connections, send, type BakeConnection } from "./connections";
-import { nothingIsExact } from "./exactness";
+import { sayExact } from "./exactness";
 import { want } from "./want";
 
 /** A room's look with the own ways of looking, which the room leaves to each. */
@@ -51,7 +50,7 @@ export function followShared(of: BakeConnection, message: SharedMessage, shared:
   if (passed !== null) passing.value = { ...passed, before: rebased(passed.before, message.patch as PatchOp[]) };
   const own = look.peek();
   look.value = own === null || shared.transport === own.transport ? shared : { ...shared, transport: own.transport };
-  nothingIsExact(shownViews.peek());
+  sayExact(of);
 }
 
 /** A new session in the room takes over from an old one: what that one has not brought there yet is brought by this. */

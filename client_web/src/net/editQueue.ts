@@ -92,25 +92,31 @@ export class EditQueue {
   join(look: Look, revision: number, solo: readonly string[] | null): void {
     const patch = this.isShared ? this.unconfirmed(revision) : [];
     this.reset(look, revision, solo, true);
-    this.way = patch;
-    if (this.wanted !== null) this.wanted = { ...this.wanted, look: patch.length > 0 ? rebased(look, patch) : look };
+    this.rebase(patch);
   }
 
   /** What was edited and is not known to be in the room's look, after a revision. */
   unconfirmed(after = 0): readonly PatchOp[] {
     const edits = this.outstanding.filter(({ revision }) => revision > after);
-    return [...edits.flatMap(({ patch }) => patch), ...(this.way ?? [])];
+    return [...edits.flatMap(({ patch }) => patch), ...this.unsent];
+  }
+
+  /** What leads from what was sent to what is wanted. */
+  private get unsent(): readonly PatchOp[] {
+    if (this.sent === null || this.wanted === null) return [];
+    return this.way ?? differenceOf(this.sent, this.wanted.look);
   }
 
   /** The room's look has become another, with the own edits up to a revision in it; an empty patch: by those alone. Gives
    * what is wanted now: the own edits after them stay on top. */
   follow(patch: readonly PatchOp[], revision: number): Look | null {
+    const unsent = this.unsent;
     const own = this.outstanding.findLast((edit) => edit.revision <= revision);
     this.confirmed = own?.look ?? this.confirmed;
     this.outstanding = this.outstanding.filter((edit) => edit.revision > revision);
     if (patch.length > 0 && this.confirmed !== null) {
       this.confirmed = rebased(this.confirmed, patch);
-      this.rebase();
+      this.rebase(unsent);
     }
     return this.look;
   }
@@ -120,13 +126,13 @@ export class EditQueue {
     return this.wanted?.look ?? this.confirmed;
   }
 
-  /** Put what is not confirmed on top of what is. */
-  private rebase(): void {
+  /** Put what is not confirmed on top of what is, and what was not sent on top of that. */
+  private rebase(unsent: readonly PatchOp[]): void {
     let look = this.confirmed as Look;
     this.outstanding = this.outstanding.map((edit) => ({ ...edit, look: (look = rebased(look, edit.patch)) }));
     this.sent = look;
-    if (this.wanted !== null) this.wanted = { ...this.wanted, look: this.way?.length ? rebased(look, this.way) : look };
-    this.way ??= [];
+    if (this.wanted !== null) this.wanted = { ...this.wanted, look: rebased(look, unsent) };
+    this.way = unsent;
   }
 
   /** The user wants this now; `change` is the edit that made the look, where one did. */
@@ -176,9 +182,10 @@ export class EditQueue {
   /** The server refused a revision: what it holds is no longer known; returns the last look it accepted. In a room, the
    * look without that edit. */
   refuse(revision: number): Look | null {
+    const unsent = this.unsent;
     this.outstanding = this.outstanding.filter((entry) => entry.revision !== revision);
     if (this.isShared) {
-      this.rebase();
+      this.rebase(unsent);
       return this.wanted?.look ?? null;
     }
     this.sent = this.way = null;

@@ -51,6 +51,8 @@ export class Session {
   private sentThisFrame = false;
   /** The only look that there is for one who may not edit; null for who may. */
   private fixed: Look | null = null;
+  /** How often the room's look had changed when others changed it last. */
+  shared = 0;
 
   constructor(
     readonly bake: string,
@@ -123,6 +125,7 @@ export class Session {
     this.socket.greet(message.resume);
     const look = message.look as unknown as Look;
     this.fixed = message.role === "view" ? look : null;
+    this.shared = 0;
     if (message.room === null || message.room.created) {
       this.queue.reset(look, message.revision, message.solo, message.room !== null);
     } else this.queue.join(look, message.revision, message.solo);
@@ -134,6 +137,7 @@ export class Session {
   private follow(message: SharedMessage): void {
     const look = this.queue.follow(message.patch as PatchOp[], message.revision);
     if (this.fixed !== null) this.fixed = look;
+    if (message.patch.length > 0) this.shared = message.shared;
     if (message.patch.length > 0) this.handlers.shared(message, look);
   }
 

@@ -39,6 +39,8 @@ export class Picture {
   revision = 0;
   /** The revision for which it is exact; −1 while it is not. */
   exactRevision = -1;
+  /** The same of what a room's look has become. */
+  exactShared = -1;
   fidelity: Fidelity = "preview";
   screen: Shows | null = null;
 

@@ -20,6 +20,13 @@ export const you = signal<number | null>(null);
 /** Whether others share this look. */
 export const isTogether = computed(() => you.value !== null);
 
+/** Who else is here, in words that change seldom; null where nobody is. */
+export const companyWords = computed(() => {
+  const others = people.value.filter(({ number }) => number !== you.value);
+  const named = others.map(({ name, here }) => (here ? name : `${name}, whose connection is lost`));
+  return named.length === 0 ? null : `Together with ${named.join(", ")}`;
+});
+
 /** Come by a link that lets nobody edit. */
 export const watching = computed(() => door.value !== null && door.value.room === null);
 

@@ -7,7 +7,7 @@ found when it can be sent: however much others edit and however slowly a client 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from relume.errors import ParameterError
@@ -69,21 +69,26 @@ class Guest:
             people=self._told_people,
         )
 
-    def edited(self, target: Target) -> None:
-        """The session's own edit was accepted: everybody else follows, where it is more than another way of looking."""
+    def edited(self, target: Target) -> Target:
+        """The session's own edit was accepted: everybody else follows, where it is more than another way of looking.
+
+        Returns:
+            What is to be shown here, which says how often the room's look has changed.
+        """
         is_seen = bool(difference(self._room.document, target.document, OWN))
         self._room.document = target.document
+        self._room.num_changes += is_seen
+        target = replace(target, shared=self._room.num_changes)
         self._note(self._seat.number, is_own=True)
-        if not is_seen:
-            return
         for other in self._room.guests:
-            if other is not self:
+            if is_seen and other is not self:
                 other.follow(target, self._seat.number)
+        return target
 
-    def taken_back(self, target: Target) -> None:
+    def taken_back(self, target: Target) -> Target:
         """An edit of this session turned out not to be possible: all, and its own client, go back to this look."""
-        self.edited(target)
         self._has_others = True
+        return self.edited(target)
 
     def follow(self, target: Target, author: int) -> None:
         """Show what somebody else has made of the look."""
@@ -131,9 +136,10 @@ class Guest:
         if not patch and revision == self._told_revision:
             return None
         self._told, self._told_revision = document, revision
-        return SharedMessage(revision=revision, patch=[SharedOperation(**each) for each in patch], by=authors)
+        operations = [SharedOperation(**each) for each in patch]
+        return SharedMessage(revision=revision, shared=self._room.num_changes, patch=operations, by=authors)
 
-    def leave(self) -> None:
-        """The session has ended."""
+    def leave(self, *, is_for_good: bool) -> None:
+        """The session has ended; `is_for_good` where the client said so, else it may come back."""
         self._room.guests.remove(self)
-        self._room.stand_up(self._seat)
+        self._room.stand_up(self._seat, is_for_good=is_for_good)

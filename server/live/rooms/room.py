@@ -29,14 +29,14 @@ class Room:
     """One shared look.
 
     Attributes:
-        document: the complete look, seen as whoever edited last sees it.
+        document: the complete look, seen as whoever edited last sees it. num_changes: that it has seen.
         guests: sessions that are in it.
     """
 
     def __init__(
         self, document: dict[str, Any], max_people: int, away_seconds: float, emptied: Callable[[], None]
     ) -> None:
-        self.document = document
+        self.document, self.num_changes = document, 0
         self.guests: list[Guest] = []
         self._seats: dict[str, Seat] = {}
         self._max_people, self._away_seconds, self._emptied = max_people, away_seconds, emptied
@@ -70,10 +70,12 @@ class Room:
         self._seats[seat.token] = seat
         return seat
 
-    def stand_up(self, seat: Seat) -> None:
-        """A session of somebody has ended; their place is kept for a while."""
+    def stand_up(self, seat: Seat, *, is_for_good: bool) -> None:
+        """A session of somebody has ended; their place is kept for a while, unless that was the last one for good."""
         seat.num_sessions -= 1
-        if seat.num_sessions == 0:
+        if seat.num_sessions == 0 and is_for_good:
+            self._leave(seat)
+        elif seat.num_sessions == 0:
             seat.leaving = asyncio.get_running_loop().call_later(self._away_seconds, self._leave, seat)
         self.tell_people()
 

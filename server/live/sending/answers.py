@@ -102,6 +102,7 @@ class Answers:
         header = FrameHeader(
             frame=frame,
             revision=viewport.target.revision,
+            shared=viewport.target.shared,
             view=viewport.name,
             width=width,
             height=height,

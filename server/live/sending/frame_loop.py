@@ -272,5 +272,5 @@ class FrameLoop:
             if is_own:
                 self._look.revert(before)
             if is_own and self._guest is not None:
-                self._guest.taken_back(before)
+                self._pending.target = self._guest.taken_back(before)
         await self._work.quick(painter.accept, self._pictures(), before)

@@ -139,6 +139,7 @@ def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mappi
     return FrameHeader(
         frame=request.frame,
         revision=request.target.revision,
+        shared=request.target.shared,
         view=request.view,
         width=request.size[0],
         height=request.size[1],

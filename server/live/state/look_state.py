@@ -26,9 +26,9 @@ class LookState:
         self.num_edits = 0
         self._materials: dict[str, tuple[Any, MaterialLook]] = {}
 
-    def target(self) -> Target:
-        """The look as something to show."""
-        return Target(self._read(self.document), self.document, self.revision, None, solo=self.solo)
+    def target(self, shared: int = 0) -> Target:
+        """The look as something to show; `shared` as in `Target`."""
+        return Target(self._read(self.document), self.document, self.revision, None, solo=self.solo, shared=shared)
 
     def apply(self, message: EditMessage, received_s: float) -> Target:
         """Apply an edit that came at `received_s`, whole or not at all.
@@ -52,7 +52,7 @@ class LookState:
     def follow(self, document: dict[str, Any], of: Target) -> Target:
         """Show a document that somebody else's edit led to, as they see it; the revision stays."""
         self.document = document
-        return Target(self._read(document), document, self.revision, of.received_s, of.hand, self.solo)
+        return Target(self._read(document), document, self.revision, of.received_s, of.hand, self.solo, of.shared)
 
     def revert(self, shown: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""
