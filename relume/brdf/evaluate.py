@@ -70,7 +70,7 @@ def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
     value = np.moveaxis(term.quotients(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0)), 0, -1)
     value = value * np.asarray(term_document.get("color", (1.0, 1.0, 1.0)), np.float64)
-    for curve in term.curves:
+    for curve in term.curves_in(term_document):
         gamma = angles_numpy(curve.angle, wi, wo, curve.axes)
         value = value * np.moveaxis(curve_values(term_document, curve, gamma), 0, -1)
     return np.asarray(value)

@@ -52,11 +52,12 @@ class Quadrature:
         term, fixed = declared.settled(term_document), declared.fixed_values(term_document)
         quotient = _quotient(self, declared.model, fixed)
         given = json.dumps([term_document.get("params"), term_document.get("curves")], sort_keys=True)
-        curves = [_curve(declared.model, fixed, index, given) for index in range(len(term.curves))]
+        shown = term.curves_in(term_document)
+        curves = [_curve(declared.model, fixed, curve.name, given) for curve in shown]
         is_grey = len(quotient) == 1 and all((curve == curve[0]).all() for curve in curves)
         num_channels = 1 if is_grey else 3
         out = np.repeat(quotient, num_channels // len(quotient), axis=0)
-        for curve, values in zip(term.curves, curves, strict=True):
+        for curve, values in zip(shown, curves, strict=True):
             places = _places(self, curve.angle, curve.axes)
             for channel in range(num_channels):
                 _multiply(places, values[channel], out[channel])
@@ -70,11 +71,11 @@ def _angles() -> F64:
 
 
 @lru_cache(maxsize=32)
-def _curve(model: str, fixed: Fixed, index: int, given: str) -> F64:
+def _curve(model: str, fixed: Fixed, name: str, given: str) -> F64:
     """A curve of a term at `_angles`: what is asked at one pair of directions after another. (3, `_STEPS` + 1)"""
     term, (params, drawn) = TERMS[model].settled_by(fixed), json.loads(given)
     document = {"model": model, **dict(fixed), "params": params, "curves": drawn}
-    return np.ascontiguousarray(curve_values(document, term.curves[index], _angles()))
+    return np.ascontiguousarray(curve_values(document, term.curve(name), _angles()))
 
 
 @lru_cache(maxsize=32)

@@ -92,11 +92,20 @@ class Curve:
         return self.angle is Angle.THETA_O
 
 
+def _one(gamma: F64, params: Params) -> F64:
+    return np.ones_like(gamma)
+
+
+VIEW = Curve("theta_o", "view angle θo", Angle.THETA_O, _one, (), 64)
+"""What any term may depend on besides (Ben-Artzi 2006, section 4.4): one at every angle until it is drawn."""
+
+
 @dataclass(frozen=True)
 class Term:
     """One BRDF term, 1/sr without the cosine: quotient(wi, wo) · Π curves.
 
     Attributes:
+        curves: those that are declared, and `VIEW` where none of them is of the outgoing angle; or none at all.
         model: name in look documents.
         quotient: ufunc (wi_x, wi_y, wi_z, wo_x, wo_y, wo_z) -> value, local frame, z = normal; float32 and float64
             loops; zero where either direction is below the horizon. With three channels, three values, channels first.
@@ -127,6 +136,19 @@ class Term:
     data: AssetStore | None = None
     texels: Any = None
     width: tuple[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.curves and not any(curve.outgoing for curve in self.curves):
+            object.__setattr__(self, "curves", (*self.curves, VIEW))
+
+    def curves_in(self, document: Mapping[str, Any]) -> tuple[Curve, ...]:
+        """The curves that make a difference in a term document: not `VIEW` where it is not drawn.
+
+        Args:
+            document: a term of a look, complete or not.
+        """
+        drawn = document.get("curves") or {}
+        return tuple(curve for curve in self.curves if curve is not VIEW or VIEW.name in drawn)
 
     @property
     def needs_data(self) -> bool:

@@ -38,7 +38,7 @@ F64 = NDArray[np.float64]
 Settings = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 MAX_ERROR = 2e-2
-MAX_NODES = 32
+MAX_NODES = 36
 _ENOUGH = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
 _NUM_VALUES = 97
 _BANDS_BESIDE = 12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
@@ -153,7 +153,7 @@ class Linearised:
 
 
 def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:
-    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or 32 are too few."""
+    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or `MAX_NODES` are too few."""
     others = _others(document, parameter)
     return None if others is None else _linearised(document["model"], parameter, others)
 

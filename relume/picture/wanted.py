@@ -45,6 +45,6 @@ class Wanted:
         declared = TERMS[document["model"]]
         term = declared.settled(document)
         bands = {c.name: level_bands(document, c, levels) for c in term.curves if not c.outgoing}
-        values = [level_values(document, c, theta_o, levels) for c in term.curves if c.outgoing]
+        values = [level_values(document, c, theta_o, levels) for c in term.curves_in(document) if c.outgoing]
         outgoing = np.asarray(np.prod(values, axis=0), np.float32) if values else None
         return cls(document, term, (document["model"], declared.fixed_values(document)), bands, outgoing)

@@ -271,7 +271,7 @@ def _factor(table: _Tables, points: Points, p: int, cos_theta_o: float) -> F64:
     if channel is not None:
         factor = factor * points.textures[channel][p]
     theta_o = np.arccos(np.clip(np.array([cos_theta_o]), 0.0, 1.0))
-    for curve in table.term.curves:
+    for curve in table.term.curves_in(table.document):
         if curve.outgoing:
             factor = factor * curve_values(table.document, curve, theta_o)[:, 0]
     return factor

@@ -12,7 +12,7 @@ from brdf_closed_forms import CLOSED_FORMS, complex_fresnel, directions
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel
 from relume.brdf.registry import TERMS, describe
-from relume.brdf.term import Angle
+from relume.brdf.term import VIEW, Angle
 
 MODELS = sorted(ANALYTIC)
 
@@ -110,7 +110,7 @@ def test_lambert_passes_the_white_furnace():
             {"model": "ashikhmin_shirley", "params": {"nu": nu, "nv": nv, "f0": 1.0}}
             for nu, nv in ((1, 1), (10, 200), (500, 5), (1000, 1000))
         ),
-        *({"model": "cook_torrance", "params": {"sigma": s, "ior": 5, "extinction": 10}} for s in (0.1, 0.4, 1.0)),
+        *({"model": "cook_torrance", "params": {"sigma": s, "ior": 5, "extinction": 10}} for s in (0.1, 0.4, 1.0, 2.0)),
     ],
     ids=lambda d: f"{d['model']}-{'-'.join(map(str, d['params'].values()))}",
 )
@@ -232,7 +232,17 @@ def test_facet_distributions_project_onto_the_surface_they_cover(width):
     assert hemisphere_integral(blinn, {"exponent": 1 / width**2}, 1) == pytest.approx(1.0, rel=1e-8)
 
 
-@pytest.mark.parametrize("sigma", [0.01, 0.05, 0.2, 1.0])
+@pytest.mark.parametrize(("model", "name"), [("cook_torrance", "sigma"), ("ward", "alpha"), ("ward_duer", "alpha")])
+def test_slopes_reach_two(model, name):
+    """There facets are steeper than flat on the mean, and D still projects onto the surface."""
+    parameter = TERMS[model].parameter(name)
+    assert parameter.maximum == 2.0
+    power, area = (1, np.pi) if model == "cook_torrance" else (-3, 0.25)
+    found = hemisphere_integral(TERMS[model].curve("theta_h"), {name: parameter.maximum}, power)
+    assert found == pytest.approx(area, rel=1e-8)
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.05, 0.2, 1.0, 2.0])
 def test_cook_torrance_peak_is_f0_over_four_pi_sigma_squared(sigma):
     n = np.array([0.0, 0.0, 1.0])
     value = eval_brdf({"model": "cook_torrance", "params": {"sigma": sigma, "ior": 1.5}}, n, n)
@@ -332,4 +342,24 @@ def test_description_is_json_for_every_term():
 def test_outgoing_is_the_view_angle_alone():
     outgoing = {t.model for t in TERMS.values() for c in t.curves if c.outgoing}
     assert outgoing == {t.model for t in TERMS.values() for c in t.curves if c.angle is Angle.THETA_O}
-    assert outgoing == {"ggx", "measured_lv", "measured_hf"}
+    assert outgoing == set(TERMS) - {"measured_btf"}  # which has no curves
+    declared = {t.model for t in TERMS.values() for c in t.curves if c.outgoing and c is not VIEW}
+    assert declared == {"ggx", "measured_lv", "measured_hf"}
+
+
+@pytest.mark.parametrize("model", ANALYTIC)
+def test_any_term_may_depend_on_the_view_angle(model):
+    """Drawn, the curve multiplies by what it is at θo; until then it is not even looked at."""
+    rng = np.random.default_rng(11)
+    wi, wo = directions(rng, 200), directions(rng, 200)
+    plain = {"model": model, "color": [1, 1, 1], "params": {}, "curves": {}}
+    drawn = {**plain, "curves": {"theta_o": {"bands": [3.0] * 32 + [0.5] * 32}}}
+    before = eval_brdf(plain, wi, wo)
+    if model == "ggx":  # masking, in the place of which it stands
+        alpha = TERMS["ggx"].parameter("roughness").default ** 2
+        tan2 = 1 / wo[:, 2] ** 2 - 1
+        before = before / (2 / (1 + np.sqrt(1 + alpha**2 * tan2)))[:, None]
+    factor = np.where(np.arccos(wo[:, 2]) < np.pi / 4, 3.0, 0.5)
+    np.testing.assert_allclose(eval_brdf(drawn, wi, wo), before * factor[:, None], rtol=1e-9)
+    term = TERMS[model]
+    assert (VIEW in term.curves_in(plain), VIEW in term.curves_in(drawn)) == (False, model != "ggx")

@@ -371,7 +371,9 @@ def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, asid
     """Direct light of soft sources, and reflected: the points of a small scene lie close enough for five per cent."""
 
     def plain(document):
-        document["materials"]["Wall"]["terms"] = [{"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}}]
+        curves = {"theta_o": {"points": [[0, 1.5], [90, 0.5]]}}
+        wall = {"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}, "curves": curves}
+        document["materials"]["Wall"]["terms"] = [wall]
 
     changes = (plain, light("Panel", on=False), light("Lamp", on=False), transport(show=show))
     look = look_of(moving, lit(*changes))

@@ -37,7 +37,7 @@ from relume.scene.model import Light, Material
         ("/materials/Teapot/terms/1/color", [True, 1, 1], "/materials/Teapot/terms/1/color/0", "[0, 10000]"),
         ("/materials/Teapot/terms/1/params", {"roughness": 1}, "/materials/Teapot/terms/1/params/roughness", "'sigma'"),
         ("/materials/a~1b~0c/terms/0/params/f0", [1, 2, 0], "/materials/a~1b~0c/terms/0/params/f0/1", "[0, 1]"),
-        *((SIGMA, bad, SIGMA, "[0.005, 1]") for bad in (0, 1.5, NAN, INF, -INF, True, None, "0.2", 10**400, [], {})),
+        *((SIGMA, bad, SIGMA, "[0.005, 2]") for bad in (0, 2.5, NAN, INF, -INF, True, None, "0.2", 10**400, [], {})),
         (CURVES, {"theta_i": {"points": points(3)}}, f"{CURVES}/theta_i", "'theta_h'"),
         (f"{CURVES}/theta_h", 7, f"{CURVES}/theta_h", "an object"),
         (f"{CURVES}/theta_h", {}, f"{CURVES}/theta_h", "points or bands"),

@@ -58,7 +58,8 @@ def picture(scene, tmp_path_factory):
 def test_picture_of_a_term_is_brute_force(model, scene, picture) -> None:
     transfer, live = picture
     params, bound = CASES[model]
-    term = {"model": model, "color": [0.8, 0.5, 0.3], "params": params, "texture": None}
+    curves = {"theta_o": {"points": [[0, 1.0], [50, 0.8], [90, 0.3]]}} if model != "ggx" else {}
+    term = {"model": model, "color": [0.8, 0.5, 0.3], "params": params, "texture": None, "curves": curves}
     look = validate({"materials": {m.name: {"terms": [term]} for m in scene.materials}}, transfer.default_look)
     live.set_look(look)
     found = settle(live).image()

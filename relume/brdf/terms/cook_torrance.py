@@ -45,7 +45,7 @@ COOK_TORRANCE = Term(
     model="cook_torrance",
     label="Cook–Torrance",
     parameters=(
-        Parameter("sigma", "Roughness σ", 0.005, 1.0, 0.2, "", "log", "Root-mean-square slope of the facets."),
+        Parameter("sigma", "Roughness σ", 0.005, 2.0, 0.2, "", "log", "Root-mean-square slope of the facets."),
         Parameter("ior", "Refraction η", 1.0, 10.0, 1.5, "", "log", "Index of refraction; glass and plastic 1.5."),
         Parameter("extinction", "Extinction k", 0.0, 10.0, 0.0, "", "linear", "Absorption; 0 for dielectrics."),
     ),

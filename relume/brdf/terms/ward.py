@@ -39,7 +39,7 @@ def facets(theta_h: F64, params: Params) -> F64:
 WARD = Term(
     model="ward",
     label="Ward",
-    parameters=(Parameter("alpha", "Width α", 0.005, 1.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
+    parameters=(Parameter("alpha", "Width α", 0.005, 2.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
     curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("alpha",), 256),),
     quotient=quotient,
     source="Ward 1992, eq. 4: f = exp(-tan² θh / α²) / (4π α² √((n·wi)(n·wo)))",

@@ -24,7 +24,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 WARD_DUER = Term(
     model="ward_duer",
     label="Ward–Dür",
-    parameters=(Parameter("alpha", "Width α", 0.005, 1.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
+    parameters=(Parameter("alpha", "Width α", 0.005, 2.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
     curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("alpha",), 256),),
     quotient=quotient,
     source="Dür 2006: f = exp(-tan² θh / α²) / (4π α² (n·wi)(n·wo))",
