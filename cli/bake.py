@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,6 +36,12 @@ def bake(
     points: Annotated[
         int | None, typer.Option(metavar="N", help="Points of a moving view, method surface. [default: 50000]")
     ] = None,
+    gather_samples: Annotated[
+        int | None, typer.Option(metavar="N", help="Pieces of surfaces that light each other. [default: as fits]")
+    ] = None,
+    gather_rays: Annotated[
+        int | None, typer.Option(metavar="N", help="Rays of a sample that look for them. [default: 610; surface: 256]")
+    ] = None,
     relightable: Annotated[
         bool, typer.Option("--relightable", help="Divide the light so that the environment can be turned or exchanged.")
     ] = False,
@@ -57,7 +64,9 @@ def bake(
     try:
         record = find_scene(service.ledger, scene)
         views = chosen_views(service.ledger, record, [*(view or ()), *(read_camera(path) for path in camera or ())])
-        identity = service.submit(record.id, _recipe(method, views, size, lights, points, relightable))
+        recipe = _recipe(method, views, size, lights, points, relightable)
+        recipe = replace(recipe, gather_samples=gather_samples, gather_rays=gather_rays)
+        identity = service.submit(record.id, recipe)
         if not watch:
             typer.echo(identity)
             return 0

@@ -30,6 +30,8 @@ class Recipe:
         relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
         cameras: those of `views` that somebody placed; the others came with the scene.
         num_points: that light is kept at for an eye that moves; methods of fixed views have none.
+        gather_samples: pieces of surfaces that reflected light is kept for (cells). gather_rays: of each view sample,
+            or point, that look for them. None: as many as the method finds fit; `direct` has none.
     """
 
     method: str
@@ -39,6 +41,8 @@ class Recipe:
     relightable: bool = False
     cameras: tuple[PlacedCamera, ...] = ()
     num_points: int = 50_000
+    gather_samples: int | None = None
+    gather_rays: int | None = None
 
     def seen(self, scene: Scene) -> Scene:
         """The scene with the cameras that this recipe brings: what its method plans and bakes."""

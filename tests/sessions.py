@@ -9,6 +9,7 @@ from analytic_terms import ANALYTIC
 
 from relume.bake import Recipe
 from relume.brdf.registry import TERMS
+from relume.brdf.term import VIEW
 from relume.look import validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_transfer
@@ -114,7 +115,8 @@ def random_edit(rng, document):
             parameter.name: random_value(rng, parameter, parameter.name in declared.fixed),
         }
     elif kind == "curve":
-        curve = declared.curves[rng.integers(len(declared.curves))]
+        curves = [curve for curve in declared.curves if curve is not VIEW]  # which multiplies finished samples, no more
+        curve = curves[rng.integers(len(curves))]
         term["curves"] = {**term["curves"], curve.name: random_curve(rng, curve.num_bands)}
     elif kind == "reset":
         term["curves"] = {}

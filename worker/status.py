@@ -113,6 +113,8 @@ def recipe_from_json(text: str) -> Recipe:
         bool(document["relightable"]),
         tuple(read_placed(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
         int(document.get("num_points", Recipe.num_points)),
+        document.get("gather_samples"),
+        document.get("gather_rays"),
     )
 
 

@@ -75,4 +75,8 @@ test("recipes are whole numbers within bounds", () => {
   for (const size of [[0, 9], [640, Number.NaN], [20.5, 20], [99999, 100]] as [number, number][])
     expect(recipeProblem({ size, lights: 9 })).toMatch("whole pixels");
   expect(recipeProblem({ size: [640, 480], lights: 0 })).toMatch("light triangles");
+  const good = { size: [640, 480] as [number, number], lights: 9 };
+  expect(recipeProblem({ ...good, gather_samples: 64, gather_rays: 4096 })).toBeNull();
+  expect(recipeProblem({ ...good, gather_samples: 63 })).toMatch("64 to 65,535 gather samples");
+  for (const gather_rays of [15, 4097, 20.5, Number.NaN]) expect(recipeProblem({ ...good, gather_rays })).toMatch("rays a sample");
 });

@@ -12,11 +12,14 @@ from typing import Any
 from numpy.typing import NDArray
 
 from relume.bake import Recipe
+from relume.errors import PlanError
 from relume.eye.layers import most_layers, most_shown
 from relume.eye.merged import POSITIONS_A_PIXEL
+from relume.light.gather_rays import MAX_RAYS
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
 
+MIN_GATHER_SAMPLES, MIN_GATHER_RAYS = 64, 16
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 
 _TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
@@ -108,3 +111,24 @@ def _textures(scene: Scene) -> list[Texture]:
 
 def _arrays(mesh: Mesh) -> list[NDArray[Any]]:
     return [mesh.positions, mesh.normals, mesh.tangents, mesh.uvs, mesh.faces]
+
+
+def check_gathering(recipe: Recipe, most_samples: int) -> None:
+    """Refuse numbers of gather samples and rays that no store can have.
+
+    Args:
+        recipe: whose `gather_samples` and `gather_rays` are looked at. most_samples: that the method can keep; 0 where
+            it gathers no light.
+    Raises:
+        PlanError: they are out of bounds.
+    """
+    for number, least, most, what in (
+        (recipe.gather_samples, MIN_GATHER_SAMPLES, most_samples, "gather samples"),
+        (recipe.gather_rays, MIN_GATHER_RAYS, MAX_RAYS, "gather rays"),
+    ):
+        if number is None:
+            continue
+        if most_samples == 0:
+            raise PlanError(f"{number} {what} were asked for; method {recipe.method} has none, leave them out")
+        if not least <= number <= most:
+            raise PlanError(f"{number} {what} were asked for; give {least} to {most:,}")

@@ -10,6 +10,7 @@ from typing import Any
 
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.memory import Memory
+from relume.methods import bounds
 from relume.methods.sampled_views import SampledViews
 from relume.methods.transfer import BakedViews, described
 from relume.scene.model import Scene
@@ -26,6 +27,7 @@ class DirectMethod:
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
+        bounds.check_gathering(recipe, 0)
         return self._views.plan(scene, recipe)
 
     def prepare(self, scene: Scene) -> None:

@@ -76,27 +76,27 @@ class GatherMethod:
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
-        direct, cells = self._views.plan(scene, recipe), _num_cells(recipe)
+        bounds.check_gathering(recipe, MAX_CELLS)
+        direct, cells, (rays, _) = self._views.plan(scene, recipe), _num_cells(recipe), self._rays_of(recipe)
         points, bits = POINTS_A_CELL * cells, (recipe.num_lights + 7) // 8
         return Plan(
             num_view_samples=direct.num_view_samples,
-            num_rays=direct.num_rays
-            + direct.num_view_samples * self._rays
-            + points * (RAYS_A_POINT + recipe.num_lights),
+            num_rays=direct.num_rays + direct.num_view_samples * rays + points * (RAYS_A_POINT + recipe.num_lights),
             store_bytes=direct.store_bytes
-            + direct.num_view_samples * (2 * self._rays + 4)
+            + direct.num_view_samples * (2 * rays + 4)
             + cells * _BYTES_A_CELL
             + points * bits,
             peak_bytes=direct.peak_bytes
             + cells * _MAKING_BYTES_A_CELL
             + bounds.num_triangles(scene) * _NORMAL_BYTES
-            + SHARD_ROWS * (3 * 2 * self._rays + _SHARD_ROW_BYTES),
+            + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES),
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material, and
         `gather_tents`: how often they are shared."""
-        plain, glossy = [self._rays, 0], [self._rays - self._glossy, self._glossy]
+        rays, about_mirror = self._rays_of(recipe)
+        plain, glossy = [rays, 0], [rays - about_mirror, about_mirror]
         direct = self._views.attributes(scene, recipe)
         terms = [direct["look"]["materials"][material.name]["terms"] for material in scene.materials]
         return {
@@ -131,7 +131,7 @@ class GatherMethod:
         of_views = [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
             for k, rows in enumerate(self._views.sampled_of(store).num_surface_samples)
-            for name, width, dtype in (("links", (self._rays,), "uint16"), ("number", (), "uint32"))
+            for name, width, dtype in (("links", (self._rays_of(recipe)[0],), "uint16"), ("number", (), "uint32"))
         ]
         return [*of_cells, *of_views]
 
@@ -142,6 +142,11 @@ class GatherMethod:
         if task.stage == _CELLS:
             return self._cells(scene, recipe)
         return self._of_view(scene, recipe, task, store) if task.view else self._of_cells(scene, task, store)
+
+    def _rays_of(self, recipe: Recipe) -> tuple[int, int]:
+        """Rays of a view sample, and of those where its material has a highlight: the same share of any number."""
+        rays = recipe.gather_rays or self._rays
+        return rays, round(rays * self._glossy / self._rays)
 
     def _cells(self, scene: Scene, recipe: Recipe) -> Written:
         cells = choose_cells(scene, self._views.geometry_of(scene), recipe.views, recipe.size, _num_cells(recipe))
@@ -177,6 +182,8 @@ class GatherMethod:
 
 
 def _num_cells(recipe: Recipe) -> int:
-    """As many as the pictures' pixels can tell apart."""
+    """As many as the pictures' pixels can tell apart, where the recipe does not say."""
+    if recipe.gather_samples is not None:
+        return recipe.gather_samples
     width, height = recipe.size
     return min(MAX_CELLS, max(_FEWEST_CELLS, len(recipe.views) * width * height // _PIXELS_A_CELL))

@@ -45,10 +45,11 @@ ROWS_A_SHARD = 4096
 RAYS_A_POINT = 256
 RAYS_A_CELL_POINT = 55
 _FEWEST_CELLS, _MOST_CELLS, _POINTS_A_CELL = 512, 8192, 6
+_MOST_ASKED_CELLS = 4 * _MOST_CELLS
 MIN_POINTS = 64
 _MOST_ALIKE = 54  # points of a material, on both sides, in each of 27 directions
 _MORE_POINTS = 1.05  # than asked for, at most
-_POINT_BYTES = 3 * 12 + 2 + 2 * RAYS_A_POINT
+_POINT_BYTES = 3 * 12 + 2
 _VERTEX_BYTES = 12 + 2 * 4 * POINTS_A_VERTEX
 _MAKING_BYTES_A_NODE = 600  # while nodes are shared: their surface, their keys, and the order of these
 _CELL_BYTES = POINTS_A_CELL * (24 + 2 * RAYS_A_CELL_POINT) + 64
@@ -75,20 +76,21 @@ class SurfaceMethod:
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
+        bounds.check_gathering(recipe, _MOST_ASKED_CELLS)
         checked = self._views.plan(scene, recipe)
         if not MIN_POINTS <= recipe.num_points <= MAX_POINTS:
             raise PlanError(f"{recipe.num_points} points were asked for; give {MIN_POINTS} to {MAX_POINTS:,}")
         most_alike = _MOST_ALIKE * len(scene.materials)  # that cannot be shared, however few are asked for
         points, bits = int(_MORE_POINTS * recipe.num_points) + most_alike, (recipe.num_lights + 7) // 8
-        num_cells = _num_cells(recipe)
+        num_cells, rays = _num_cells(recipe), _rays_of(recipe)
         of_cells = POINTS_A_CELL * num_cells
         nodes = most_nodes(bounds.num_triangles(scene), recipe.num_points)
         triangles = bounds.num_triangles(scene)
         textures = bounds.texture_bytes(scene)
         return Plan(
             num_view_samples=points,
-            num_rays=points * (recipe.num_lights + RAYS_A_POINT) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT),
-            store_bytes=points * (_POINT_BYTES + bits)
+            num_rays=points * (recipe.num_lights + rays) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT),
+            store_bytes=points * (_POINT_BYTES + 2 * rays + bits)
             + of_cells * bits
             + num_cells * _CELL_BYTES
             + (4 + _VERTEX_BYTES) * nodes
@@ -99,7 +101,11 @@ class SurfaceMethod:
             + textures
             + bounds.lights_bytes(scene, recipe)
             + (1 << 20),
-            peak_bytes=checked.peak_bytes + nodes * _MAKING_BYTES_A_NODE + num_cells * _MAKING_BYTES_A_CELL + textures,
+            peak_bytes=checked.peak_bytes
+            + nodes * _MAKING_BYTES_A_NODE
+            + num_cells * _MAKING_BYTES_A_CELL
+            + ROWS_A_SHARD * 3 * 2 * rays  # links: traced, joined, written
+            + textures,
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -132,7 +138,7 @@ class SurfaceMethod:
         bits = (store.shape("lights/power")[0] + 7) // 8
         widths = {
             "cells": (POINTS_A_CELL * bits, POINTS_A_CELL * RAYS_A_CELL_POINT),
-            "points": (bits, RAYS_A_POINT),
+            "points": (bits, _rays_of(recipe)),
         }
         return [
             ArraySpec(
@@ -155,7 +161,7 @@ class SurfaceMethod:
             return Written(make_harmonic_light(store, int(scene.id[:7], 16)), 0, 0.0)
         if task.view not in ("cells", "points"):
             raise ValueError(f"{task.view!r} is not in the stage")
-        return self._rows(scene, task, store)
+        return self._rows(scene, recipe, task, store)
 
     def _lights(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         geometry = self._views.geometry_of(scene)
@@ -185,7 +191,7 @@ class SurfaceMethod:
         del fields["tree"]
         return {f"cells/{name}": array for name, array in fields.items()}
 
-    def _rows(self, scene: Scene, task: Task, store: StoreReader) -> Written:
+    def _rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
         """What some cells or points see, and what their rays hit."""
         geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
         if task.view == "cells":
@@ -194,7 +200,10 @@ class SurfaceMethod:
                 make_pattern(RAYS_A_CELL_POINT, 0, seed),
             )
         else:
-            points, pattern = read_surface_points(store, task.start, task.stop), pattern_of_points(store, RAYS_A_POINT)
+            points, pattern = (
+                read_surface_points(store, task.start, task.stop),
+                pattern_of_points(store, _rays_of(recipe)),
+            )
         seen = trace_coherent(geometry.embree, points.position, points.normal, self._targets_of(store))
         links = trace_links(geometry, self._tree_of(store), points, points.normal, pattern)
         num_rows = task.stop - task.start
@@ -206,5 +215,12 @@ class SurfaceMethod:
 
 
 def _num_cells(recipe: Recipe) -> int:
-    """Fewer than points: what they send is gathered over hemispheres, which blurs it."""
+    """Fewer than points, where the recipe does not say: what they send is gathered over hemispheres, which blurs it."""
+    if recipe.gather_samples is not None:
+        return recipe.gather_samples
     return min(_MOST_CELLS, max(_FEWEST_CELLS, recipe.num_points // _POINTS_A_CELL))
+
+
+def _rays_of(recipe: Recipe) -> int:
+    """Of a point."""
+    return recipe.gather_rays or RAYS_A_POINT

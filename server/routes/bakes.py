@@ -147,7 +147,8 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     preset = PRESETS[request.preset or "good"]
     lights = request.lights or preset.num_lights
     points = request.points or Recipe.num_points
-    return Recipe(request.method, views, request.size or preset.size, lights, request.relightable, cameras, points)
+    size, gathering = request.size or preset.size, (request.gather_samples, request.gather_rays)
+    return Recipe(request.method, views, size, lights, request.relightable, cameras, points, *gathering)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
@@ -164,6 +165,8 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         size=recipe.size,
         lights=recipe.num_lights,
         points=recipe.num_points,
+        gather_samples=recipe.gather_samples,
+        gather_rays=recipe.gather_rays,
         relightable=recipe.relightable,
         cameras=[CameraBody(**camera.document()) for camera in recipe.cameras],
     )

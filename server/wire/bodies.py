@@ -175,6 +175,8 @@ class BakeRequest(Body):
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
     where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none.
+    `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point,
+    that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`).
     `relightable`: divide the light so that turning or exchanging the environment errs little.
     """
 
@@ -185,6 +187,8 @@ class BakeRequest(Body):
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
     points: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    gather_samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    gather_rays: Annotated[int, Field(ge=1, le=100_000)] | None = None
     relightable: bool = False
     dry_run: bool = False
 
@@ -200,13 +204,16 @@ class PlanBody(Body):
 
 
 class RecipeBody(Body):
-    """What was asked for, complete; `cameras` are those of the `views` that somebody placed."""
+    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `gather_samples`,
+    `gather_rays`: null where the method chooses."""
 
     method: str
     views: list[str]
     size: tuple[int, int]
     lights: int
     points: int
+    gather_samples: int | None
+    gather_rays: int | None
     relightable: bool
     cameras: list[CameraBody]
 

@@ -66,6 +66,14 @@ def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None
 
 
 @linux
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["gather", "surface"])
+def test_many_gather_samples_and_rays_stay_below_their_plan(name: str, blades: Scene) -> None:
+    asked = Recipe(name, ("front",), (16, 16), 40, num_points=1000, gather_samples=4000, gather_rays=1024)
+    check(METHODS[name], blades, asked)
+
+
+@linux
 @pytest.mark.parametrize("make", [large_environment, pytest.param(large_textures, marks=pytest.mark.slow)])
 def test_what_a_scene_brings_is_planned(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]

@@ -44,6 +44,27 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
     return str(done["id"])
 
 
+@pytest.mark.parametrize("method", ["gather", "surface"])
+def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dict[str, Any], method: str) -> None:
+    request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "points": 500, "dry_run": True}
+    usual, asked = (
+        client.post("/api/bakes", json=request | more).json()
+        for more in ({}, {"gather_samples": 4000, "gather_rays": 1000})
+    )
+    assert (usual["recipe"]["gather_samples"], usual["recipe"]["gather_rays"]) == (None, None)
+    assert (asked["recipe"]["gather_samples"], asked["recipe"]["gather_rays"]) == (4000, 1000)
+    for count in ("rays", "store_bytes", "peak_bytes"):
+        assert asked["plan"][count] > usual["plan"][count]
+    for bad in (
+        {"gather_samples": 10**6},
+        {"gather_rays": 5000},
+        {"gather_rays": 0},
+        {"method": "direct", "gather_rays": 9},
+    ):
+        refused = client.post("/api/bakes", json=request | bad)
+        assert refused.status_code == 422, refused.text
+
+
 @pytest.fixture
 def session(client: TestClient, bake: str) -> Iterator[Session]:
     with open_session(client, bake) as session:

@@ -12,6 +12,8 @@ export interface BakeChoice {
   preset?: Preset;
   size?: Size;
   lights?: number;
+  gather_samples?: number;
+  gather_rays?: number;
   /** Divided for light that will be turned or exchanged. */
   relightable?: boolean;
 }

@@ -4,11 +4,16 @@ export type Size = [width: number, height: number];
 /** The server takes no others. */
 export const SIDE = { minimum: 16, maximum: 16384 };
 export const LIGHTS = { minimum: 1, maximum: 100_000 };
+export const GATHER_SAMPLES = { minimum: 64, maximum: 65_535 };
+export const GATHER_RAYS = { minimum: 16, maximum: 4096 };
 export const PREVIEW_PIXELS = 320 * 240;
 
 export interface OwnRecipe {
   size: Size;
   lights: number;
+  /** Pieces of surfaces that light each other, and rays that look for them; without a number the method chooses. */
+  gather_samples?: number;
+  gather_rays?: number;
 }
 
 /** A size of the same shape that a preview can have: about as many pixels as the preset's, never more than asked. */
@@ -20,10 +25,15 @@ export function previewSize([width, height]: Size): Size {
 const isWhole = (value: number, { minimum, maximum }: { minimum: number; maximum: number }) =>
   Number.isInteger(value) && value >= minimum && value <= maximum;
 
+const anyOrWhole = (value: number | undefined, range: { minimum: number; maximum: number }) => value === undefined || isWhole(value, range);
+
+const told = ({ minimum, maximum }: { minimum: number; maximum: number }) => `${minimum} to ${maximum.toLocaleString("en")}`;
+
 /** What is wrong with a recipe, in words; null where nothing is. */
-export function recipeProblem({ size, lights }: OwnRecipe): string | null {
-  if (!size.every((side) => isWhole(side, SIDE)))
-    return `Give width and height in whole pixels, ${SIDE.minimum} to ${SIDE.maximum.toLocaleString("en")}.`;
-  if (!isWhole(lights, LIGHTS)) return `Give 1 to ${LIGHTS.maximum.toLocaleString("en")} light triangles.`;
+export function recipeProblem({ size, lights, gather_samples, gather_rays }: OwnRecipe): string | null {
+  if (!size.every((side) => isWhole(side, SIDE))) return `Give width and height in whole pixels, ${told(SIDE)}.`;
+  if (!isWhole(lights, LIGHTS)) return `Give ${told(LIGHTS)} light triangles.`;
+  if (!anyOrWhole(gather_samples, GATHER_SAMPLES)) return `Give ${told(GATHER_SAMPLES)} gather samples, or none: as many as fit.`;
+  if (!anyOrWhole(gather_rays, GATHER_RAYS)) return `Give ${told(GATHER_RAYS)} rays a sample, or none: as many as fit.`;
   return null;
 }

@@ -53,7 +53,7 @@ whenBakeIsReady((id) => {
 
 /** Bake what is soon there to be shown, and wait for it; gives its id. */
 export async function bakePreview(scene: SceneBody, choice: BakeChoice): Promise<string> {
-  const { size, lights: _, ...rest } = choice;
+  const { size, lights: _, gather_samples: __, gather_rays: ___, ...rest } = choice;
   const shape = size === undefined ? {} : { size: previewSize(size) };
   const preview = await api.startBake({ scene: scene.id, ...rest, ...shape, preset: "preview" });
   coming.value = preview;

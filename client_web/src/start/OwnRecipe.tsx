@@ -2,7 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { planBake } from "../net/api";
 import type { BakeRequest } from "../protocol";
-import { LIGHTS, recipeProblem, SIDE, type OwnRecipe as Recipe } from "../scene/recipe";
+import { GATHER_RAYS, GATHER_SAMPLES, LIGHTS, recipeProblem, SIDE, type OwnRecipe as Recipe } from "../scene/recipe";
 import { PlanWords, type Planned } from "./PlanWords";
 
 const TYPING_MS = 300;
@@ -31,13 +31,15 @@ function usePlan(request: BakeRequest, problem: string | null): Planned {
 
 interface FieldProps {
   label: string;
+  /** Not a number: none is given. */
   value: number;
+  placeholder?: string;
   range: { minimum: number; maximum: number };
   step: number;
   onChange(value: number): void;
 }
 
-function Field({ label, value, range, step, onChange }: FieldProps) {
+function Field({ label, value, placeholder, range, step, onChange }: FieldProps) {
   return (
     <label>
       {label}
@@ -47,6 +49,7 @@ function Field({ label, value, range, step, onChange }: FieldProps) {
         min={range.minimum}
         max={range.maximum}
         step={step}
+        placeholder={placeholder}
         value={Number.isFinite(value) ? value : ""}
         onKeyDown={(event) => event.key !== "Escape" && event.stopPropagation()}
         onInput={(event) => onChange(event.currentTarget.valueAsNumber)}
@@ -64,7 +67,13 @@ interface Props {
 }
 
 export function OwnRecipe({ request, initial, action, onChoose }: Props) {
-  const [recipe, setRecipe] = useState(initial);
+  const [typed, setRecipe] = useState(initial);
+  const gathers = request.method === "gather" || request.method === "surface";
+  const recipe: Recipe = gathers ? typed : { size: typed.size, lights: typed.lights };
+  const setNumber = (name: "gather_samples" | "gather_rays", value: number) => {
+    const { [name]: _, ...others } = recipe;
+    setRecipe(Number.isNaN(value) ? others : { ...others, [name]: value });
+  };
   const [width, height] = recipe.size;
   const plan = usePlan({ ...request, ...recipe }, recipeProblem(recipe));
   return (
@@ -76,6 +85,26 @@ export function OwnRecipe({ request, initial, action, onChoose }: Props) {
         <Field label="Width" value={width} range={SIDE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [side, height] })} />
         <Field label="Height" value={height} range={SIDE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [width, side] })} />
         <Field label="Light triangles" value={recipe.lights} range={LIGHTS} step={1} onChange={(lights) => setRecipe({ ...recipe, lights })} />
+        {gathers && (
+          <>
+            <Field
+              label="Gather samples"
+              value={recipe.gather_samples ?? NaN}
+              placeholder="as fits"
+              range={GATHER_SAMPLES}
+              step={1}
+              onChange={(value) => setNumber("gather_samples", value)}
+            />
+            <Field
+              label="Rays a sample"
+              value={recipe.gather_rays ?? NaN}
+              placeholder="as fits"
+              range={GATHER_RAYS}
+              step={1}
+              onChange={(value) => setNumber("gather_rays", value)}
+            />
+          </>
+        )}
       </div>
       <PlanWords plan={plan} />
       <button disabled={plan === undefined || plan instanceof Error} onClick={() => onChoose(recipe)}>

@@ -1,0 +1,88 @@
+"""Numbers of gather samples and rays that a recipe asks for: kept in the store, counted in the plan, and bounded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sessions import relative_rmse
+from tiny_scenes import looking, quad, scene_of
+
+from relume.bake import Recipe
+from relume.errors import PlanError
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_transfer
+from relume.render.image import render_image
+from relume.store import bake_here, open_store
+from worker.status import recipe_from_json, recipe_json
+
+SIZE = (24, 18)
+GATHERING = ["gather", "surface"]
+
+
+@pytest.fixture(scope="module")
+def corner():
+    parts = [
+        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
+        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 2, -1], [-1, 2, -1]], 1),
+    ]
+    return scene_of(*parts, camera=looking("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5))
+
+
+def recipe_of(method: str, **asked: int) -> Recipe:
+    return Recipe(method, ("front",), SIZE, 60, num_points=300, **asked)
+
+
+@pytest.mark.parametrize("method", GATHERING)
+def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, method: str) -> None:
+    recipe = recipe_of(method, gather_samples=200, gather_rays=100)
+    path = bake_here(METHODS[method], corner, recipe, tmp_path / "s.zarr")
+    store = open_store(path)
+    links = "views/0/links" if method == "gather" else "points/links"
+    assert store.shape(links)[1] == 100
+    assert 150 <= store.shape("cells/material")[0] <= 200
+    if method == "gather":
+        usual = bake_here(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
+        few, plenty = (open_transfer(of, Memory(1 << 30)) for of in (path, usual))
+        look = validate({"transport": {"show": "reflected"}}, few.default_look)
+        assert relative_rmse(*(render_image(transfer, "front", look) for transfer in (few, plenty))) < 0.08
+
+
+@pytest.mark.parametrize("method", GATHERING)
+def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
+    plan, recipe = METHODS[method].plan, recipe_of(method, gather_samples=1000, gather_rays=100)
+    usual = plan(corner, recipe)
+    more_rays = plan(corner, replace(recipe, gather_rays=1100))
+    assert more_rays.num_rays == usual.num_rays + 1000 * usual.num_view_samples
+    assert more_rays.store_bytes == usual.store_bytes + 2 * 1000 * usual.num_view_samples
+    assert more_rays.peak_bytes > usual.peak_bytes
+    more_samples = plan(corner, replace(recipe, gather_samples=3000))
+    assert more_samples.num_rays == usual.num_rays + 2000 * 4 * (55 + recipe.num_lights)
+    assert more_samples.store_bytes > usual.store_bytes + 2000 * 4 * 2 * 55
+    assert more_samples.peak_bytes > usual.peak_bytes
+
+
+@pytest.mark.parametrize(
+    ("method", "asked", "said"),
+    [
+        *((method, {"gather_samples": 63}, "give 64 to") for method in GATHERING),
+        *((method, {"gather_rays": bad}, "give 16 to 4,096") for method in GATHERING for bad in (0, 15, 4097, -1)),
+        ("gather", {"gather_samples": 65_536}, "65,535"),
+        ("surface", {"gather_samples": 32_769}, "32,768"),
+        ("direct", {"gather_samples": 1000}, "leave them out"),
+        ("direct", {"gather_rays": 100}, "leave them out"),
+    ],
+)
+def test_what_no_store_can_have_is_refused(corner, method: str, asked: dict[str, int], said: str) -> None:
+    with pytest.raises(PlanError, match=said):
+        METHODS[method].plan(corner, recipe_of(method, **asked))
+
+
+def test_recipes_are_read_as_they_were_written_and_older_ones_too() -> None:
+    recipe = recipe_of("gather", gather_samples=200, gather_rays=100)
+    assert recipe_from_json(recipe_json(recipe)) == recipe
+    text = recipe_json(recipe_of("gather")).replace('"gather_rays":null,"gather_samples":null,', "")
+    assert "gather_rays" not in text
+    assert recipe_from_json(text) == recipe_of("gather")
