@@ -34,6 +34,11 @@ class Editor {
     this.queue.want({ look: wanted, hand: null, solo: null, inputTime: 0 }, change);
   }
 
+  /** Show another look of which no edit is known that leads there. */
+  show(next: Look): void {
+    this.want(next);
+  }
+
   edit(path: string, value: unknown, sends = true): void {
     const change = changeAt(this.look, path, value);
     this.want(change.after, change);
@@ -113,6 +118,16 @@ describe("a shared look", () => {
     settle();
     expect(room).toEqual(ann.look);
     expect(bob.look).toEqual(room);
+  });
+
+  test("what was not sent stays also where no edit is known that leads there", () => {
+    ann.show(lookWith(LOOK, SIGMA, 0.3));
+    bob.edit(COLOR, [1, 0, 0]);
+    serve(bob);
+    ann.hear();
+    expect(ann.look).toEqual(lookWith(lookWith(LOOK, SIGMA, 0.3), COLOR, [1, 0, 0]));
+    settle();
+    expect(bob.look).toEqual(ann.look);
   });
 
   test("an edit inside something that another has removed is gone with it", () => {

@@ -79,7 +79,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       if (!isShown()) return;
       connection.value = state;
       retryInMs.value = retryIn;
-      refusedBecause.value = reason ?? null;
+      if (state === "open" || retryIn > 0) refusedBecause.value = reason ?? null;
     },
     hello: (message) => welcome(self, message),
     frame: (frame) => take(self, frame),

@@ -2,7 +2,7 @@
 import type { Picture } from "../picture/picture";
 import { bakingWords, hasProgress, phaseWords, useElapsed } from "../scene/baking";
 import { bake, coming } from "../state/bakes";
-import { connection, freezing } from "../state/connection";
+import { connection, freezing, refusedBecause } from "../state/connection";
 import { drawn } from "../state/display";
 
 interface Words {
@@ -28,7 +28,7 @@ function words(view: string, elapsed: number): Words {
     return { text: `${doing}… ${percent} %`, announced: `${doing}…`, progress: making.progress };
   }
   const text = {
-    reconnecting: "Waiting for the server",
+    reconnecting: refusedBecause.value === null ? "Waiting for the server" : `Waiting: ${refusedBecause.value}`,
     closed: "There is no picture to show",
     connecting: "Opening the scene",
     open: "Waiting for the first picture",
