@@ -638,7 +638,7 @@ export interface RenderBody {
   problem: string | null;
 }
 
-/** The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that this session brings. */
+/** The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that this session brings. `default`: the scene's own look, as everything is that nobody has edited. */
 export interface RoomInfo {
   id: string | null;
   watch: string;
@@ -646,6 +646,7 @@ export interface RoomInfo {
   you: number;
   created: boolean;
   people: Person[];
+  default: Record<string, unknown>;
 }
 
 /** server → client: who is in the room now, of these the one at `you`. */

@@ -35,7 +35,7 @@ class Person(Message):
 class RoomInfo(Message):
     """The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a
     token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look
-    that this session brings."""
+    that this session brings. `default`: the scene's own look, as everything is that nobody has edited."""
 
     id: str | None
     watch: str
@@ -43,6 +43,7 @@ class RoomInfo(Message):
     you: int
     created: bool
     people: list[Person]
+    default: dict[str, Any]
 
 
 class RoomMessage(Message):

@@ -73,8 +73,12 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
         news = told(bob, SIGMA)
         assert (news["revision"], news["shared"], news["by"], news["value"]) == (1, 3, [1], 0.4)
         with open_session(client, baked.bake, query=ROOM) as late:
-            params = late.text("hello")["look"]["materials"]["Paper"]["terms"][1]["params"]
+            hello = late.text("hello")
+            params, own = (
+                look["materials"]["Paper"]["terms"][1]["params"] for look in (hello["look"], hello["room"]["default"])
+            )
             assert (params["sigma"], params["extinction"]) == (0.4, 1.7)
+            assert (own["sigma"], own["extinction"]) == (0.2, 0.0)
 
 
 def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -> None:

@@ -42,7 +42,6 @@ export function whenCommented(take: typeof onComments): void {
 
 /** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. */
 function takeUp(own: Look): Look {
-  defaultLook.value ??= own;
   if (!mayEdit.peek()) return (look.value = own);
   const kept = look.peek();
   if (kept !== null && Object.keys(own).every((section) => section in kept)) return kept;
@@ -52,6 +51,7 @@ function takeUp(own: Look): Look {
 /** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function welcome(of: BakeConnection, hello: HelloMessage): void {
   of.greeted(hello);
+  defaultLook.value ??= (hello.room?.default ?? hello.look) as unknown as Look;
   if (!comeIn(of, hello)) want(of, takeUp(hello.look as unknown as Look), performance.now());
   tellViews(of, shownOf(hello), focusedView.peek());
   if (of === connections.shown) {

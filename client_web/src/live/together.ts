@@ -5,7 +5,7 @@ import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import type { HelloMessage, Look, PatchOp, SharedMessage } from "../protocol";
 import { connection } from "../state/connection";
-import { defaultLook, look } from "../state/look";
+import { look } from "../state/look";
 import { selectedMaterial } from "../state/selection";
 import { door, keepSeat, ownName, people, seatIn, you } from "../state/together";
 import { connections, send, type BakeConnection } from "./connections";
@@ -36,7 +36,6 @@ export function comeIn(of: BakeConnection, hello: HelloMessage): boolean {
   const shared = of.session.look;
   if (hello.room === null || hello.room.created || shared === null) return false;
   if (of !== connections.shown) return true; // it takes over later
-  defaultLook.value ??= hello.look as unknown as Look;
   passing.value = null;
   look.value = hello.role === "view" ? shared : asSeenHere(shared);
   want(of, look.value, performance.now());

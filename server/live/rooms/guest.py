@@ -67,6 +67,7 @@ class Guest:
             you=self._seat.number,
             created=self._place.is_new,
             people=self._told_people,
+            default=self._look.default,
         )
 
     def edited(self, target: Target) -> Target:
