@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relume.replacing import replacing
 
-_FORMAT = 1
+_FORMAT = 2
 Arrays = Mapping[str, NDArray[Any]]
 
 

@@ -7,6 +7,7 @@ bound is found from some of the views. The error that is told is that of what wa
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, Protocol
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from relume.basis.local_pca import Clusters, cluster, distances, missed, strongest
 from relume.btf.begun import Arrays, Begun
 from relume.btf.eigen import LARGEST, EigenBtf
+from relume.btf.packing import largest
 from relume.btf.rings import Rings
 from relume.errors import CancelledError, MaterialError
 
@@ -32,6 +34,7 @@ _LOOKED_AT = 5  # views that numbers are chosen by
 _OF_CHOOSING = 0.2  # of the time, about
 _MORE = 2  # components that are found, in case that other views need them
 _LEAST_RATIO = 2.5  # what is larger is no compression
+_BITS_OF_LAST = (3, 4, 5, 6, 8)  # of the weights of the last component, among which the number is chosen
 
 
 class Images(Protocol):
@@ -53,6 +56,14 @@ class _Span(NamedTuple):
     centre: F32
     lost: float
     energy: float
+
+
+class _Chosen(NamedTuple):
+    """clusters, components: of each view. bits: of the weights of each component. (components,) uint8"""
+
+    clusters: int
+    components: int
+    bits: NDArray[np.uint8]
 
 
 class _Part(NamedTuple):
@@ -95,19 +106,17 @@ def compress(
         progress(share)
         return _rows(images, view)
 
-    chosen = _known(begun, "choice", lambda: _choice(images, bound, rows_of))
-    num_clusters, num = int(chosen["clusters"]), int(chosen["components"])
+    arrays = _known(begun, "choice", lambda: _choice(images, bound, rows_of)._asdict())
+    chosen = _Chosen(int(arrays["clusters"]), int(arrays["components"]), arrays["bits"])
     parts = []
     for view in range(views):
         rows = partial(rows_of, view, _OF_CHOOSING + (1 - _OF_CHOOSING) * view / views)
-        parts.append(
-            _Part(**_known(begun, f"view-{view}", partial(_found, rows, images.size, num_clusters, num, view)))
-        )
+        parts.append(_Part(**_known(begun, f"view-{view}", partial(_found, rows, images.size, chosen, view))))
     energy = float(sum(part.energy for part in parts))
     if energy <= 0:
         raise MaterialError("the BTF is black")
-    kept = _joined(images, parts, energy)
-    return kept.with_components(next((j for j, one in enumerate(kept.error) if one <= bound), num))
+    kept = _joined(images, parts, chosen.bits, energy)
+    return kept.with_components(next((j for j, one in enumerate(kept.error) if one <= bound), chosen.components))
 
 
 def _known(begun: Begun | None, name: str, find: Callable[[], Arrays]) -> Arrays:
@@ -120,16 +129,15 @@ def _known(begun: Begun | None, name: str, find: Callable[[], Arrays]) -> Arrays
     return found
 
 
-def _choice(images: Images, bound: float, rows_of: Callable[[int, float], F32]) -> Arrays:
-    """Choose clusters and components by some of the views."""
+def _choice(images: Images, bound: float, rows_of: Callable[[int, float], F32]) -> _Chosen:
+    """Choose clusters, components and bits by some of the views."""
     views = images.rings.num_directions
     looked_at = np.unique(np.linspace(0, views - 1, _LOOKED_AT).round().astype(int))
     some = [
         _span(rows_of(view, _OF_CHOOSING * number / len(looked_at)))
         for number, view in enumerate(looked_at)
     ]  # fmt: skip
-    num_clusters, least = _choose(some, bound)
-    return {"clusters": np.array(num_clusters), "components": np.array(min(least + _MORE, MOST_COMPONENTS))}
+    return _choose(some, bound)
 
 
 def _rows(images: Images, view: int) -> F32:
@@ -154,39 +162,66 @@ def _energy(rows: F32) -> float:
     return float(np.einsum("nr,nr->", rows, rows, dtype=np.float64))
 
 
-def _choose(some: list[_Span], bound: float) -> tuple[int, int]:
-    """Find the clusters and components that keep some views to a bound in the least space, else what errs least."""
-    best: tuple[float, float, int, int] | None = None
-    texels = len(some[0].z)
-    values = some[0].basis.shape[1]
+def _choose(some: list[_Span], bound: float) -> _Chosen:
+    """Find what keeps some views to a bound in the least space, else what errs least; and some components more."""
+    best: tuple[tuple[float, ...], _Chosen] | None = None
+    texels, values = len(some[0].z), some[0].basis.shape[1]
     energy = max(sum(span.energy for span in some), 1e-30)
     for num_clusters in _CLUSTERS:
-        left = np.zeros(MOST_COMPONENTS + 1)
+        left, unit = np.zeros(MOST_COMPONENTS + 1), np.zeros(MOST_COMPONENTS)
         for span in some:
-            rng = np.random.default_rng(_SEED)
-            left += span.lost + missed(span.z, cluster(span.z, num_clusters, MOST_COMPONENTS, rng))
-        for num, error in enumerate(np.sqrt(left / energy)):
-            size = num_clusters * (2 + num) * values + texels * (1 + num)
-            rank = (max(float(error), bound), float(size), num_clusters, num)
-            if size * _LEAST_RATIO <= texels * values and (best is None or rank < best):
-                best = rank
-    return (1, 0) if best is None else best[2:]
+            found = cluster(span.z, num_clusters, MOST_COMPONENTS, np.random.default_rng(_SEED))
+            left += span.lost + missed(span.z, found)
+            unit += _rounding(span.z, found)
+        for num, last in itertools.product(range(MOST_COMPONENTS + 1), _BITS_OF_LAST):
+            bits = _bits(left[: num + 1], last)
+            error = float(np.sqrt((left[num] + (unit[:num] / largest(bits) ** 2).sum()) / energy))
+            rank = (max(error, bound), _size(num_clusters, bits, texels, values))
+            more = np.append(bits, np.full(min(_MORE, MOST_COMPONENTS - num), last, np.uint8))
+            is_small = _size(num_clusters, more, texels, values) * _LEAST_RATIO <= texels * values
+            if is_small and (best is None or rank < best[0]):
+                best = rank, _Chosen(num_clusters, len(more), more)
+    return _Chosen(1, 0, np.zeros(0, np.uint8)) if best is None else best[1]
 
 
-def _found(rows_of: Callable[[], F32], size: tuple[int, int], num_clusters: int, num: int, view: int) -> Arrays:
+def _size(num_clusters: int, bits: NDArray[np.uint8], texels: int, values: int) -> float:
+    """Bytes of a view, nearly."""
+    return num_clusters * (2 + len(bits)) * values + texels * (1 + float(bits.sum()) / 8)
+
+
+def _rounding(z: F32, found: Clusters) -> F64:
+    """Squares that rounding of weights misses, were the largest of each cluster one step. (C,)"""
+    out = np.zeros(found.components.shape[1])
+    for k in np.unique(found.of):
+        weight = (z[found.of == k] - found.mean[k]) @ found.components[k].T
+        out += len(weight) * np.abs(weight).max(axis=0).astype(np.float64) ** 2 / 12
+    return out
+
+
+def _bits(left: F64, last: int) -> NDArray[np.uint8]:
+    """Bits of weights: `last` for the last component, one more for four times as many squares that one tells. (C,)"""
+    told = np.maximum(-np.diff(left), 1e-30)
+    return np.asarray(np.clip(last + np.rint(0.5 * np.log2(told / told[-1:])), last, 8), np.uint8)
+
+
+def _found(rows_of: Callable[[], F32], size: tuple[int, int], chosen: _Chosen, view: int) -> Arrays:
     """Cluster the texels of one view, and round what tells them: a `_Part`."""
     rows, rng = rows_of(), np.random.default_rng((_SEED, view))
     span = _span(rows)
-    found = cluster(span.z, num_clusters, num, rng)
+    num, most_steps = chosen.components, largest(chosen.bits)
+    found = cluster(span.z, chosen.clusters, num, rng)
     z = np.concatenate([level.reshape(-1, span.z.shape[1]) for level in levels_of(span.z, size)])
     of, weight = _told(z, found)
     reach = np.zeros((len(found.mean), num), np.float32)
     np.maximum.at(reach, of, np.abs(weight))
-    weight = np.rint(weight * (LARGEST / np.maximum(reach, 1e-30))[of])
+    weight = np.rint(weight * (most_steps / np.maximum(reach, 1e-30))[of])
     mean = (found.mean @ span.basis + span.centre).astype(np.float16)
     eigen = found.components @ span.basis
     most = np.maximum(np.abs(eigen).max(axis=2, initial=0), 1e-30)
-    eigen, step = np.rint(eigen * (LARGEST / most)[:, :, None]), (most * reach / LARGEST**2).astype(np.float32)
+    eigen, step = (
+        np.rint(eigen * (LARGEST / most)[:, :, None]),
+        (most * reach / (LARGEST * most_steps)).astype(np.float32),
+    )
     by_light = (len(mean), -1, 3)
     part = _Part(
         of.astype(np.uint8), weight.astype(np.int8), mean.reshape(by_light),
@@ -219,7 +254,7 @@ def _missed(rows: F32, part: _Part) -> F64:
     return left
 
 
-def _joined(images: Images, parts: list[_Part], energy: float) -> EigenBtf:
+def _joined(images: Images, parts: list[_Part], bits: NDArray[np.uint8], energy: float) -> EigenBtf:
     """Put the views together. Clusters that a view has fewer of are empty there."""
     nothing = np.zeros((images.size[0] * images.size[1], 1), np.float32)
     shapes = [level.shape[:2] for level in levels_of(nothing, images.size)]
@@ -235,6 +270,7 @@ def _joined(images: Images, parts: list[_Part], energy: float) -> EigenBtf:
         levels=np.array([(first, *shape) for first, shape in zip(ends[:-1], shapes, strict=True)], np.int32),
         cluster=np.stack([part.cluster for part in parts]),
         weight=np.stack([part.weight for part in parts]),
+        bits=bits,
         mean=stacked("mean"),
         eigen=stacked("eigen"),
         step=stacked("step"),

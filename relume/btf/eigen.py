@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.btf.packing import packed_bytes
 from relume.btf.rings import Rings
 
 F32 = NDArray[np.float32]
@@ -22,6 +23,7 @@ I8 = NDArray[np.int8]
 
 
 LARGEST = 127  # of what is kept in a byte
+U8 = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,7 @@ class EigenBtf:
             (levels, 3) int32
         cluster: of each texel of each level. (V, texels) uint8
         weight: α, in steps that are in those of `step`. (V, texels, C) int8
+        bits: that weights of each component need, sign included. (C,) uint8
         mean: M. (V, K, L, 3) float16
         eigen: E, in steps of `step`. (V, K, C, L, 3) int8
         step: (V, K, C) float32
@@ -45,6 +48,7 @@ class EigenBtf:
     levels: NDArray[np.int32]
     cluster: NDArray[np.uint8]
     weight: I8
+    bits: U8
     mean: NDArray[np.float16]
     eigen: I8
     step: F32
@@ -64,8 +68,8 @@ class EigenBtf:
     @property
     def num_bytes(self) -> int:
         """What is kept, the coarser levels left out, which files of measurements do not have either."""
-        of_texels = self.rings.num_directions * self.size[0] * self.size[1] * (1 + self.num_components)
-        return of_texels + self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
+        of_texels = packed_bytes(self.size[0] * self.size[1], np.append(self.bits, np.uint8(8)))  # their clusters, too
+        return self.rings.num_directions * of_texels + self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
 
     @property
     def measured_bytes(self) -> int:
@@ -79,6 +83,7 @@ class EigenBtf:
         return replace(
             self,
             weight=np.ascontiguousarray(self.weight[..., :kept]),
+            bits=self.bits[:kept],
             eigen=self.eigen[:, :, :kept],
             step=self.step[..., :kept],
             error=self.error[: kept + 1],

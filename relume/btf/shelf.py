@@ -1,6 +1,7 @@
 """BTFs that were imported or made; `relume.asset_store` keeps them.
 
-    <folder>/<id>/cluster.npy, weight.npy, …    arrays of `relume.btf.eigen.EigenBtf`
+    <folder>/<id>/cluster.npy, mean.npy, …      arrays of `relume.btf.eigen.EigenBtf`
+                  packed.npy                    its weights, in as few bits as they need (`relume.btf.packing`)
                   btf.json                      name, what it is, how well it is kept
 
 Look documents name one as "btf:<id>".
@@ -8,7 +9,7 @@ Look documents name one as "btf:<id>".
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,13 +19,15 @@ import numpy as np
 
 from relume.asset_store import AssetStore
 from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
-from relume.btf.eigen import EigenBtf
+from relume.btf.eigen import I8, U8, EigenBtf
+from relume.btf.packing import packed, packed_bytes, unpacked
 from relume.btf.rings import rings_of
 from relume.errors import MaterialError
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
+_PACKED = "packed.npy"
 _ARRAYS = {
-    "levels": np.int32, "cluster": np.uint8, "weight": np.int8, "mean": np.float16, "eigen": np.int8,
+    "levels": np.int32, "cluster": np.uint8, "mean": np.float16, "eigen": np.int8,
     "step": np.float32, "average": np.float32,
 }  # fmt: skip
 
@@ -77,6 +80,7 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
         found = make()
         for array in _ARRAYS:
             np.save(made / f"{array}.npy", getattr(found, array))
+        np.save(made / _PACKED, np.stack([packed(weight, found.bits) for weight in found.weight]))
         return {
             "synthetic": synthetic,
             "rings": [
@@ -84,6 +88,7 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
                 for theta, count in zip(found.rings.theta, np.diff(found.rings.first), strict=True)
             ],
             "shift": found.rings.shift.tolist(),
+            "bits": found.bits.tolist(),
             "error": list(found.error),
             "ratio": found.measured_bytes / found.num_bytes,
         }
@@ -126,14 +131,31 @@ def _load(path: Path) -> EigenBtf:
         rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]], shift)
         error = tuple(float(one) for one in document["error"])
         arrays = {name: _array(path, name) for name in _ARRAYS}
+        bits, weight = _weights(path, document)
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
         raise STORE.damaged(path) from problem
     if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
         raise STORE.damaged(path)
-    found = EigenBtf(rings=rings, error=error, **arrays)
+    found = EigenBtf(rings=rings, error=error, bits=bits, weight=weight, **arrays)
     if not _is_sound(found):
         raise STORE.damaged(path)
     return found
+
+
+def _weights(path: Path, document: Mapping[str, Any]) -> tuple[U8, I8]:
+    """Bits and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError where they do not fit."""
+    if "bits" not in document:  # each had a byte before they were packed
+        weight = _array(path, "weight")
+        if weight.dtype != np.int8 or weight.ndim != 3:
+            raise ValueError("weights")
+        return np.full(weight.shape[2], 8, np.uint8), weight
+    bits = np.array([int(one) for one in document["bits"]])
+    if len(bits) > MOST_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
+        raise ValueError("bits")
+    of_bits, num, rows = bits.astype(np.uint8), _array(path, "cluster").shape[1], _array(path, "packed")
+    if rows.dtype != np.uint8 or rows.ndim != 2 or rows.shape[1] != packed_bytes(num, of_bits):
+        raise ValueError("packed")
+    return of_bits, np.stack([unpacked(row, of_bits, num) for row in rows])
 
 
 def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
@@ -163,6 +185,7 @@ def _is_sound(found: EigenBtf) -> bool:
         and found.cluster.shape == (directions, texels)
         and int(found.cluster.max()) < clusters
         and found.weight.shape == (directions, texels, components)
+        and found.bits.shape == (components,)
         and found.mean.shape == (directions, clusters, directions, 3)
         and found.eigen.shape == (directions, clusters, components, directions, 3)
         and found.step.shape == (directions, clusters, components)

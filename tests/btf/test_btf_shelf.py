@@ -39,7 +39,7 @@ def test_a_look_that_names_another_is_refused(small_btf, data):
         complete_term(("terms", 0), {"model": "measured_btf", "data": data}, None)
 
 
-@pytest.mark.parametrize("array", ["cluster", "weight", "mean", "eigen", "step", "average", "levels"])
+@pytest.mark.parametrize("array", ["cluster", "packed", "mean", "eigen", "step", "average", "levels"])
 @pytest.mark.parametrize("how", ["gone", "cut", "shape", "numbers"])
 def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
     shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / small_btf.record.id)
@@ -54,8 +54,35 @@ def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
     else:
         np.save(path, np.full_like(values, 250 if array == "cluster" else -1 if array == "levels" else 0) * (
             np.nan if values.dtype.kind == "f" else 1))  # fmt: skip
-        if array in ("eigen", "weight"):
+        if array in ("eigen", "packed"):
             pytest.skip("any steps are sound")
+    with pytest.raises(MaterialError, match="damaged"):
+        get_record(tmp_path, small_btf.record.id)
+
+
+def changed(path, **changes):
+    document = {**json.loads(path.read_text()), **changes}
+    path.write_text(json.dumps({key: value for key, value in document.items() if value is not None}))
+
+
+def test_weights_that_have_a_byte_each_are_read_as_before(small_btf, tmp_path):
+    at = tmp_path / small_btf.record.id
+    shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    expected = btf(small_btf.record.data)
+    np.save(at / "weight.npy", expected.weight)
+    (at / "packed.npy").unlink()
+    changed(at / "btf.json", bits=None)
+    assert get_record(tmp_path, small_btf.record.id).components == expected.num_components
+    found = shelf._load(at)
+    np.testing.assert_array_equal(found.weight, expected.weight)
+    assert found.bits.tolist() == [8] * expected.num_components
+
+
+@pytest.mark.parametrize("bits", [[], [8] * 17, [9], [1], ["x"], [3], 7])
+def test_bits_that_do_not_fit_are_damage(small_btf, tmp_path, bits):
+    at = tmp_path / small_btf.record.id
+    shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    changed(at / "btf.json", bits=bits)
     with pytest.raises(MaterialError, match="damaged"):
         get_record(tmp_path, small_btf.record.id)
 
@@ -87,7 +114,7 @@ def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
     record = make_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
     assert shares[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
-    for array in shelf._ARRAYS:
+    for array in [*shelf._ARRAYS, "packed"]:
         one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
         np.testing.assert_array_equal(one, other)
 

@@ -55,6 +55,10 @@ def test_a_looser_bound_keeps_less():
     images = Facets(kinds=30)
     tight, loose = kept(images, 0.01), kept(images, 0.2)
     assert loose.num_bytes < tight.num_bytes
+    assert loose.bits.max() < tight.bits.max()
+    assert list(loose.bits) == sorted(loose.bits, reverse=True)  # the strongest components have the finest steps
+    for found in (loose, tight):
+        assert (np.abs(found.weight).max(axis=(0, 1)) == 2 ** (found.bits.astype(int) - 1) - 1).all()
     assert loose.error[-1] <= 0.21
     assert tight.num_components <= MOST_COMPONENTS
 
@@ -94,7 +98,7 @@ def test_one_that_was_stopped_goes_on_and_finds_the_same(tmp_path):
     read = counted(images)
     found = kept(images, begun=Begun(tmp_path / "a", {"bound": 0.01}))
     assert read == [3, *range(35, 81)]  # five were read to choose by, then 35
-    for name in ("cluster", "weight", "mean", "eigen", "step", "average", "error"):
+    for name in ("cluster", "weight", "bits", "mean", "eigen", "step", "average", "error"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
     read.clear()
     kept(images, 0.2, begun=Begun(tmp_path / "a", {"bound": 0.2}))

@@ -1,0 +1,21 @@
+"""Weights of a few bits: what is packed comes back, in no more bytes than it needs."""
+
+import numpy as np
+import pytest
+
+from relume.btf.packing import largest, packed, packed_bytes, unpacked
+
+
+@pytest.mark.parametrize("bits", [[8], [3], [2, 3, 4, 5, 6, 7, 8], [5, 5, 4, 3, 3], []])
+@pytest.mark.parametrize("num", [1, 37])
+def test_what_is_packed_comes_back(bits, num):
+    of = np.array(bits, np.uint8)
+    rows = np.random.default_rng(1).integers(-largest(of), largest(of) + 1, (num, len(of))).astype(np.int8)
+    rows[0] = largest(of)
+    rows[-1] = -largest(of)
+    found = packed(rows, of)
+    assert len(found) == packed_bytes(num, of) == int(np.ceil(num * sum(bits) / 8))
+    np.testing.assert_array_equal(unpacked(found, of, num), rows)
+    for j, (begin, width) in enumerate(zip(np.cumsum([0, *bits]), bits, strict=False)):  # in plain NumPy
+        plain = np.unpackbits(found)[: num * sum(bits)].reshape(num, -1)[:, begin : begin + width]
+        np.testing.assert_array_equal(plain @ (1 << np.arange(width)[::-1]) - largest(of)[j], rows[:, j])
