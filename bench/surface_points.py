@@ -20,7 +20,8 @@ from bench.moving_scene import MovingScene
 from bench.standard_error import NoiseFree, over_passes
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.look import Look
-from relume.moving.evaluate import send, tables_of
+from relume.moving.basis.tables import tables_of
+from relume.moving.evaluate import send
 from relume.moving.vectors.arriving import wholly
 from relume.picture.light import light_of
 from relume.picture.view_images import documents_of
@@ -92,7 +93,11 @@ def whole_rmse(of: MovingScene, num: int, num_paths: int, change: Change = lambd
     is_needed[chosen] = 1
     arriving = wholly(moving, light_of(look, moving.material_names, has_bounces=True))
     tables = tables_of([documents_of(look, name) for name in moving.material_names])
-    ours = send(moving.surface, arriving.total, tables, eye.astype(np.float32), is_needed)[chosen].sum(axis=1)
+    of_highlights = tables._replace(of=tables.of[..., [2, 3, 4, 5, 4, 5]])  # what the in-basis tells of all light
+    ours = sum(
+        send(moving.surface, arriving.total, None, part, eye.astype(np.float32), is_needed).radiance[chosen].sum(axis=1)
+        for part in (tables, of_highlights)
+    )
     truth = _traced(of, look, chosen, num_paths)
     return over_passes(ours.astype(np.float64)[None], truth[:, None].astype(np.float32))
 

@@ -11,7 +11,7 @@ export const MAX_VIEWS_SHOWN = 4;
 
 export const MAX_EYE_PIXELS = 2304000;
 
-export const SURFACE_LAYOUT = 2;
+export const SURFACE_LAYOUT = 3;
 
 export const MAX_PERSON_NAME = 40;
 
@@ -471,6 +471,15 @@ export interface LeavingMessage {
   seconds: number;
 }
 
+/** Lists of lights that lobes look for: `side` of the map of directions, how many are `listed` for each and how many `lights_a_lamp`; the `narrowest` σ, radians, of so many `widths`, each √2 times the one before. */
+export interface LobeListsBody {
+  side: number;
+  listed: number;
+  lights_a_lamp: number;
+  narrowest: number;
+  widths: number;
+}
+
 /** A saved look in the list of them. */
 export interface LookEntry {
   name: string;
@@ -754,17 +763,19 @@ export interface SurfaceBody {
   ladder: LadderBody;
   expansions: number[][];
   first_points: number[];
+  lobe_lists: LobeListsBody;
   has_holes: boolean;
   arrays: string[];
 }
 
-/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
+/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
 export interface TablesInfo {
   gain: [number, number, number];
   sky_gain: [number, number, number];
   background_gain: [number, number, number];
   sky_turn: number;
   sky_levels: [number, number, number][];
+  lamps: [number, number, number, number, number, number, number][];
   background: "map" | "blurred" | "color" | "transparent";
   background_color: [number, number, number];
   background_size: [number, number];

@@ -4,28 +4,30 @@ import { rectanglesOf, WIDTH } from "../src/evaluator/common";
 import { classesOf, layersOf, readMaterials } from "../src/evaluator/materials";
 
 const NONE = [-1, -1, 0, -1];
+const NO = [-1, -1, -1, -1];
 const EMISSION = [0, 0, 0, -1];
-const diffuse = [[0, -1, 1, -1], NONE, NONE, [-1, -1, 0, -1], EMISSION];
-const textured = [[1, -1, 1, -1], [2, -1, 1, 0], NONE, [-1, 0, 0, -1], EMISSION];
-const glossy = [[3, 0, 1, -1], NONE, NONE, [0, -1, 0, -1], EMISSION];
-const mirror = [NONE, NONE, [-1, -1, 1, -1], [1, -1, 1, -1], EMISSION];
-const ROWS = 2;
-/** Two lobes of two rows: the first is told by the in-basis. */
-const lobes = new Float32Array(2 * ROWS * 4 * 4);
-lobes[4 * 3 + 2] = 1;
+const NOTHING = [NO, NO, NO];
+const diffuse = [[0, -1, 1, -1], NONE, NONE, [-1, -1, 0, -1], EMISSION, ...NOTHING];
+const textured = [[1, -1, 1, -1], [2, -1, 1, 0], NONE, [-1, 0, 0, -1], EMISSION, ...NOTHING];
+const glossy = [[3, 0, 1, -1], NONE, NONE, [0, -1, 0, -1], EMISSION, [4, -1, -1, 5], NO, NO];
+const mirror = [NONE, NONE, [-1, -1, 1, -1], [1, -1, 1, -1], EMISSION, NO, NO, [-1, -1, 6, -1]];
+const NEVER = [false, false, false];
 
 const read = (materials: number[][][]) =>
-  readMaterials(new Int32Array(materials.flat(2)), lobes, ROWS, (name, material) => (name === "vectors" ? 15 : 30) + material);
+  readMaterials(new Int32Array(materials.flat(2)), (name, material) => (name === "vectors" ? 15 : 30) + material);
 
 test("a material uses what its rows say", () => {
   const [first, second, third, fourth] = read([diffuse, textured, glossy, mirror]);
-  expect(first?.points).toEqual({ functions: 15, even: [true, false, false], uneven: [false, false, false], lobe: "none", others: 0, map: false });
+  const none = { even: NEVER, uneven: NEVER };
+  const plain = { even: [true, false, false], uneven: NEVER };
+  expect(first?.points).toEqual({ functions: 15, plain, sky: none, beside: none, lobe: false, others: 0, map: false });
   expect(first?.pixels).toEqual({ groups: false, textures: false, lobes: false, catches: false });
-  expect(second?.points).toMatchObject({ functions: 16, even: [true, true, false], map: true });
+  expect(second?.points).toMatchObject({ functions: 16, plain: { even: [true, true, false] }, map: true });
   expect(second?.pixels).toEqual({ groups: true, textures: true, lobes: false, catches: false });
-  expect(third?.points).toMatchObject({ functions: 17, uneven: [true, false, false], lobe: "told", others: 0 });
-  expect(third?.tables).toEqual([3, 0, -1, -1, -1, -1]);
-  expect(fourth?.points).toMatchObject({ functions: 0, lobe: "narrow", others: 33 });
+  expect(third?.points).toMatchObject({ functions: 17, plain: { uneven: [true, false, false] }, lobe: true, others: 32 });
+  expect(third?.points).toMatchObject({ sky: { even: [true, false, false], uneven: NEVER }, beside: { even: NEVER, uneven: [true, false, false] } });
+  expect(third?.tables).toEqual({ plain: [3, 0, -1, -1, -1, -1], highlights: [4, -1, -1, 5, ...NO, ...NO] });
+  expect(fourth?.points).toMatchObject({ functions: 0, lobe: true, sky: none, beside: { even: [false, false, true] }, others: 33 });
   expect(fourth?.pixels).toEqual({ groups: true, textures: false, lobes: true, catches: true });
 });
 

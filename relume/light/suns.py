@@ -18,16 +18,29 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 TURNS, NUM_TARGETS = 9, 16  # sets of directions, one for each of 3 × 3 pixels; directions of each
-_MOST = 2
+MOST_SUNS = 2
 _LEAST_SHARE = 0.05  # of all light of the map
 _BRIGHT = 100.0  # times the mean radiance
-_NEAR, _AROUND = np.cos(np.radians((2.5, 5.0)))  # of what is brightest: the sun's, and where no more may be
 _MOST_AROUND = 0.2  # of a sun's light
-_WIDEST = np.radians(
-    1.25
-)  # root mean square of a sun's angles from its middle: of what is wider points know the shadows
 _ROUNDS = 3
 _PLASTIC = 1.3247179572447460  # x³ = x + 1: steps of Roberts' R2 sequence
+
+
+class Bounds(NamedTuple):
+    """What is a sun.
+
+    Attributes:
+        near, around: angles from what is brightest: the sun's, and where no more may be; degrees.
+        widest: root mean square of a sun's angles from its middle, degrees.
+    """
+
+    near: float
+    around: float
+    widest: float
+
+
+SUNS = Bounds(2.5, 5.0, 1.25)  # of what is wider points know the shadows
+LAMPS = Bounds(4.0, 8.0, 3.0)  # what a highlight shows as itself, narrower than itself
 
 
 class Sun(NamedTuple):
@@ -60,11 +73,12 @@ class _Texels(NamedTuple):
     luminous: F64
 
 
-def without_suns(radiance: F32) -> Divided:
+def without_suns(radiance: F32, bounds: Bounds = SUNS) -> Divided:
     """Take the suns out of a map.
 
     Args:
         radiance: equirectangular, top row first. (height, width, 3) float32
+        bounds: what is a sun.
     """
     height, width, _ = radiance.shape
     solid_angles, light = texel_solid_angles(height, width), luminance(radiance).astype(np.float64)
@@ -73,39 +87,42 @@ def without_suns(radiance: F32) -> Divided:
     directions = uv_to_direction((columns + 0.5) / width, (rows + 0.5) / height)
     bright = _Texels(rows, columns, directions, light[rows, columns] * solid_angles[rows])
     beside, suns, is_left = radiance, list[Sun](), np.ones(len(rows), np.bool_)
-    for _ in range(2 * _MOST):
-        if len(suns) == _MOST or not is_left.any():
+    for _ in range(2 * MOST_SUNS):
+        if len(suns) == MOST_SUNS or not is_left.any():
             break
-        is_in, is_about = _about_brightest(bright, is_left)
+        is_in, is_about = _about_brightest(bright, is_left, bounds)
         of_sun, about = bright.luminous[is_in].sum(), bright.luminous[is_about].sum()
         is_left &= ~(is_in | is_about)
         if of_sun < _LEAST_SHARE * total or about > _MOST_AROUND * of_sun:
             continue
-        lowered, excess = _taken_out(beside, bright, is_in)
+        lowered, excess = _taken_out(beside, bright, is_in, bounds)
         sun = _sun(bright, is_in, excess * solid_angles[bright.rows[is_in], None], (height, width))
-        if 2 * (1 - np.linalg.norm(sun.mean)) < _WIDEST**2:
+        if 2 * (1 - np.linalg.norm(sun.mean)) < np.radians(bounds.widest) ** 2:
             suns.append(sun)
             beside = lowered
     return Divided(tuple(suns), beside)
 
 
-def _about_brightest(bright: _Texels, is_left: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _about_brightest(
+    bright: _Texels, is_left: NDArray[np.bool_], bounds: Bounds
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Find what is about the most light of all that is left: within a sun's radius, and in the ring round it."""
     axis = bright.directions[np.argmax(np.where(is_left, bright.luminous, -1))]
+    near, around = np.cos(np.radians(bounds[:2]))
     for _ in range(_ROUNDS):
-        is_in = is_left & (bright.directions @ axis > _NEAR)
+        is_in = is_left & (bright.directions @ axis > near)
         axis = bright.luminous[is_in] @ bright.directions[is_in]
         axis /= np.linalg.norm(axis)
     cosine = bright.directions @ axis
-    is_in = is_left & (cosine > _NEAR)
-    return is_in, is_left & (cosine > _AROUND) & ~is_in
+    is_in = is_left & (cosine > near)
+    return is_in, is_left & (cosine > around) & ~is_in
 
 
-def _taken_out(radiance: F32, bright: _Texels, is_in: NDArray[np.bool_]) -> tuple[F32, F64]:
+def _taken_out(radiance: F32, bright: _Texels, is_in: NDArray[np.bool_], bounds: Bounds) -> tuple[F32, F64]:
     """Lower texels to what is about them. Returns the map, and by how much they were lowered: (n, 3)."""
     height, width, _ = radiance.shape
     axis = bright.luminous[is_in] @ bright.directions[is_in]
-    is_about = texel_directions(height, width) @ (axis / np.linalg.norm(axis)) > _AROUND
+    is_about = texel_directions(height, width) @ (axis / np.linalg.norm(axis)) > np.cos(np.radians(bounds.around))
     rows, columns = bright.rows[is_in], bright.columns[is_in]
     is_about[bright.rows, bright.columns] = False
     around = radiance[is_about].mean(axis=0) if is_about.any() else np.zeros(3)

@@ -14,15 +14,17 @@ from relume.bake import StoreReader
 from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
-from relume.look import LightGeometry
+from relume.look import EnvironmentKey, LightGeometry
 from relume.memory import Memory
-from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
+from relume.methods.skies_in_lobes import SkiesInLobes
+from relume.methods.store_io import read_cells
 from relume.methods.suns_of_skies import SunsOfSkies
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
+from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.parted import find_parted
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
-from relume.moving.sky import Sky, sky_of
+from relume.moving.sky import Sky
 from relume.moving.solid import Solid
 from relume.moving.view import FreeView
 from relume.picture.light import Light, Source
@@ -134,7 +136,8 @@ class MovingViews:
         return find_parted(self.solid)
 
     @cached_property
-    def _visible(self) -> NDArray[np.uint8]:
+    def visible(self) -> NDArray[np.uint8]:
+        """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
         return np.asarray(self.lit.store.read("points/visibility"), np.uint8)
 
     @cached_property
@@ -164,7 +167,7 @@ class MovingViews:
         if sent is not None:
             rays.append(GatherRays(self._links, self._pattern, sent))
         lights = self.suns.lights_beside(element) if beside_suns else self.lit.lights_of(element)
-        return light_vectors(points, self._visible, lights, rays)
+        return light_vectors(points, self.visible, lights, rays)
 
     def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool = False) -> F32:
         """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32
@@ -224,9 +227,9 @@ class MovingViews:
         """Light vectors of an environment at some points, by harmonics where the bake has them."""
         harmonic = self.lit.harmonic
         if harmonic is None:
-            return light_vectors(points, self._visible[chosen], lights, (), QUICK_DEGREE)
+            return light_vectors(points, self.visible[chosen], lights, (), QUICK_DEGREE)
         divided = harmonic.divided(lights)
-        seen = visible_of(self._visible, chosen, divided.chosen)
+        seen = visible_of(self.visible, chosen, divided.chosen)
         beyond = light_vectors(points, seen, divided.beyond, (), QUICK_DEGREE)
         return beyond + harmonic.of_points.vectors(divided.smooth, chosen)
 
@@ -278,22 +281,21 @@ class MovingViews:
         """Of light vectors: points, channels, K."""
         return self.surface.points.num_points, 3, NUM_FUNCTIONS
 
-    @property
-    def sky_share(self) -> F32:
-        """What each point sees of the sky, in the in-basis, of whatever brightness it is. (points, K) float32"""
-        return self.memory.keep((self.key, "share of the sky"), self._sky_share)
+    @cached_property
+    def _in_lobes(self) -> SkiesInLobes:
+        return SkiesInLobes(self.lit)
 
-    def _sky_share(self) -> F32:
-        lights = self.lit.lights
-        areas = np.repeat(read_tiles(self.lit.store).solid_angles[:, None], 3, axis=1).astype(np.float32)
-        directions = read_traced_directions(self.lit.store)
-        white = TriangleLights(lights.nodes, directions, areas)
-        return np.ascontiguousarray(light_vectors(self.surface.points, self._visible, white, ())[:, 0])
+    def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
+        """The light triangles of an environment, as lobes of some widths look for them."""
+        return self._in_lobes.lights(environment, widths)
+
+    def lamps_in(self, environment: EnvironmentKey) -> F32:
+        """Lamps of an environment, turned; see `relume.moving.highlights.looking.SkyLight`. (lamps, 7) float32"""
+        return self._in_lobes.lamps(environment)
 
     def sky_in(self, name: str | None) -> Sky:
-        """An environment, None for the scene's own, and what it is when it is blurred."""
-        owner = self.key if name is None else "environments"
-        return self.memory.keep((owner, "sky", name), lambda: sky_of(lambda degrees: self.map_of(name, degrees)))
+        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        return self._in_lobes.sky(name)
 
     def map_of(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""

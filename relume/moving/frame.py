@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 from relume.look import Look
 from relume.moving.again import Part, Shown, resolve_some
 from relume.moving.basis.lobes import Lobes, lobes_of
+from relume.moving.basis.tables import Tables, tables_of
 from relume.moving.beams.show import add_beams
 from relume.moving.behind import Caught, lay_over, seen_behind
-from relume.moving.between_points import SkyLight, take_off_lobes
 from relume.moving.bumps import towards_light
 from relume.moving.edges import resolve
-from relume.moving.evaluate import Tables, send, tables_of
-from relume.moving.glints import glance
+from relume.moving.evaluate import Sent, send
+from relume.moving.highlights.between_points import add_sky_in_highlights
+from relume.moving.highlights.glances import glance
+from relume.moving.highlights.lobe_lights import MOST_LAMPS, widths_of
+from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.panes import hide_less, lay_over_glass
-from relume.moving.pixels import Mirrored, Sent, combine
+from relume.moving.pixels import FromVertices, Mirrored, combine
 from relume.moving.relief.show import Sight, show_texels
 from relume.moving.relief.tables import Cover, covers_of
 from relume.moving.sky import turn_of
@@ -87,13 +90,13 @@ class Sums(NamedTuple):
     """What a frame was summed from.
 
     Attributes:
-        glances: of points along their lobes. (points, 4) float32. sent: by points. (points, groups, 3) float32
-        at_vertices: both of vertices. towards_light: of vertices, see `Sent`.
+        glances: of points along their lobes. (points, 3) float32. sent: by points.
+        at_vertices: both of vertices. towards_light: of vertices, see `FromVertices`.
         radiance: along the rays. (rays, 3) float32
     """
 
     glances: F32
-    sent: F32
+    sent: Sent
     at_vertices: tuple[F32, F32]
     towards_light: F32
     radiance: F32
@@ -197,17 +200,28 @@ def _summed(
     surface, materials, arriving = transfer.surface, wanted.materials, wanted.arriving
     lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
     glances, sent, (broad, along), towards, out = into or (None, None, (None, None), None, None)
-    glances = glance(surface, transfer.sky_share, arriving.others, lobes, eye, points, glances)
-    sky, sent = _sky_in(transfer, wanted.light), send(surface, arriving.total, materials.tables, eye, points, sent)
-    take_off_lobes(surface, lobes, sky, eye, glances, points, sent)
-    broad, along = at_vertices(surface, vertices, sent, broad), at_vertices(surface, vertices, glances, along)
+    glances = _glanced(transfer, wanted, eye, points, glances)
+    sky = _sky_in(transfer, wanted.light)
+    sent = send(surface, arriving.total, arriving.others, materials.tables, eye, points, sent)
+    add_sky_in_highlights(surface, lobes, sky, eye, glances, points, sent)
+    broad, along = at_vertices(surface, vertices, sent.radiance, broad), at_vertices(surface, vertices, glances, along)
     towards = _towards_light(transfer, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
-    pixel_angle, from_vertices = camera.yfov / height, Sent(broad, materials.sends, towards)
+    pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
     out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
     sight = Sight(eye, pixel_angle, seen)
     show_texels(materials.covers, surface, transfer.positions, sight, arriving.total, emission, out)
     return Sums(glances, sent, (broad, along), towards, out)
+
+
+def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8], out: F32 | None) -> F32:
+    """Look from points along their lobes. out: written; None: new."""
+    lobes, light = wanted.materials.lobes, wanted.light
+    widths = widths_of(lobes) if light.paths.direct and light.is_environment_lit else ()
+    if not widths:
+        return np.zeros((len(points), 1 + MOST_LAMPS), np.float32) if out is None else out
+    listed = transfer.lobe_lights(light.environment, widths)
+    return glance(transfer.surface, transfer.visible, listed, lobes, eye, points, out)
 
 
 def _add_beams(
@@ -238,7 +252,8 @@ def _sky_in(transfer: MovingTransfer, light: Light) -> SkyLight:
     """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
     is_seen = light.paths.direct and light.is_environment_lit
     gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
-    return SkyLight(transfer.sky_in(light.environment.map), turn_of(light.environment.rotation), gain)
+    sky, lamps = transfer.sky_in(light.environment.map), transfer.lamps_in(light.environment)
+    return SkyLight(sky, lamps, turn_of(light.environment.rotation), gain)
 
 
 def _caught(transfer: MovingTransfer, wanted: Wanted, seen: Seen) -> Caught:

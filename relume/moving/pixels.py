@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
-from relume.moving.between_points import SkyLight
 from relume.moving.bumps import leaning, shading_ratio, unit
-from relume.moving.glints import along_lobe
+from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_lobe
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import EMISSION, NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
-from relume.moving.sky import sky_about
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -31,12 +29,26 @@ class Mirrored(NamedTuple):
 
     Attributes:
         lobes: of all materials. sky: that they show where points see it.
-        glances: of vertices along their lobes, from `relume.moving.glints`. (vertices, 4) float32
+        glances: of vertices along their lobes, from `relume.moving.highlights.glances`. (vertices, 3) float32
     """
 
     lobes: Lobes
     sky: SkyLight
     glances: F32
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
+    """Interpolate vectors between the three vertices about a pixel.
+
+    Args:
+        values: of all vertices. (vertices, 3). vertex: the three, a tuple. weight: of each, a tuple.
+    """
+    x = y = z = np.float32(0)
+    for k in range(3):
+        v, w = vertex[k], weight[k]
+        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
+    return x, y, z
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -58,38 +70,21 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     Returns:
         A row of the lobe's table and the share of the next, for its albedo.
     """
-    lobes, open_sky = mirrored.lobes, np.float32(0)
-    for k in range(3):
-        open_sky += weight[k] * mirrored.glances[vertex[k], 0]
-    dx, dy, dz = direction[0], direction[1], direction[2]
-    row, share, rx, ry, rz, sigma = along_lobe(lobes, lobe, n, direction)
-    sky_about(mirrored.sky.sky, mirrored.sky.turn, rx, ry, rz, sigma, light)
-    along = dx * outward[0] + dy * outward[1] + dz * outward[2]
-    away = (rx * outward[0] + ry * outward[1] + rz * outward[2]) * (np.float32(-1) if along > 0 else np.float32(1))
+    seen = blend(mirrored.glances, vertex, weight)
+    row, share, ray, sigma = along_lobe(mirrored.lobes, lobe, n, direction)
+    along = direction[0] * outward[0] + direction[1] * outward[1] + direction[2] * outward[2]
+    away = (ray[0] * outward[0] + ray[1] * outward[1] + ray[2] * outward[2]) * (
+        np.float32(-1) if along > 0 else np.float32(1)
+    )
     # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
     per = np.float32(1) / sigma
     hidden, facing = _beyond(per * away), _beyond(per * abs(along))
     above = min((np.float32(1) + facing) / (np.float32(1) + hidden), np.float32(1))
+    light[0] = light[1] = light[2] = 0
+    add_sky_in_lobe(mirrored.sky, seen, ray, sigma, above, light)
     for channel in range(3):
-        light[channel] *= open_sky * mirrored.sky.gain[channel]
-        for k in range(3):
-            light[channel] += weight[k] * mirrored.glances[vertex[k], 1 + channel]
-        light[channel] *= above
+        light[channel] *= mirrored.sky.gain[channel]
     return row, share
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
-    """Interpolate vectors between the three vertices about a pixel.
-
-    Args:
-        values: of all vertices. (vertices, 3). vertex: the three, a tuple. weight: of each, a tuple.
-    """
-    x = y = z = np.float32(0)
-    for k in range(3):
-        v, w = vertex[k], weight[k]
-        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
-    return x, y, z
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -196,7 +191,7 @@ def _combine(  # type: ignore[no-untyped-def]
                 out[p, channel] += texture_value[channel] * max(total, np.float32(0))
 
 
-class Sent(NamedTuple):
+class FromVertices(NamedTuple):
     """What vertices send to an eye, and what leaning pixels about them make of it.
 
     Attributes:
@@ -214,7 +209,7 @@ def combine(
     surface: Surface,
     seen: Seen,
     pixel_angle: float,
-    sent: Sent,
+    sent: FromVertices,
     emission: F32,
     mirrored: Mirrored,
     rows: NDArray[np.int32] | None = None,

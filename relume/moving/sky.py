@@ -15,8 +15,9 @@ from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
 
-_NARROWEST = 2.0  # σ of the first level that is blurred, degrees; each is twice the one before
-_NUM_BLURRED = 5
+_NARROWEST = 2.0  # σ of the first level that is blurred, degrees
+_STEPS = 2  # levels until σ is twice as large: what is between two is a sum of both, and no blur
+_NUM_BLURRED = 9
 
 
 class Sky(NamedTuple):
@@ -31,9 +32,14 @@ class Sky(NamedTuple):
     levels: NDArray[np.int64]
 
 
-def sky_of(map_of: Callable[[float], F32]) -> Sky:
-    """Blur an environment by steps. map_of: degrees -> radiance, (height, width, 3) float32"""
-    maps = [map_of(0.0), *(map_of(_NARROWEST * 2.0**k) for k in range(_NUM_BLURRED))]
+def sky_of(sharp: F32, map_of: Callable[[float], F32]) -> Sky:
+    """Blur an environment by steps.
+
+    Args:
+        sharp: its radiance. (height, width, 3) float32
+        map_of: what of it is blurred, by degrees. (height, width, 3) float32
+    """
+    maps = [sharp, *(map_of(_NARROWEST * 2 ** (k / _STEPS)) for k in range(_NUM_BLURRED))]
     ends = np.cumsum([0, *(radiance.shape[0] * radiance.shape[1] for radiance in maps)])
     levels = [(end, *radiance.shape[:2]) for end, radiance in zip(ends, maps, strict=False)]
     return Sky(np.concatenate([radiance.reshape(-1, 3) for radiance in maps]), np.array(levels, np.int64))
@@ -85,23 +91,30 @@ def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
         out[channel] += share * (top * (1 - fy) + bottom * fy)
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def level_of(sigma):  # type: ignore[no-untyped-def]
+    """Find the level of a blur of σ radians, as if there were any number of them."""
+    step = np.float32(_STEPS) * math.log2(max(sigma * np.float32(180 / math.pi / _NARROWEST), np.float32(1e-3)))
+    return max(step + np.float32(1), np.float32(0))
+
+
 # Inlined, as what it calls: calls would count the references of arrays, for which threads wait for each other.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def sky_about(sky, turn, dx, dy, dz, sigma, out):  # type: ignore[no-untyped-def]
-    """Find the light about a direction.
+def add_sky_about(sky, turn, direction, level, gain, out):  # type: ignore[no-untyped-def]
+    """Add the light about a direction.
 
     Args:
         sky: its levels. turn: of the map, as a share of a whole turn, and a half.
-        dx, dy, dz: the direction, unit. sigma: of the blur, radians. out: written. (3,)
+        direction: unit, a tuple. level: of the blur, from `level_of`. gain: that it is multiplied by.
+        out: added to. (3,)
     """
-    step = math.log2(max(sigma * np.float32(180 / math.pi / _NARROWEST), np.float32(1e-3)))
-    place: Any = min(max(step + 1, 0.0), sky.levels.shape[0] - 1.0)
+    place: Any = min(level, np.float32(sky.levels.shape[0] - 1))
     lower = np.int64(place)
-    share = place - lower
-    out[0] = out[1] = out[2] = 0
-    u, v = _place(turn, dx, dy, dz)
-    _add_level(sky, lower, u, v, np.float32(1 - share), out)
-    _add_level(sky, min(lower + 1, sky.levels.shape[0] - 1), u, v, np.float32(share), out)
+    share = place - np.float32(lower)
+    u, v = _place(turn, direction[0], direction[1], direction[2])
+    _add_level(sky, lower, u, v, gain * (np.float32(1) - share), out)
+    if share > 0:
+        _add_level(sky, lower + 1, u, v, gain * share, out)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

@@ -8,7 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.look import EnvironmentKey
 from relume.moving.beams.beam import Beam
+from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.points.surface import Surface
 from relume.moving.sky import Sky
 from relume.moving.solid import Solid
@@ -49,9 +51,20 @@ class MovingTransfer(Opened, Protocol):
     @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
-    def sky_share(self) -> F32: ...
+    def visible(self) -> NDArray[np.uint8]:
+        """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
+        ...
+
+    def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
+        """The light triangles of an environment, as lobes of some widths look for them."""
+        ...
+
     def sky_in(self, name: str | None) -> Sky:
-        """An environment, None for the scene's own, and what it is when it is blurred."""
+        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        ...
+
+    def lamps_in(self, environment: EnvironmentKey) -> F32:
+        """Lamps of an environment, turned; see `relume.moving.highlights.looking.SkyLight`. (lamps, 7) float32"""
         ...
 
     def vectors(self, element: Light, beside_suns: bool) -> F32:

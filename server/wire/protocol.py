@@ -29,7 +29,7 @@ MAX_FRAMES_IN_FLIGHT = 2
 MAX_VIEWS_SHOWN = 4
 MAX_EYE_PIXELS = 1920 * 1200
 # of GET /api/bakes/{id}/surface/…, kept for ever: clients name it, lest what an earlier release gave be taken for it
-SURFACE_LAYOUT = 2
+SURFACE_LAYOUT = 3
 
 Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
 Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
@@ -336,14 +336,16 @@ class ArrayInfo(Message):
 class TablesInfo(Message):
     """What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what
     lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height
-    and width of each. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those
-    of the payload; those that are not named are as they were."""
+    and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that
+    comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named
+    are as they were."""
 
     gain: tuple[float, float, float]
     sky_gain: tuple[float, float, float]
     background_gain: tuple[float, float, float]
     sky_turn: float
     sky_levels: list[tuple[int, int, int]]
+    lamps: list[tuple[float, float, float, float, float, float, float]]
     background: Literal["map", "blurred", "color", "transparent"]
     background_color: tuple[float, float, float]
     background_size: tuple[int, int]

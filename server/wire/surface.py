@@ -17,6 +17,17 @@ class LadderBody(Body):
     c: list[float]
 
 
+class LobeListsBody(Body):
+    """Lists of lights that lobes look for: `side` of the map of directions, how many are `listed` for each and how many
+    `lights_a_lamp`; the `narrowest` σ, radians, of so many `widths`, each √2 times the one before."""
+
+    side: int
+    listed: int
+    lights_a_lamp: int
+    narrowest: float
+    widths: int
+
+
 class SurfaceBody(Body):
     """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
     `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET
@@ -29,5 +40,6 @@ class SurfaceBody(Body):
     ladder: LadderBody
     expansions: list[list[float]]
     first_points: list[int]
+    lobe_lists: LobeListsBody
     has_holes: bool
     arrays: list[str]

@@ -5,15 +5,22 @@ import pytest
 from tiny_scenes import looking, mesh, quad, scene_of, sphere, studio
 
 from relume.bake import Recipe
-from relume.environments.equirect import lookup, turned
+from relume.environments.equirect import lookup, texel_directions, turned
+from relume.light.blur import blurred
+from relume.light.suns import LAMPS as LAMPS_OF_SKIES
+from relume.light.suns import without_suns
 from relume.look import complete, validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.basis import lobes as lobes_module
 from relume.moving.basis.lobes import is_narrow, lobes_of
 from relume.moving.basis.out_factors import NUM_ROWS
-from relume.moving.between_points import SkyLight, take_off_lobes
-from relume.moving.glints import LEAST_COSINE
+from relume.moving.basis.rows import LEAST_COSINE
+from relume.moving.evaluate import Sent
+from relume.moving.highlights.between_points import add_sky_in_highlights
+from relume.moving.highlights.glances import glance
+from relume.moving.highlights.lobe_lights import SIDE, lists_numpy, lobe_lights, widths_of
+from relume.moving.highlights.looking import SkyLight
 from relume.moving.points.lattice import pieces_of, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import sky_of, turn_of
@@ -64,60 +71,153 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
     assert error() > 2.5 * kept
 
 
-def lobe_numpy(surface, lobes, light, eye, share_of_sky, point):
-    """L of a point, in plain NumPy: the oracle of what is taken off. (groups, 3)"""
+LAMPS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0, 2.0, 1e-3]], np.float32)
+
+
+def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), lamps=LAMPS):
+    rng = np.random.default_rng(5)
+    sky = sky_of(rng.random((16, 32, 3), np.float32), lambda degrees: rng.random((16, 32, 3), np.float32))
+    return SkyLight(sky, lamps, turn_of(rotation), np.array(gain, np.float32))
+
+
+def seen_along(lobes, surface, eye, point):
+    """Reads a lobe's tables for a point; its normal; where the eye's ray goes on along the surface. In plain NumPy."""
     lobe = lobes.of[surface.material[point]]
     n = surface.points.normal[point].astype(np.float64)
     wo = eye - surface.points.position[point].astype(np.float64)
     wo /= np.linalg.norm(wo)
     place = np.sqrt(1 - np.clip(wo @ n, LEAST_COSINE, 1)) * (NUM_ROWS - 1)
     row = min(int(place), NUM_ROWS - 2)
+    aside = (wo @ n) * n - wo
 
     def at(table):
         return table[lobe, row] + (place - row) * (table[lobe, row + 1] - table[lobe, row])
 
-    aside = (wo @ n) * n - wo
-    direction = np.sqrt(1 - at(lobes.mean) ** 2) * aside / np.linalg.norm(aside) + at(lobes.mean) * n
-    level = np.clip(np.log2(np.degrees(at(lobes.sigma)) / 2) + 1, 0, len(light.sky.levels) - 1)
-    rotated = turned(direction[None], 360 * (0.5 - float(light.turn)))
-    found = np.zeros(3)
+    return at, n, aside / np.linalg.norm(aside)
+
+
+def two_numpy(lobes, surface, eye, point):
+    """Where both lobes of a point look, their shares, σ."""
+    at, n, aside = seen_along(lobes, surface, eye, point)
+    directions = [np.sqrt(1 - cosine**2) * aside + cosine * n for cosine in at(lobes.cosine)]
+    return np.array(directions), np.array([at(lobes.first), 1 - at(lobes.first)]), at(lobes.sigma)
+
+
+def one_numpy(lobes, surface, eye, point):
+    """Where the lobe of a pixel at a point looks, its share, and its width."""
+    at, n, aside = seen_along(lobes, surface, eye, point)
+    return (np.sqrt(1 - at(lobes.mean) ** 2) * aside + at(lobes.mean) * n)[None], np.ones(1), at(lobes.wide)
+
+
+def sky_numpy(directions, shares, sigma, light, glance):
+    """What lobes show of the sky, in plain NumPy: the oracle. (3,)"""
+    level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.sky.levels) - 1)
+    rotated = turned(directions, 360 * (0.5 - float(light.turn)))
+    found = np.zeros((len(directions), 3))
     for k, share in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
         first, height, width = light.sky.levels[k]
         radiance = light.sky.texels[first : first + height * width].reshape(height, width, 3)
-        found += share * lookup(radiance, rotated.astype(np.float32))[0]
-    return at(lobes.albedo) * found * light.gain * share_of_sky
+        found += share * lookup(radiance, rotated.astype(np.float32))
+    shown = glance[0] * (shares @ found)
+    for k, lamp in enumerate(light.lamps.astype(np.float64)):
+        towards, power, per = lamp[:3], lamp[3:6], 1 / (sigma**2 + lamp[6])
+        density = np.exp(per * (directions @ towards - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
+        shown = shown + glance[1 + k] * min(level, 1) * (shares @ density) * power
+    return shown * light.gain
 
 
 @pytest.mark.parametrize("rotation", [0.0, 123.0])
-def test_what_is_taken_off_is_the_lobe_of_the_oracle(shiny_ball, rotation):
+def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_one(shiny_ball, rotation):
     moving, _ = shiny_ball
-    surface, rng = moving.surface, np.random.default_rng(5)
-    maps = {degrees: rng.random((16, 32, 3), np.float32) for degrees in (0.0, 2.0, 4.0, 8.0, 16.0, 32.0)}
-    light = SkyLight(sky_of(maps.__getitem__), turn_of(rotation), np.array([1.0, 0.5, 2.0], np.float32))
+    surface, rng, light = moving.surface, np.random.default_rng(7), sky_light(rotation)
     num, eye = surface.points.num_points, np.array([0.4, 1.5, 3.0], np.float32)
-    glances = rng.random((num, 4), np.float32)
-    lobes = lobes_of([[{**GLOSSY, "texture": "diffuse"}]])
+    glances = rng.random((num, 3), np.float32)
+    terms = [[{**GLOSSY, "texture": "diffuse"}]]
+    lobes = lobes_of(terms)
+    sky = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    take_off_lobes(surface, lobes, light, eye, glances, is_needed, sent)
+    add_sky_in_highlights(surface, lobes, light, eye, glances, is_needed, Sent(sent, sky))
     assert not sent[is_needed == 0].any()
+    held, most = 0, float(lobes.most[0])
     for point in np.flatnonzero(is_needed)[::17]:
-        expected = lobe_numpy(surface, lobes, light, eye.astype(np.float64), glances[point, 0], point)
-        np.testing.assert_allclose(-sent[point], expected, rtol=2e-3, atol=1e-4)
+        at, _, _ = seen_along(lobes, surface, eye.astype(np.float64), point)
+        said, found = (
+            at(lobes.albedo) * sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
+            for lobe in (two_numpy, one_numpy)
+        )
+        expected = np.clip(sky[point], said / most, said * most)
+        held += int((expected != sky[point]).sum())
+        np.testing.assert_allclose(sent[point], expected - found, rtol=2e-3, atol=3e-4 * max(1, np.abs(said).max()))
+    assert held > 3
     assert sent[:, 1].any()
     assert not sent[:, [0, 2]].any()
 
 
 def test_what_the_in_basis_cannot_tell_is_a_lobe_alone(shiny_ball):
-    surface = shiny_ball[0].surface
+    surface, rng = shiny_ball[0].surface, np.random.default_rng(7)
     assert is_narrow(NARROW)
     lobes = lobes_of([[NARROW, GLOSSY]])
-    assert lobes.is_told.tolist() == [False]
-    sent = np.zeros((surface.points.num_points, 3, 3), np.float32)
-    light = SkyLight(sky_of(lambda degrees: np.ones((4, 8, 3), np.float32)), turn_of(0), np.ones(3, np.float32))
-    everywhere = np.ones(len(sent), np.uint8)
-    take_off_lobes(surface, lobes, light, CAMERA.to_world[:3, 3], np.ones((len(sent), 4), np.float32), everywhere, sent)
-    assert not sent.any()
+    assert lobes.most.tolist() == [1]
+    num = surface.points.num_points
+    sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
+    sky = rng.normal(size=(num, 3, 3)).astype(np.float32)
+    eye, glances = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
+    add_sky_in_highlights(surface, lobes, sky_light(), eye, glances, everywhere, Sent(sent, sky))
+    assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
+
+
+def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
+    surface, rng = shiny_ball[0].surface, np.random.default_rng(3)
+    num, num_lights, lobes = surface.points.num_points, 20, lobes_of([[NARROW]])
+    directions = rng.normal(size=(num_lights, 3)).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    of_lamps = np.zeros((2, num_lights), np.float32)
+    of_lamps[0, [2, 5]], of_lamps[1, 11] = (0.25, 0.75), 1
+    radius, luminous = (rng.uniform(low, high, num_lights).astype(np.float32) for low, high in ((0.3, 0.8), (1, 9)))
+    listed = lobe_lights(directions, radius, luminous, of_lamps, widths_of(lobes))
+    bits = rng.integers(0, 2, (num, 8 * ((num_lights + 7) // 8)), np.uint8)
+    eye, is_needed = np.array([0.4, 1.5, 3.0], np.float32), (np.arange(num) % 3 > 0).astype(np.uint8)
+    found = glance(surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, eye, is_needed)
+    assert not found[is_needed == 0].any()
+    for point in np.flatnonzero(is_needed)[::13]:
+        towards, shares, sigma = two_numpy(lobes, surface, eye.astype(np.float64), point)
+        middle = shares @ towards
+        size = np.linalg.norm(middle)
+        variance = sigma**2 + 1 - size + listed.lights[:, 3].astype(np.float64)
+        weight = luminous / variance * np.maximum(1 - (1 - directions @ middle / size) / (8 * variance), 0) ** 8
+        expected = weight @ bits[point, :num_lights] / weight.sum()
+        seen = [expected, *(of_lamps @ bits[point, :num_lights])]
+        np.testing.assert_allclose(found[point], seen, atol=2e-3)
+
+
+@pytest.mark.parametrize("width", [0, 3, 9])
+def test_lists_have_the_lights_that_weigh_most(width):
+    rng = np.random.default_rng(4)
+    directions = rng.normal(size=(300, 3)).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    radius, luminous = rng.uniform(0.02, 0.3, 300).astype(np.float32), rng.uniform(0, 9, 300).astype(np.float32)
+    listed = lobe_lights(directions, radius, luminous, np.zeros((0, 300), np.float32), (width,))
+    for square in range(0, SIDE * SIDE, 31):
+        found = listed.lists[listed.first[width] + square]
+        assert set(found[found >= 0]) == set(lists_numpy(listed, width, square))
+
+
+@pytest.mark.parametrize("degrees", [4.0, 16.0])
+def test_a_blurred_sky_and_its_lamp_are_the_blurred_whole(degrees):
+    """A lamp of two degrees, too wide for a sun whose shadows are traced."""
+    towards, axis = texel_directions(256, 512), np.array([0.0, 0.6, 0.8])
+    sky = np.where((towards @ axis > np.cos(np.radians(2)))[..., None], 3000.0, 1 + towards[..., 1:2] ** 2)
+    whole = np.repeat(sky, 3, axis=2).astype(np.float32)
+    assert not without_suns(whole).suns
+    (lamp,), beside = without_suns(whole, LAMPS_OF_SKIES)
+    spread = 1 - np.linalg.norm(lamp.mean)
+    expected, rest, per = blurred(whole, degrees), blurred(beside, degrees), 1 / (np.radians(degrees) ** 2 + spread)
+    cosine = texel_directions(*expected.shape[:2]) @ lamp.mean / np.linalg.norm(lamp.mean)
+    density = np.exp(per * (cosine - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
+    found = rest + density[..., None] * lamp.irradiance
+    assert np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2)) < 0.03
+    assert np.sqrt(np.mean((rest - expected) ** 2) / np.mean(expected**2)) > 0.5
 
 
 def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():

@@ -9,7 +9,7 @@ from relume.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis.lobes import is_narrow, lobes_of
 from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors, turned
-from relume.moving.evaluate import tables_of
+from relume.moving.basis.tables import tables_of
 
 
 def document(model, **fields):
@@ -79,7 +79,8 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
     ]
     assert not is_narrow(terms[-1])
     tables = tables_of([terms, []])
-    assert tables.of.tolist() == [[[0, 0], [1, -1], [-1, -1]], [[-1, -1]] * 3]
+    of = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
+    assert tables.of.tolist() == [of, [[-1] * 6] * 3]
     np.testing.assert_allclose(tables.even[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
 
 
@@ -110,6 +111,48 @@ def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
 
 def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
     found = [lobes_of([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
-    np.testing.assert_allclose(found[0].mean[0, :24], cosines()[:24], atol=0.02)
-    widths = [lobe.sigma[0, 8] for lobe in found]
+    np.testing.assert_allclose(found[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
+    widths = [lobe.wide[0, 8] for lobe in found]
     assert widths == sorted(widths)
+    np.testing.assert_allclose(
+        found[0].cosine[0, :24, 0], found[0].mean[0, :24], atol=1e-6
+    )  # too narrow for points: one
+
+
+@pytest.mark.parametrize("row", [10, 16, 20])
+@pytest.mark.parametrize("exponent", [60.0, 200.0])
+def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponent):
+    """Mean, variances and third moment over all directions, by another quadrature."""
+    term = document("blinn_phong", params={"exponent": exponent})
+    lobes = lobes_of([[term]])
+    cosine = cosines()[row]
+    eye = np.arccos(cosine)
+    nodes, weights = np.polynomial.legendre.leggauss(600)
+    cos_i, phi = np.repeat((nodes + 1) / 2, 360), np.tile((np.arange(360) + 0.5) * (2 * np.pi / 360), 600)
+    sin_i = np.sqrt(1 - cos_i**2)
+    wi = np.stack([sin_i * np.cos(phi), sin_i * np.sin(phi), cos_i], axis=-1)
+    weight = eval_brdf(term, wi, np.array([-np.sin(eye), 0, cosine]))[:, 0] * cos_i * np.repeat(weights, 360)
+    weight /= weight.sum()
+    mean = weight @ wi
+    angle, length = np.arctan2(mean[0], mean[2]), np.linalg.norm(mean)
+    u, v = wi @ [np.cos(angle), 0, -np.sin(angle)], wi[:, 1]
+    off = np.sin(np.arccos(lobes.cosine[0, row]) - angle)
+    share = np.array([lobes.first[0, row], 1 - lobes.first[0, row]])
+    sigma = float(lobes.sigma[0, row])
+    assert (weight @ v**2) / length == pytest.approx(sigma**2, rel=0.05)
+    assert (weight @ u**2) / length == pytest.approx(sigma**2 + share @ off**2, rel=0.05)
+    assert share @ off == pytest.approx(0, abs=0.03 * sigma)
+    assert (weight @ u**3) / length == pytest.approx(share @ off**3, rel=0.1, abs=0.02 * sigma**3)
+
+
+def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
+    term = document("ward_anisotropic", params={"alpha_x": 0.4, "alpha_y": 0.1})
+    lobes = lobes_of([[term]])
+    assert lobes.of.tolist() == [0]
+    np.testing.assert_array_equal(lobes.cosine[0, :, 0], lobes.cosine[0, :, 1])
+
+
+def test_what_the_in_basis_cannot_tell_is_not_believed_and_what_it_tells_well_is():
+    most = [lobes_of([[document("blinn_phong", params={"exponent": e})]]).most[0] for e in (20.0, 30.0, 300.0)]
+    assert most[0] > most[1] > most[2] == 1
+    assert most[0] > 5

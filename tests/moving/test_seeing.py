@@ -9,13 +9,15 @@ from tiny_scenes import looking, mesh, scene_of, sphere, still_life
 from relume.bake import Recipe
 from relume.environments.equirect import lookup, turned
 from relume.errors import PlanError
+from relume.look import EnvironmentKey
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.basis.lobes import lobes_of
-from relume.moving.between_points import SkyLight
-from relume.moving.evaluate import send, send_numpy, tables_of
+from relume.moving.basis.tables import tables_of
+from relume.moving.evaluate import send, send_numpy
+from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import at_vertices, look
-from relume.moving.pixels import Mirrored, Sent, combine
+from relume.moving.pixels import FromVertices, Mirrored, combine
 from relume.moving.points.lattice import node_of, num_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import fill_sky, turn_of
@@ -118,21 +120,29 @@ def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
 
 
 def test_what_points_send_is_that_of_the_oracle(moving):
+    """Of terms without a highlight all light; of the others what is not the sky's, which does not ring below black."""
     materials = [
         [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
         [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": {}, "texture": None}],
+        [{"model": "blinn_phong", "color": [0.2, 0.1, 0.3], "params": {"exponent": 20.0}, "texture": None}],
     ]
     names = len(moving.material_names)
-    tables = tables_of([materials[k % 2] for k in range(names)])
+    tables = tables_of([materials[k % 3] for k in range(names)])
     rng = np.random.default_rng(9)
     num = moving.surface.points.num_points
-    vectors, eye = rng.normal(size=(num, 3, 36)).astype(np.float32), np.array([0.3, 1.2, 2.0], np.float32)
-    found = send(moving.surface, vectors, tables, eye, np.ones(num, np.uint8))
+    vectors, others = (rng.normal(size=(num, 3, 36)).astype(np.float32) for _ in range(2))
+    eye, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
+    found = send(moving.surface, vectors, others, tables, eye, everywhere)
     for point in range(0, num, num // 60):
-        expected = send_numpy(moving.surface, vectors, tables, eye, point)
-        np.testing.assert_allclose(found[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
-    none = send(moving.surface, vectors, tables, eye, np.zeros(num, np.uint8))
-    assert not none.any()
+        for of, expected in zip(found, send_numpy(moving.surface, vectors, others, tables, eye, point), strict=True):
+            np.testing.assert_allclose(of[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
+    assert found.sky.any()
+    none = send(moving.surface, vectors, others, tables, eye, np.zeros(num, np.uint8))
+    assert not none.radiance.any()
+    assert not none.sky.any()
+    has_highlight = (moving.surface.material % 3 > 0) & (found.radiance[:, 0].max(axis=1) > 0)
+    assert has_highlight.any()
+    assert not send(moving.surface, vectors, None, tables, eye, everywhere).radiance[has_highlight].any()
 
 
 def test_textures_of_pixels_are_those_of_the_bakes(moving):
@@ -146,10 +156,12 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
     dark = np.zeros((len(moving.material_names), 3), np.float32)
     mirrored = Mirrored(
         lobes_of([()] * len(dark)),
-        SkyLight(moving.sky_in(None), turn_of(0.0), np.zeros(3, np.float32)),
-        np.zeros((len(sent), 4), np.float32),
+        SkyLight(
+            moving.sky_in(None), moving.lamps_in(EnvironmentKey(None, 0.0)), turn_of(0.0), np.zeros(3, np.float32)
+        ),
+        np.zeros((len(sent), 3), np.float32),
     )
-    all_groups = Sent(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
+    all_groups = FromVertices(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
     found = combine(surface, seen, angle, all_groups, dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured

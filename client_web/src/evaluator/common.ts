@@ -4,8 +4,10 @@
 export const WIDTH = 2048;
 /** Groups of terms: untextured, then those that a diffuse and a specular texture multiply. */
 export const GROUPS = 3;
-/** Texels of one material: its groups, its lobe and its normal map, its emission. */
-export const MATERIAL = GROUPS + 2;
+/** Texels of one material: its groups, its lobe and its normal map, its emission, the tables of its highlights. */
+export const MATERIAL = 2 * GROUPS + 2;
+/** The most lamps of a sky. */
+export const LAMPS = 2;
 
 export const HEAD = `#version 300 es
 precision highp float;
@@ -71,24 +73,52 @@ vec3 skyAt(ivec3 level, vec2 place) {
 }
 `;
 
-/** The sky about directions, blurred by σ radians, and where a lobe looks: texel `of` of its table, and the next. */
+/** The most levels of a sky: sharp, then blurred ever more. */
+export const SKY_LEVELS = 12;
+
+/** Where a lobe looks, and the sky that it shows (relume.moving.highlights.looking). The texel `of` of its table. */
 export const LOBES = `
 uniform sampler2D uLobes;
-uniform ivec3 uSkyLevels[8];
-uniform int uNumSkyLevels;
+uniform ivec3 uSkyLevels[${SKY_LEVELS}];
+uniform int uNumSkyLevels, uNumLamps;
 uniform vec3 uSkyGain;
+uniform vec4 uLampDirections[${LAMPS}];
+uniform vec3 uLampLights[${LAMPS}];
+struct Lobes { vec3 one, other; float first, sigma; };
+float levelOf(float sigma) { return max(2.0 * log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0); }
 vec3 skyAbout(vec3 direction, float sigma) {
-  float place = clamp(log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0, float(uNumSkyLevels - 1));
+  float place = min(levelOf(sigma), float(uNumSkyLevels - 1));
   int lower = int(place);
   float share = place - float(lower);
   vec2 where = placeOf(direction);
   vec3 found = skyAt(uSkyLevels[lower], where);
   return share > 0.0 ? mix(found, skyAt(uSkyLevels[lower + 1], where), share) : found;
 }
-vec3 alongLobe(int of, float share, vec3 n, vec3 d, out vec3 shape) {
-  shape = mix(texelFetch(uLobes, at(of), 0).xyz, texelFetch(uLobes, at(of + ${GROUPS + 1}), 0).xyz, share);
+vec3 lampAbout(int lamp, vec3 direction, float sigma) {
+  vec4 towards = uLampDirections[lamp];
+  float per = 1.0 / (sigma * sigma + towards.w), near = exp(-per * (1.0 - dot(direction, towards.xyz)));
+  return min(levelOf(sigma), 1.0) * near * per * 0.5 / PI / (1.0 - exp(-2.0 * per)) * uLampLights[lamp];
+}
+vec3 skyInLobe(vec3 direction, float sigma, vec3 seen) {
+  vec3 found = seen.x * skyAbout(direction, sigma);
+  if (uNumLamps > 0) found += seen.y * lampAbout(0, direction, sigma);
+  if (uNumLamps > 1) found += seen.z * lampAbout(1, direction, sigma);
+  return uSkyGain * found;
+}
+vec3 asideOf(vec3 n, vec3 d) {
   vec3 aside = d - dot(n, d) * n;
-  return sqrt(max(1.0 - shape.x * shape.x, 0.0)) * inversesqrt(max(dot(aside, aside), 1e-20)) * aside + shape.x * n;
+  return aside * inversesqrt(max(dot(aside, aside), 1e-20));
+}
+vec3 leanTo(float cosine, vec3 aside, vec3 n) { return sqrt(max(1.0 - cosine * cosine, 0.0)) * aside + cosine * n; }
+vec4 lobeRow(int texel, float share) { return mix(texelFetch(uLobes, at(texel), 0), texelFetch(uLobes, at(texel + ${GROUPS + 1}), 0), share); }
+vec3 alongLobe(int of, float share, vec3 n, vec3 d, out float wide) {
+  wide = lobeRow(of - 1, share).a;
+  return leanTo(lobeRow(of - 2, share).a, asideOf(n, d), n);
+}
+Lobes alongBoth(int of, float share, vec3 n, vec3 d) {
+  vec4 shape = lobeRow(of, share);
+  vec3 aside = asideOf(n, d);
+  return Lobes(leanTo(shape.x, aside, n), leanTo(shape.y, aside, n), shape.z, shape.w);
 }
 `;
 /** The albedo of a lobe in a group of terms, whose texel of a table is `of`. */

@@ -1,7 +1,7 @@
 /** Draws moving views of one bake: points, then slots, then pixels; what it holds of a look comes in tables. */
 import { Program } from "../picture/gl";
 import type { FrameHeader, SurfaceBody } from "../protocol";
-import { COVER, rectanglesOf } from "./common";
+import { COVER, LAMPS, rectanglesOf, SKY_LEVELS } from "./common";
 import { classesOf, layersOf, readMaterials, type FaceClass, type Material } from "./materials";
 import { pointShader, slotShader } from "./pointShader";
 import { read } from "./reading";
@@ -39,16 +39,18 @@ const KEPT: Record<string, [Kind, number]> = {
   places: ["float32", 4],
   point_normals: ["float16", 4],
   tangents: ["float16", 4],
-  sky_share: ["float16", 4],
+  seen_lights: ["uint32", 4],
   uvs: ["float32", 4],
   texels: ["float16", 4],
   levels: ["uint32", 4],
 };
+/** What points ask for, beside light vectors. */
+const OF_POINTS = ["places", "point_normals", "tangents", "even", "uneven", "lobes", "sky", "seen_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "lights_of_lamps"];
 const SAMPLES = 4; // a pixel
 const NEAREST = 1e-4; // of the size of the scene, to the nearest that is seen
 const FARTHEST = 100;
 
-/** A sampler's uniform by its array's name: uSkyShare of sky_share. */
+/** A sampler's uniform by its array's name: uSeenLights of seen_lights. */
 const uniform = (name: string) => `u${name.replace(/(^|_)(.)/g, (_, __, letter: string) => letter.toUpperCase())}`;
 
 export class Evaluator {
@@ -105,7 +107,7 @@ export class Evaluator {
 
   /** Whether there is a look to be drawn. */
   get isReady(): boolean {
-    return this.numbers !== null && !this.lacksSkyShare && !this.isLost;
+    return this.numbers !== null && !this.lacksSeenLights && !this.isLost;
   }
 
   get isLost(): boolean {
@@ -113,8 +115,8 @@ export class Evaluator {
   }
 
   /** Whether the look has lobes, which ask for an array that is not there yet. */
-  get lacksSkyShare(): boolean {
-    return this.layers.includes(3) && this.texels.count("sky_share") === 0;
+  get lacksSeenLights(): boolean {
+    return this.layers.includes(3) && this.texels.count("seen_lights") === 0;
   }
 
   /** Give the context back: a browser has few of them. */
@@ -149,9 +151,8 @@ export class Evaluator {
   /** What materials make use of, and which faces show what. */
   private takeMaterials(): void {
     const { gl, rows, scales } = this;
-    const [of, lobes] = [new Int32Array(rows.materials.buffer), new Float32Array(rows.lobes.buffer)];
     const before = JSON.stringify(this.materials.map(({ pixels }) => pixels));
-    this.materials = readMaterials(of, lobes, this.surface.rows, (name, k) => scales.get(`${name}/${k}/scale`)?.[1] ?? 0);
+    this.materials = readMaterials(new Int32Array(rows.materials.buffer), (name, k) => scales.get(`${name}/${k}/scale`)?.[1] ?? 0);
     this.layers = layersOf(this.materials);
     if (JSON.stringify(this.materials.map(({ pixels }) => pixels)) === before) return;
     for (const { buffer } of this.faces) gl.deleteBuffer(buffer);
@@ -191,12 +192,14 @@ export class Evaluator {
       const [first, end] = [surface.first_points[k] as number, surface.first_points[k + 1] as number];
       if (first === end) return;
       const made = this.program({ points, layers }, () => new Program(gl, COVER, pointShader(surface, points, layers)));
-      const program = this.use(made, ["sky_share", "places", "point_normals", "tangents", "even", "uneven", "lobes", "sky"]);
-      this.bindVectors(program, "vectors", k, 8);
-      this.bindVectors(program, "others", k, 9);
+      const program = this.use(made, OF_POINTS);
+      this.bindVectors(program, "vectors", k, OF_POINTS.length);
+      this.bindVectors(program, "others", k, OF_POINTS.length + 1);
       gl.uniform1i(program.at("uFirst"), first);
-      gl.uniform2iv(program.at("uTables"), tables);
+      gl.uniform2iv(program.at("uTables"), tables.plain);
+      gl.uniform4iv(program.at("uHighlights"), tables.highlights);
       gl.uniform1i(program.at("uLobe"), lobe);
+      gl.uniform1i(program.at("uSeenTexels"), this.texels.count("seen_lights") / Math.max(1, surface.first_points[surface.first_points.length - 1] as number));
       gl.uniform3fv(program.at("uEye"), placeOf(camera));
       this.saySky(program, numbers);
       for (const rectangle of rectanglesOf(first, end)) {
@@ -310,9 +313,14 @@ export class Evaluator {
   private saySky(program: Program, numbers: Tables): void {
     const { gl } = this;
     gl.uniform3fv(program.at("uSkyGain"), numbers.sky_gain);
-    gl.uniform3iv(program.at("uSkyLevels"), numbers.sky_levels.slice(0, 8).flat());
-    gl.uniform1i(program.at("uNumSkyLevels"), Math.min(8, numbers.sky_levels.length));
+    gl.uniform3iv(program.at("uSkyLevels"), numbers.sky_levels.slice(0, SKY_LEVELS).flat());
+    gl.uniform1i(program.at("uNumSkyLevels"), Math.min(SKY_LEVELS, numbers.sky_levels.length));
     gl.uniform1f(program.at("uTurn"), numbers.sky_turn);
+    const lamps = numbers.lamps.slice(0, LAMPS);
+    gl.uniform1i(program.at("uNumLamps"), lamps.length);
+    if (lamps.length === 0) return;
+    gl.uniform4fv(program.at("uLampDirections"), lamps.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]));
+    gl.uniform3fv(program.at("uLampLights"), lamps.flatMap(([, , , ...light]) => light.slice(0, 3)));
   }
 
   private sayBehind(program: Program, numbers: Tables): void {

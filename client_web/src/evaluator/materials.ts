@@ -1,6 +1,6 @@
 /** What each material of a look makes use of, from the rows that `relume.moving.shader.tables` writes of it. */
 import { GROUPS, MATERIAL } from "./common";
-import type { PointFeatures } from "./pointShader";
+import type { Kinds, PointFeatures } from "./pointShader";
 
 /** What pixels of a material make use of. */
 export interface Shows {
@@ -15,8 +15,8 @@ export interface Shows {
 export interface Material {
   points: PointFeatures;
   pixels: Shows;
-  /** The even and the uneven table of each group. */
-  tables: readonly number[];
+  /** The even and the uneven table of each group; of the sky in its highlights, and of other light in these. */
+  tables: { plain: readonly number[]; highlights: readonly number[] };
   lobe: number;
 }
 
@@ -28,24 +28,28 @@ const UNEVEN = 1;
 const SENDS = 2;
 const TEXTURE = 3;
 
-/** Read the rows of all materials. `lobes`: texels of four, `tableRows` rows of each. */
-export function readMaterials(rows: Int32Array, lobes: Float32Array, tableRows: number, functions: Functions): Material[] {
+/** Read the rows of all materials. */
+export function readMaterials(rows: Int32Array, functions: Functions): Material[] {
   const groups = Array.from({ length: GROUPS }, (_, group) => group);
   return Array.from({ length: rows.length / (4 * MATERIAL) }, (_, index) => {
     const at = (texel: number, number: number) => rows[4 * (index * MATERIAL + texel) + number] as number;
     const [lobe, normalMap, catches] = [at(GROUPS, 0), at(GROUPS, 1), at(GROUPS, 2)];
     const sending = groups.filter((group) => at(group, SENDS) > 0);
-    const [even, uneven] = [EVEN, UNEVEN].map((kind) => groups.map((group) => at(group, kind) >= 0)) as [boolean[], boolean[]];
-    const isTold = (lobes[4 * ((lobe * tableRows + 1) * (GROUPS + 1) - 1) + 2] ?? 0) > 0;
-    const isAsked = [...even, ...uneven, normalMap >= 0].includes(true);
-    const kind = lobe < 0 ? "none" : isTold ? "told" : "narrow";
+    const kinds = groups.map((group) => [at(group, EVEN), at(group, UNEVEN), ...[0, 1, 2, 3].map((k) => at(GROUPS + 2 + group, k))]);
+    const kindsAt = (first: number): Kinds => ({
+      even: kinds.map((of) => (of[first] as number) >= 0),
+      uneven: kinds.map((of) => (of[first + 1] as number) >= 0),
+    });
+    const [plain, sky, beside] = [kindsAt(0), kindsAt(2), kindsAt(4)];
+    const isAsked = (of: Kinds) => [...of.even, ...of.uneven].includes(true);
     return {
       points: {
-        functions: isAsked ? functions("vectors", index) : 0,
-        even,
-        uneven,
-        lobe: kind,
-        others: kind === "narrow" ? functions("others", index) : 0,
+        functions: isAsked(plain) || isAsked(sky) || normalMap >= 0 ? functions("vectors", index) : 0,
+        others: isAsked(sky) || isAsked(beside) ? functions("others", index) : 0,
+        plain,
+        sky,
+        beside,
+        lobe: lobe >= 0,
         map: normalMap >= 0,
       },
       pixels: {
@@ -54,7 +58,7 @@ export function readMaterials(rows: Int32Array, lobes: Float32Array, tableRows: 
         lobes: lobe >= 0,
         catches: catches === 1,
       },
-      tables: groups.flatMap((group) => [at(group, EVEN), at(group, UNEVEN)]),
+      tables: { plain: kinds.flatMap((of) => of.slice(0, 2)), highlights: kinds.flatMap((of) => of.slice(2)) },
       lobe,
     };
   });

@@ -1,9 +1,10 @@
-/** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, its looks along lobes
- * (`glints`), less the sky in these (`between_points`), and where their light comes from (`bumps`), written from the
- * ladder. Sixteen numbers of each point: radiance of three groups, the direction of the light, the share of the sky along
- * the lobe, radiance beside it. */
+/** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, what they see along lobes
+ * (`highlights.glances`), how the sky in these differs from what lobes say (`highlights.between_points`), and where their
+ * light comes from (`bumps`), written from the ladder. Sixteen numbers of each point: radiance of three groups, the
+ * direction of the light, the share of the sky along the lobe, that of two lamps. */
 import type { SurfaceBody } from "../protocol";
 import { albedoOf, GROUPS, HEAD, LOBES, PLACE, rowOf, SKY, WIDTH } from "./common";
+import { glance } from "./glanceShader";
 
 const CHANNELS = [0, 1, 2];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -15,20 +16,29 @@ const part = (texels: string, k: number) => `${texels}${k >> 2}.${FOUR[k & 3]}`;
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
 const named = (texels: string, count: number) => `vec4 ${range(count).map((k) => `${texels}${k}`).join(", ")};`;
 
+/** Which groups have a table over θo alone, and which one over φo too. */
+export interface Kinds {
+  even: readonly boolean[];
+  uneven: readonly boolean[];
+}
+type Sent = "plain" | "sky" | "beside";
+
 /** What a material makes use of: the rest is not compiled in. Software takes both ways of every branch. */
 export interface PointFeatures {
   /** How many functions its light vectors have; 0 where nothing asks for them. */
   functions: number;
-  /** Which groups have a table of each kind. */
-  even: readonly boolean[];
-  uneven: readonly boolean[];
-  /** Its lobe: none, one that the in-basis tells, or one that is too narrow for that. */
-  lobe: "none" | "told" | "narrow";
-  /** How many functions the light vectors beside the sky have, which narrow lobes look at. */
+  /** The same of those beside the sky. */
   others: number;
+  /** Terms without a highlight; what those with one send of the sky, and of other light. */
+  plain: Kinds;
+  sky: Kinds;
+  beside: Kinds;
+  lobe: boolean;
   /** A normal map asks where light comes from. */
   map: boolean;
 }
+
+const isAsked = ({ even, uneven }: Kinds) => [...even, ...uneven].includes(true);
 
 /** cos mφ and sin mφ of all orders, from those of φ. */
 function turns(orders: number): string {
@@ -40,42 +50,28 @@ function turns(orders: number): string {
 }
 
 /** Rungs of the ladder whose functions a material's light vectors have. */
-const rungsBelow = ({ ladder }: SurfaceBody, functions: number) =>
-  range(ladder.order.length).filter((rung) => (ladder.cosine[rung] as number) < functions);
+const rungsOf = ({ ladder }: SurfaceBody, { functions, others }: PointFeatures) =>
+  range(ladder.order.length).filter((rung) => (ladder.cosine[rung] as number) < Math.max(functions, others));
 
-/** One number of a light vector: they come channel by channel. */
-const light = ({ functions }: PointFeatures, channel: number, k: number) =>
-  k < functions ? part("t", channel * functions + k) : "0.0";
+/** One number of a light vector: they come channel by channel. That of the sky is what the others leave of all. */
+function light(features: PointFeatures, of: Sent, channel: number, k: number): string {
+  const number = (texels: string, count: number) => (k < count ? part(texels, channel * count + k) : "0.0");
+  const [all, others] = [number("t", features.functions), number("o", features.others)];
+  return of === "plain" ? all : of === "beside" ? others : `(${all} - ${others})`;
+}
 
 /** Light vectors turned to the eye's φ, rung by rung. */
-function turned(surface: SurfaceBody, features: PointFeatures): string {
+function turned(surface: SurfaceBody, features: PointFeatures, of: Sent): string {
   const { ladder } = surface;
   const lines = CHANNELS.flatMap((channel) =>
-    rungsBelow(surface, features.functions).map((rung) => {
+    rungsOf(surface, features).map((rung) => {
       const m = ladder.order[rung] as number;
-      const cosine = light(features, channel, ladder.cosine[rung] as number);
-      const sine = light(features, channel, ladder.sine[rung] as number);
+      const cosine = light(features, of, channel, ladder.cosine[rung] as number);
+      const sine = light(features, of, channel, ladder.sine[rung] as number);
       const value = m === 0 ? cosine : `c${m} * ${cosine} + s${m} * ${sine}`;
       return `${part("turned", channel * ladder.order.length + rung)} = ${value};`;
     }),
   );
-  return lines.join("\n");
-}
-
-/** All functions in the direction whose place in the disc is \`w\`. */
-function functionsAt({ ladder }: SurfaceBody): string {
-  const lines = ["float x = 2.0 * dot(w, w) - 1.0, re = 1.0, im = 0.0, before = 0.0, last = 1.0, older, turn, value;"];
-  ladder.order.forEach((m, rung) => {
-    const [a, b, c, norm] = [ladder.a[rung], ladder.b[rung], ladder.c[rung], ladder.norm[rung]].map((value) =>
-      float(value as number),
-    );
-    if (ladder.a[rung] === 0) {
-      if (m > 0) lines.push("turn = re * w.x - im * w.y; im = re * w.y + im * w.x; re = turn;");
-      lines.push("before = 0.0; last = 1.0;");
-    } else lines.push(`older = last; last = (${a} * x + ${b}) * older - ${c} * before; before = older;`);
-    lines.push(`${part("h", ladder.cosine[rung] as number)} = ${norm} * last * re;`);
-    if (m > 0) lines.push(`${part("h", ladder.sine[rung] as number)} = ${norm} * last * im;`);
-  });
   return lines.join("\n");
 }
 
@@ -85,7 +81,7 @@ function expanded({ expansions }: SurfaceBody, features: PointFeatures): string 
     const parts = row.flatMap((value, k) =>
       Math.abs(value) < 1e-7
         ? []
-        : [`${float(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${light(features, c, k)}`).join(" + ")})`],
+        : [`${float(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${light(features, "plain", c, k)}`).join(" + ")})`],
     );
     return parts.join(" + ") || "0.0";
   });
@@ -93,9 +89,9 @@ function expanded({ expansions }: SurfaceBody, features: PointFeatures): string 
 }
 
 /** Radiance by a table over θo alone. */
-function even(surface: SurfaceBody, { functions }: PointFeatures): string {
+function even(surface: SurfaceBody, features: PointFeatures): string {
   const rungs = surface.ladder.order.length / 4;
-  const used = new Set(rungsBelow(surface, functions));
+  const used = new Set(rungsOf(surface, features));
   // texels of rungs that hold functions of high degrees alone are left out
   const lines = range(rungs).flatMap((q) => {
     const here = FOUR.split("").filter((_, k) => used.has(4 * q + k)).join("");
@@ -116,19 +112,19 @@ function even(surface: SurfaceBody, { functions }: PointFeatures): string {
 }
 
 /** Radiance by a table over θo and φo. */
-function uneven({ rows, columns, functions }: SurfaceBody, features: PointFeatures): string {
+function uneven({ rows, columns, functions }: SurfaceBody, features: PointFeatures, of: Sent): string {
   const texels = functions / 4;
   const place = (row: string, column: string, k: number) => `texelFetch(uUneven, at((${row} + ${column}) * ${3 * texels} + ${k}), 0)`;
   const sums = CHANNELS.map((channel) =>
-    range(Math.ceil(features.functions / 4))
+    range(Math.ceil(Math.max(features.functions, features.others) / 4))
       .map((q) => {
         const k = channel * texels + q;
         const [near, far] = ["near", "far"].map((row) => `mix(${place(row, "column", k)}, ${place(row, "beside", k)}, part)`);
-        return `dot(mix(${near}, ${far}, share), vec4(${range(4).map((n) => light(features, channel, 4 * q + n)).join(", ")}))`;
+        return `dot(mix(${near}, ${far}, share), vec4(${range(4).map((n) => light(features, of, channel, 4 * q + n)).join(", ")}))`;
       })
       .join(" +\n    "),
   );
-  return `vec3 uneven(int table, int row, float share, float cp, float sp) {
+  return `vec3 ${of}Uneven(int table, int row, float share, float cp, float sp) {
   float place = fract(atan(sp, cp) / 6.28318530718) * ${columns.toFixed(1)};
   int column = min(int(place), ${columns - 1}), beside = (column + 1) % ${columns};
   float part = place - float(column);
@@ -137,55 +133,74 @@ function uneven({ rows, columns, functions }: SurfaceBody, features: PointFeatur
 }`;
 }
 
+/** What is sent by tables of a kind, each group a vector: `name` and its number. */
+function sum(surface: SurfaceBody, features: PointFeatures, of: Sent, name: string): string {
+  const { even, uneven } = features[of];
+  const table = (group: number, k: number) => (of === "plain" ? `uTables[${group}].${FOUR[k]}` : `uHighlights[${group}].${FOUR[(of === "sky" ? 0 : 2) + k]}`);
+  const groups = range(GROUPS).map((group) => {
+    const parts = [even[group] && `even(${table(group, 0)}, row, share)`, uneven[group] && `${of}Uneven(${table(group, 1)}, row, share, cp, sp)`];
+    return `vec3 ${name}${group} = ${parts.filter(Boolean).join(" + ") || "vec3(0.0)"};`;
+  });
+  return `${even.includes(true) ? turned(surface, features, of) : ""}
+  ${groups.join("\n  ")}`;
+}
+
+/** The sky in highlights: what the in-basis says, within what two lobes allow, less what pixels find by one. */
+function sky(surface: SurfaceBody, features: PointFeatures): string {
+  const isTold = isAsked(features.sky);
+  const add = (group: number) => {
+    const held = isTold ? `clamp(told${group}, albedo * both / most, albedo * both * most)` : "albedo * both";
+    return `albedo = ${albedoOf(`of - ${GROUPS - group}`)}; sent${group} += ${held} - albedo * light;`;
+  };
+  return `${isTold ? sum(surface, features, "sky", "told") : ""}
+  float wide, most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;
+  vec3 ray = alongLobe(of, share, n, -wo, wide), light = skyInLobe(ray, wide, glance.xyz), albedo;
+  vec3 both = mix(skyInLobe(lobes.other, lobes.sigma, glance.xyz), skyInLobe(lobes.one, lobes.sigma, glance.xyz), lobes.first);
+  ${range(GROUPS).map(add).join("\n  ")}`;
+}
+
+const UNIFORMS = `
+uniform sampler2D uVectors, uOthers, uPlaces, uPointNormals, uTangents, uEven, uUneven;
+uniform int uFirst, uLobe;
+uniform ivec2 uTables[${GROUPS}];
+uniform ivec4 uHighlights[${GROUPS}];
+uniform float uScale, uOthersScale;
+uniform vec3 uEye;
+`;
+
 /** Loads so many numbers of a point from an array of whole texels. */
 const loaded = (into: string, array: string, scale: string, numbers: number) =>
   range(Math.ceil(numbers / 4))
     .map((q) => `${into}${q} = ${scale} * texelFetch(${array}, at((p - uFirst) * ${Math.ceil(numbers / 4)} + ${q}), 0);`)
     .join(" ");
 
-/** A look along the lobe. */
-function glance(surface: SurfaceBody, { lobe, others }: PointFeatures): string {
-  const texels = surface.functions / 4;
-  const seen = (channel: number) =>
-    range(others).map((k) => `${part("h", k)} * ${part("o", channel * others + k)}`).join(" + ") || "0.0";
-  const told = `vec3 light = glance.x * uSkyGain * skyAbout(r, shape.y);
-    ${range(GROUPS).map((group) => `sent${group} -= light * ${albedoOf(`of - ${GROUPS - group}`)};`).join("\n    ")}`;
-  const narrow = `${named("o", Math.max(1, Math.ceil((3 * others) / 4)))}
-    ${loaded("o", "uOthers", "uOthersScale", 3 * others)}
-    glance.yzw = max(vec3(${CHANNELS.map(seen).join(",\n      ")}), 0.0);`;
-  return `int of = (uLobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
-    vec3 shape, r = alongLobe(of, share, n, -wo, shape);
-    vec2 w = vec2(dot(tangent, r), dot(bitangent, r));
-    ${named("h", texels)}
-    ${functionsAt(surface)}
-    float open = ${range(texels).map((q) => `dot(h${q}, texelFetch(uSkyShare, at(p * ${texels} + ${q}), 0))`).join(" + ")};
-    glance.x = clamp(open, 0.0, 1.0);
-    ${lobe === "told" ? told : narrow}`;
-}
-
-const UNIFORMS = `
-uniform sampler2D uVectors, uOthers, uSkyShare, uPlaces, uPointNormals, uTangents, uEven, uUneven;
-uniform int uFirst, uLobe;
-uniform ivec2 uTables[${GROUPS}];
-uniform float uScale, uOthersScale;
-uniform vec3 uEye;
-`;
-
 /** Four numbers each, for which there is a layer. */
 export const outputs = (layers: readonly number[]) => layers.map((layer, k) => `layout(location = ${k}) out vec4 out${layer};`).join("\n");
 
-export function pointShader(surface: SurfaceBody, features: PointFeatures, layers: readonly number[]): string {
-  const { functions, lobe, map } = features;
-  const [isEven, isUneven] = [features.even.includes(true), features.uneven.includes(true)];
-  const sent = (group: number) => `vec3 sent${group} = vec3(0.0);
-  ${features.even[group] ? `sent${group} += even(uTables[${group}].x, row, share);` : ""}
-  ${features.uneven[group] ? `sent${group} += uneven(uTables[${group}].y, row, share, cp, sp);` : ""}`;
-  const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
-  return `${HEAD}${rowOf(surface.rows)}${lobe === "none" ? "" : `${PLACE}${SKY}${LOBES}`}${UNIFORMS}
-${outputs(layers)}
-${functions > 0 ? named("t", Math.ceil((3 * functions) / 4)) : ""}
+/** Functions and what they share. */
+function declared(surface: SurfaceBody, features: PointFeatures): string {
+  const kinds = (["plain", "sky", "beside"] as const).filter((of) => isAsked(features[of]));
+  const isEven = kinds.some((of) => features[of].even.includes(true));
+  const numbers = (texels: string, count: number) => (count > 0 ? named(texels, Math.ceil((3 * count) / 4)) : "");
+  return `${numbers("t", features.functions)}
+${numbers("o", features.others)}
 ${isEven ? `${named("turned", 3 * (surface.ladder.order.length / 4))}\n${even(surface, features)}` : ""}
-${isUneven ? uneven(surface, features) : ""}
+${kinds.filter((of) => features[of].uneven.includes(true)).map((of) => uneven(surface, features, of)).join("\n")}`;
+}
+
+export function pointShader(surface: SurfaceBody, features: PointFeatures, layers: readonly number[]): string {
+  const { functions, others, lobe, map, beside } = features;
+  const orders = rungsOf(surface, features).map((rung) => surface.ladder.order[rung] as number);
+  const besides = `${sum(surface, features, "beside", "beside")}
+  ${range(GROUPS).map((group) => `sent${group} += max(beside${group}, 0.0);`).join(" ")}`;
+  const looked = `int of = (uLobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
+  Lobes lobes = alongBoth(of, share, n, -wo);
+  glance.xyz = glanceAlong(lobes, p);
+  ${sky(surface, features)}`;
+  const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
+  return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}` : ""}${UNIFORMS}
+${outputs(layers)}
+${declared(surface, features)}
 void main() {
   int p = int(gl_FragCoord.y) * ${WIDTH} + int(gl_FragCoord.x);
   vec3 n = texelFetch(uPointNormals, at(p), 0).xyz, tangent = texelFetch(uTangents, at(p), 0).xyz;
@@ -197,13 +212,15 @@ void main() {
   int row = rowOf(cosine, share);
 
   ${loaded("t", "uVectors", "uScale", 3 * functions)}
-  ${isEven ? `${turns(Math.max(...rungsBelow(surface, functions).map((rung) => surface.ladder.order[rung] as number)) + 1)}\n${turned(surface, features)}` : ""}
-  ${range(GROUPS).map(sent).join("\n  ")}
+  ${loaded("o", "uOthers", "uOthersScale", 3 * others)}
+  ${orders.length > 0 ? turns(Math.max(...orders) + 1) : ""}
+  ${sum(surface, features, "plain", "sent")}
+  ${isAsked(beside) ? besides : ""}
 
   vec3 towards = vec3(0.0);
   ${map ? `${expanded(surface, features)}\n  towards = local.x * tangent + local.y * bitangent + local.z * n;` : ""}
   vec4 glance = vec4(0.0);
-  ${lobe === "none" ? "" : glance(surface, features)}
+  ${lobe ? looked : ""}
   ${layers.map((layer) => `out${layer} = ${values[layer]};`).join("\n  ")}
 }
 `;

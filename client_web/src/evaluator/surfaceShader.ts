@@ -178,11 +178,11 @@ const mirrored = (rows: number) => `
 float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
 vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, out float share) {
   row = rowOf(clamp(-dot(n, d), 0.01, 1.0), share);
-  int of = (lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS};
-  vec3 shape, r = alongLobe(of, share, n, d, shape);
-  float along = dot(d, outward), away = dot(r, outward) * (along > 0.0 ? -1.0 : 1.0);
-  float above = min(shareAbove(away / shape.y) / shareAbove(abs(along) / shape.y), 1.0);
-  return above * (glance.x * uSkyGain * skyAbout(r, shape.y) + glance.yzw);
+  float wide, along = dot(d, outward);
+  vec3 ray = alongLobe((lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS}, share, n, d, wide);
+  float away = dot(ray, outward) * (along > 0.0 ? -1.0 : 1.0);
+  float above = min(shareAbove(away / wide) / shareAbove(abs(along) / wide), 1.0);
+  return above * skyInLobe(ray, wide, glance.xyz);
 }
 `;
 

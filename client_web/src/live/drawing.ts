@@ -21,8 +21,8 @@ const SLOW_MS = 80;
 const TRIALS = 8;
 /** Of a bake; a browser that loses more of them is left alone. */
 const MOST_LOST_CONTEXTS = 3;
-/** What lobes alone ask for; it is as much as everything else. */
-const OF_LOBES = "sky_share";
+/** What lobes alone ask for; it is more than everything else. */
+const OF_LOBES = "seen_lights";
 
 /** Who draws moving views, as the user wants it. */
 export const drawnBy = signal<Draws>(readChoice());
@@ -117,7 +117,7 @@ async function takeTables(from: BakeConnection, frame: Frame): Promise<void> {
   if (here?.of !== from || header.tables === null) return;
   here.evaluator.take(header.tables, payload);
   here.headers.set(header.view, header);
-  if (here.evaluator.lacksSkyShare) {
+  if (here.evaluator.lacksSeenLights) {
     try {
       await (here.ofLobes ??= loadOfLobes(here));
     } catch (error) {

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from relume.basis.zernike import NUM_FUNCTIONS, num_functions
-from relume.moving.basis.lobes import NARROW
+from relume.moving.basis.lobes import is_narrow
 from relume.moving.basis.out_factors import out_factors
 
 BOUND = 0.05
@@ -31,4 +31,4 @@ def in_out(term_document: Mapping[str, Any]) -> InOut:
     """Of one term of a complete look."""
     missed = out_factors(term_document).missed_by_degree
     needed = next((num_functions(degree) for degree, share in enumerate(missed) if share <= BOUND), None)
-    return InOut(NUM_FUNCTIONS, missed[-1], needed, missed[-1] > NARROW)
+    return InOut(NUM_FUNCTIONS, missed[-1], needed, is_narrow(term_document))

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import lobes_of
+from relume.moving.basis.tables import Tables
 from relume.moving.beams.beam import Beam
-from relume.moving.between_points import SkyLight
-from relume.moving.evaluate import Tables, send
+from relume.moving.evaluate import send
+from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import Seen, at_vertices
-from relume.moving.pixels import Mirrored, Sent, combine
+from relume.moving.pixels import FromVertices, Mirrored, combine
 from relume.moving.points.surface import Surface
 from relume.scene.model import Camera
 
@@ -58,11 +59,11 @@ def add_beams(
     """
     num_materials, eye = len(materials.sends), camera.to_world[:3, 3].astype(np.float32)
     dark = np.zeros((num_materials, 3), np.float32)
-    nothing = Mirrored(lobes_of([[]] * num_materials), no_sky, np.zeros((0, 4), np.float32))
+    nothing = Mirrored(lobes_of([[]] * num_materials), no_sky, np.zeros((0, 3), np.float32))
     for beam, share in zip(beams, shares, strict=True):
         rows = np.flatnonzero(share > 0).astype(np.int32) if rays is None else rays[share[rays] > 0]
-        by_points = send(surface, beam.vectors, materials.tables, eye, seen.is_needed)
-        sent = Sent(at_vertices(surface, seen.is_seen, by_points), materials.sends, _towards(surface, beam))
+        by_points = send(surface, beam.vectors, None, materials.tables, eye, seen.is_needed).radiance
+        sent = FromVertices(at_vertices(surface, seen.is_seen, by_points), materials.sends, _towards(surface, beam))
         of_beam = combine(surface, seen, pixel_angle, sent, dark, nothing, rows)
         out[rows] += of_beam[rows] * (share[rows, None] * beam.gain)
 

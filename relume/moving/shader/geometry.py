@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS
 from relume.moving.bumps import expansions
+from relume.moving.highlights.lobe_lights import LIGHTS_A_LAMP, NARROWEST, NUM_LISTED, NUM_WIDTHS, SIDE
 from relume.moving.points.lattice import Lattice, num_nodes
 from relume.moving.points.surface import Surface, Textures
 from relume.moving.transfer import MovingTransfer
@@ -21,7 +22,8 @@ MOST_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, fines
 
 
 def constants(transfer: MovingTransfer) -> dict[str, Any]:
-    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables.
+    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables
+    and of lists of lights.
 
     `first_points` are those of the materials, and one more at the end. `has_holes` says that surfaces have some, which
     shaders do not know of.
@@ -30,7 +32,9 @@ def constants(transfer: MovingTransfer) -> dict[str, Any]:
     sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
     first = first_points(transfer).tolist()
     texts = {"ladder": rungs, "expansions": expansions().tolist(), "first_points": first}
-    return {**sizes, **texts, "has_holes": transfer.has_holes}
+    lists: dict[str, float] = {"side": SIDE, "listed": NUM_LISTED, "lights_a_lamp": LIGHTS_A_LAMP}
+    lists |= {"narrowest": NARROWEST, "widths": NUM_WIDTHS}
+    return {**sizes, **texts, "lobe_lists": lists, "has_holes": transfer.has_holes}
 
 
 def first_points(transfer: MovingTransfer) -> NDArray[np.int64]:
@@ -45,7 +49,7 @@ def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
         corners: of faces, three and the material. sides: two of each face, see `slots_of`. facing: normals of faces,
         `uv_scale`. positions: of corners. normals, points, weights: of slots. places, point_normals, tangents: of
-        points. sky_share: K numbers of each point in texels of four, which lobes alone need.
+        points. seen_lights: bits of the lights that each sees, 128 a texel, which lobes alone need.
         Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
         then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
         and its tangent.
@@ -64,7 +68,7 @@ def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
         "places": lambda: _four(points.position, 0),
         "point_normals": lambda: _four(points.normal, 0).astype(np.float16),
         "tangents": lambda: _four(points.tangent, 0).astype(np.float16),
-        "sky_share": lambda: transfer.sky_share.astype(np.float16).reshape(-1, 4),
+        "seen_lights": lambda: _bits(transfer.visible),
     }
     if len(surface.textures.wraps):
         found |= _of_textures(surface, surface.textures)
@@ -142,6 +146,14 @@ def _kept_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.int6
             break
         widest.pop(0)
     return np.concatenate(ranges).astype(np.int64), np.cumsum([0, *map(len, ranges)])
+
+
+def _bits(visible: NDArray[np.uint8]) -> Texels:
+    """Put bits of points, low ones first, into whole texels."""
+    num = -(-visible.shape[1] // 16)
+    out = np.zeros((len(visible), 16 * num), np.uint8)
+    out[:, : visible.shape[1]] = visible
+    return out.view("<u4").reshape(-1, 4)
 
 
 def _four(three: NDArray[Any], more: Any) -> Texels:

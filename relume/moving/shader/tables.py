@@ -13,6 +13,7 @@ from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, nu
 from relume.brdf.albedo import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.frame import Materials, Wanted
+from relume.moving.highlights.lobe_lights import LobeLights, widths_of
 from relume.moving.points.surface import EMISSION, NORMAL_MAP
 from relume.moving.shader.geometry import first_points
 from relume.moving.sky import turn_of
@@ -48,6 +49,7 @@ class Numbers(NamedTuple):
     background_gain: list[float]
     sky_turn: float
     sky_levels: list[list[int]]
+    lamps: list[list[float]]
     background: str
     background_color: list[float]
     background_size: list[int]
@@ -75,10 +77,13 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
         for k in np.flatnonzero(most * np.diff(first)):
             of_points, key = vectors[first[k] : first[k + 1]], f"{name}/{k}"
             parts[key] = Part((versions[1], most[k]), partial(_light, key, of_points, int(most[k])))
-    if len(lobes.is_told) or background.kind == "map":
+    if len(lobes.most) or background.kind == "map":
         parts["sky"] = Part(
             light.environment.map, lambda: {"sky": _words(transfer.sky_in(light.environment.map).texels)}
         )
+    if widths := widths_of(lobes):
+        listed = transfer.lobe_lights(light.environment, widths)
+        parts["lobe_lights"] = Part((light.environment, widths), lambda: _listed(listed))
     if background.kind == "blurred":
         blurred = light.environment.map, background.blur
         parts["background"] = Part(blurred, lambda: {"background": _words(transfer.map_of(*blurred).reshape(-1, 3))})
@@ -100,6 +105,7 @@ def numbers_of(transfer: MovingTransfer, wanted: Wanted) -> Numbers:
         background_gain=[float(a * b) for a, b in zip(light.environment_gain, wanted.gain, strict=True)],
         sky_turn=float(turn_of(light.environment.rotation)),
         sky_levels=transfer.sky_in(light.environment.map).levels.tolist(),
+        lamps=transfer.lamps_in(light.environment).tolist(),
         background=radiance.kind,
         background_color=[float(x) for x in radiance.color],
         background_size=list(transfer.map_of(light.environment.map, blur).shape[:2]),
@@ -118,24 +124,39 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 
 
 def _lobes(lobes: Lobes) -> F32:
-    """Of each row of each lobe the albedos by groups, then its mean, σ, and whether the in-basis tells it.
+    """Of each row of each lobe the albedos by groups, with `most`, cos θm, √(1 − R); then both cosines, s_1 and σ.
     (lobes · rows · (groups + 1), 4)"""
-    num, rows = lobes.mean.shape
+    num, rows = lobes.sigma.shape
     out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
     out[:, :, :NUM_GROUPS, :3] = lobes.albedo
-    out[:, :, NUM_GROUPS, 0], out[:, :, NUM_GROUPS, 1] = lobes.mean, lobes.sigma
-    out[:, :, NUM_GROUPS, 2] = lobes.is_told[:, None]
+    out[:, :, 0, 3], out[:, :, 1, 3], out[:, :, 2, 3] = lobes.most[:, None], lobes.mean, lobes.wide
+    out[:, :, NUM_GROUPS] = np.concatenate([lobes.cosine, lobes.first[..., None], lobes.sigma[..., None]], axis=-1)
     return out.reshape(-1, 4)
+
+
+def _listed(listed: LobeLights) -> dict[str, Texels]:
+    """Lights that lobes look for, two texels each; lists of four a texel, −1 after the last; the first
+    list of each width; of each lamp its lights and their shares."""
+    lights = np.zeros((len(listed.lights), 8), np.float32)
+    lights[:, :5] = listed.lights
+    lamps = np.stack([listed.lamps.astype(np.float32), listed.share], axis=-1)
+    return {
+        "lobe_lights": lights.reshape(-1, 4),
+        "lobe_lists": listed.lists.reshape(-1, 4),
+        "lobe_firsts": listed.first[:, None],
+        "lights_of_lamps": np.ascontiguousarray(lamps.reshape(-1, 2)) if lamps.size else np.zeros((1, 2), np.float32),
+    }
 
 
 def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDArray[np.int32]:
     """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
-    lobe, its normal map, whether it is a catcher, −1; then the bits of its emission, and the image of that.
-    (materials · (groups + 2), 4) int32, −1 for none"""
+    lobe, its normal map, whether it is a catcher, −1; then the bits of its emission, and the image of that; then of
+    each group both tables of the sky in its highlights, and both of other light. −1 for none.
+    (materials · (2 groups + 2), 4) int32"""
     tables, lobes, sends = materials.tables, materials.lobes, materials.sends
     of_material = transfer.surface.textures.of_material
-    out = np.full((len(sends), NUM_GROUPS + 2, 4), -1, np.int32)
-    out[:, :NUM_GROUPS, :2] = tables.of
+    out = np.full((len(sends), 2 * NUM_GROUPS + 2, 4), -1, np.int32)
+    out[:, :NUM_GROUPS, :2], out[:, NUM_GROUPS + 2 :] = tables.of[..., :2], tables.of[..., 2:]
     out[:, :NUM_GROUPS, 2] = sends
     out[:, 1:NUM_GROUPS, 3] = of_material[:, : len(TEXTURES)]
     out[:, NUM_GROUPS, 0] = lobes.of
@@ -154,20 +175,23 @@ def needed_functions(materials: Materials, has_map: NDArray[np.bool_]) -> tuple[
     Args:
         materials: what they send. has_map: whether each has a normal map. (materials,)
     Returns:
-        Of vectors of all light, and of those of others than the sky, where narrow lobes look. (materials,) each
+        Of vectors of all light, and of those of others than the sky, which highlights send apart. (materials,) each
     """
-    tables, lobes = materials.tables, materials.lobes
+    tables = materials.tables
     of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
     of_even, of_uneven = _degrees(tables.even, of_function[ladder().cosine]), _degrees(tables.uneven, of_function)
-    total = np.zeros(len(tables.of), np.int64)
-    for k, of in enumerate(tables.of):
-        degrees = [*of_even[of[:, 0][of[:, 0] >= 0]], *of_uneven[of[:, 1][of[:, 1] >= 0]]]
-        total[k] = _KEPT[np.searchsorted(_KEPT, num_functions(max(degrees)))] if degrees else 0
+
+    def needed(columns: slice) -> NDArray[np.int64]:
+        out = np.zeros(len(tables.of), np.int64)
+        for k, of in enumerate(tables.of[..., columns]):
+            even, uneven = of[:, ::2], of[:, 1::2]
+            degrees = [*of_even[even[even >= 0]], *of_uneven[uneven[uneven >= 0]]]
+            out[k] = _KEPT[np.searchsorted(_KEPT, num_functions(max(degrees)))] if degrees else 0
+        return out
+
+    total = needed(slice(0, 4))
     total[has_map] = NUM_FUNCTIONS
-    others = np.zeros(len(total), np.int64)
-    with_lobe = lobes.of >= 0
-    others[with_lobe] = np.where(lobes.is_told[lobes.of[with_lobe]], 0, NUM_FUNCTIONS)
-    return total, others
+    return total, needed(slice(2, 6))
 
 
 def _degrees(tables: F32, degree_of: NDArray[np.int64]) -> NDArray[np.int64]:

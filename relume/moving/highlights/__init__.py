@@ -1,0 +1,1 @@
+"""Highlights of moving views: where lobes look, and what points see there."""

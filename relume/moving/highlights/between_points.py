@@ -1,0 +1,72 @@
+"""What is interpolated between points of the sky in highlights: all but the lobe that each pixel has anew.
+
+    B(pixel) = L(pixel) + Σ_points w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lamps V_j L̄_j(ωm, σ))
+
+L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate. It is what turns
+fastest where surfaces are curved, twice as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says.
+Beside what is bright it rings, and says what cannot be: it is held within a multiple of L_2, the sky in two lobes that
+stand for the highlight better than one; the more the in-basis misses, the smaller is the multiple, down to L_2 itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.moving.basis.lobes import Lobes
+from relume.moving.evaluate import Sent
+from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_both, along_lobe
+from relume.moving.points.surface import Surface
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add(points, material, lobes, light, eye, glances, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
+    """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
+    position, normal, _, _ = points
+    shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
+    for p in rows[start:stop]:
+        lobe = lobes.of[material[p]]
+        if lobe < 0:
+            continue
+        n = normal[p, 0], normal[p, 1], normal[p, 2]
+        x, y, z = position[p, 0] - eye[0], position[p, 1] - eye[1], position[p, 2] - eye[2]
+        scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+        d = scale * x, scale * y, scale * z
+        seen = glances[p, 0], glances[p, 1], glances[p, 2]
+        for channel in range(3):
+            shown[channel] = both[channel] = 0
+        row, share, ray, wide = along_lobe(lobes, lobe, n, d)
+        add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
+        row, share, one, other, first, sigma = along_both(lobes, lobe, n, d)
+        add_sky_in_lobe(light, seen, one, sigma, first, both)
+        add_sky_in_lobe(light, seen, other, sigma, np.float32(1) - first, both)
+        most = lobes.most[lobe]
+        for group in range(sent.shape[1]):
+            for channel in range(3):
+                near = lobes.albedo[lobe, row, group, channel]
+                albedo = light.gain[channel] * (near + share * (lobes.albedo[lobe, row + 1, group, channel] - near))
+                said = albedo * both[channel]
+                held = min(max(sky[p, group, channel], said / most), said * most)
+                sent[p, group, channel] += held - albedo * shown[channel]
+
+
+def add_sky_in_highlights(
+    surface: Surface, lobes: Lobes, light: SkyLight, eye: F32, glances: F32, is_needed: NDArray[np.uint8], sent: Sent
+) -> None:
+    """Add what points know of the sky in highlights, less what pixels find.
+
+    Args:
+        surface: whose points. lobes: of all materials. light: that they show. eye: where it is. (3,) float32
+        glances: of the points along their lobes, from `relume.moving.highlights.glances`. (points, 3)
+        is_needed: points that are asked. (points,) uint8
+        sent: by them; its radiance is added to.
+    """
+    rows = np.flatnonzero(is_needed.view(np.bool_))
+    args = (surface.points, surface.material, lobes, light, np.ascontiguousarray(eye, np.float32), glances, rows)
+    for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))

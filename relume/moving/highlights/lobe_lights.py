@@ -1,0 +1,205 @@
+"""The lights that a lobe may see, listed by where it looks and how wide it is.
+
+A point knows of each light triangle whether it sees it. What it sees of the sky in a lobe about ω, σ wide, is
+
+    V = Σ_l V_l w_l / Σ_l w_l,   w_l = E_l / (σ² + r_l²) · (1 − (1 − ω · ω_l) / (8 (σ² + r_l²)))₊⁸,
+
+weighed by light, with r_l what a triangle is wide: (1 − x / 8)⁸ is e^−x nearly, without a call, and nothing beyond
+twenty degrees of a lobe of seven. Of a thousand lights few count, and those that do are listed for each of 576 squares
+of an octahedral map of directions and each of some widths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.moving.basis.lobes import Lobes
+from relume.parallel import for_shares
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+SIDE = 24  # of the map, in squares
+NUM_LISTED = 32  # lights in a list, at most
+MOST_LAMPS, LIGHTS_A_LAMP = 2, 16
+NARROWEST = 0.05  # σ of the first width, radians; each is √2 times the one before
+NUM_WIDTHS = 10
+_SHARPNESS = 8  # of the polynomial
+_WIDTH_OF_RADIUS = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
+
+
+class LobeLights(NamedTuple):
+    """Lights of a sky, and lists of them.
+
+    Attributes:
+        lights: of each light the direction, r², and E, luminous, without lamps. (lights, 5) float32
+        lists: lights of every width and square; after the last of a list −1. (lists, `NUM_LISTED`) int32
+        first: list of the first square of each width, or of the nearest that has lists. (`NUM_WIDTHS`,) int32
+        lamps: the lights that most of each lamp comes by, then −1. (lamps, `LIGHTS_A_LAMP`) int32
+        share: how much of it comes by each, one in all. (lamps, `LIGHTS_A_LAMP`) float32
+    """
+
+    lights: F32
+    lists: NDArray[np.int32]
+    first: NDArray[np.int32]
+    lamps: NDArray[np.int32]
+    share: F32
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def width_of(sigma):  # type: ignore[no-untyped-def]
+    """Find which width's lists a lobe of σ takes: the nearest."""
+    step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / NARROWEST))
+    return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def square_of(x, y, z):  # type: ignore[no-untyped-def]
+    """Find the square of a direction, whose parts are x, y, z."""
+    per = np.float32(1) / (abs(x) + abs(y) + abs(z))
+    u, v = x * per, z * per
+    if y < 0:
+        folded = np.float32(1) - abs(v)
+        v = math.copysign(np.float32(1) - abs(u), v)
+        u = math.copysign(folded, u)
+    half = np.float32(0.5 * SIDE)
+    column: Any = min(max(np.int64((u + np.float32(1)) * half), 0), SIDE - 1)
+    row: Any = min(max(np.int64((v + np.float32(1)) * half), 0), SIDE - 1)
+    return row * SIDE + column
+
+
+def _squares() -> tuple[F64, F64]:
+    """Directions of the squares' middles (squares, 3), and the angle from each to its farthest corner (squares,)."""
+    edge = np.linspace(-1, 1, SIDE + 1)
+    middle = 0.5 * (edge[1:] + edge[:-1])
+
+    def towards(u: F64, v: F64) -> F64:
+        y = 1 - np.abs(u) - np.abs(v)
+        over = np.maximum(-y, 0)
+        raw = np.stack([u - np.copysign(over, u), y, v - np.copysign(over, v)], axis=-1)
+        return np.asarray(raw / np.linalg.norm(raw, axis=-1, keepdims=True))
+
+    v, u = np.meshgrid(middle, middle, indexing="ij")
+    about = towards(u, v)
+    v, u = np.meshgrid(edge, edge, indexing="ij")
+    corners = towards(u, v)
+    each = [corners[a : SIDE + a, b : SIDE + b] for a in (0, 1) for b in (0, 1)]
+    cosine = np.min([np.einsum("abk,abk->ab", about, corner) for corner in each], axis=0)
+    return about.reshape(-1, 3), np.arccos(np.clip(cosine, -1, 1)).ravel()
+
+
+_SQUARES = _squares()
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def weight_of(light, x, y, z, variance):  # type: ignore[no-untyped-def]
+    """Find w of a light.
+
+    Args:
+        light: a row of `LobeLights.lights`. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
+    """
+    per = np.float32(1) / (variance + light[3])
+    off = np.float32(1) - (x * light[0] + y * light[1] + z * light[2])
+    left = max(np.float32(1) - off * per * np.float32(1 / _SHARPNESS), np.float32(0))
+    left *= left
+    left *= left
+    return light[4] * per * left * left
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _list(lights, about, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
+    """List the lights that weigh most anywhere in squares [start, stop)."""
+    num = lights.shape[0]
+    weight, nearest = np.empty(num, np.float32), np.empty(5, np.float32)
+    for square in range(start, stop):
+        cosine, sine = math.cos(radius[square]), math.sin(radius[square])
+        for k in range(num):
+            along = about[square, 0] * lights[k, 0] + about[square, 1] * lights[k, 1] + about[square, 2] * lights[k, 2]
+            # of the place in the square that is nearest to the light
+            along = along * cosine + math.sqrt(max(1 - along * along, 0.0)) * sine if along < cosine else 1.0
+            nearest[0], nearest[1], nearest[2] = along, 0, 0
+            nearest[3], nearest[4] = lights[k, 3], lights[k, 4]
+            weight[k] = weight_of(nearest, np.float32(1), np.float32(0), np.float32(0), variance)
+        least = np.float32(0)
+        if num > out.shape[1]:
+            least = np.partition(weight, num - out.shape[1])[num - out.shape[1]]
+        n = 0
+        for k in range(num):
+            if n < out.shape[1] and weight[k] > 0 and weight[k] >= least:
+                out[square, n] = k
+                n += 1
+        out[square, n:] = -1
+
+
+def lobe_lights(directions: F32, radius: F32, luminous: F32, of_lamps: F32, widths: Sequence[int]) -> LobeLights:
+    """List the lights of a sky.
+
+    Args:
+        directions: unit, that points see them in or not. (lights, 3) float32
+        radius: of a circle about each, radians. (lights,) float32
+        luminous: E of each without lamps, luminance. (lights,) float32
+        of_lamps: how much of each lamp comes by each light. (lamps, lights) float32
+        widths: that lobes have, from `widths_of`; ascending, one at least.
+    """
+    lights = np.column_stack([directions, radius**2 / _WIDTH_OF_RADIUS, luminous]).astype(np.float32)
+    about, farthest = _SQUARES
+    lists = np.empty((len(widths), len(about), NUM_LISTED), np.int32)
+    for part, width in zip(lists, widths, strict=True):
+        args = lights, about, farthest, np.float32(sigma_of(width) ** 2)
+        for_shares(partial(_list_into, args, part), len(about))
+    nearest = np.abs(np.arange(NUM_WIDTHS)[:, None] - np.array(widths)).argmin(axis=1)
+    first = (nearest * len(about)).astype(np.int32)
+    return LobeLights(lights, lists.reshape(-1, NUM_LISTED), first, *_lamp_lights(of_lamps))
+
+
+def _lamp_lights(of_lamps: F32) -> tuple[NDArray[np.int32], F32]:
+    """Find the fields `lamps` and `share`."""
+    num = min(LIGHTS_A_LAMP, of_lamps.shape[1])
+    lamps = np.full((len(of_lamps), LIGHTS_A_LAMP), -1, np.int32)
+    share = np.zeros(lamps.shape, np.float32)
+    lamps[:, :num] = np.argsort(-of_lamps, axis=1)[:, :num]
+    share[:, :num] = np.take_along_axis(of_lamps, lamps[:, :num], axis=1)
+    lamps[share <= 0] = -1
+    return lamps, share / np.maximum(share.sum(axis=1, keepdims=True), np.float32(1e-20))
+
+
+def _list_into(args: tuple[Any, ...], lists: NDArray[np.int32], start: int, stop: int) -> None:
+    _list(*args, start, stop, lists)  # type: ignore[call-arg]
+
+
+def lists_numpy(listed: LobeLights, width: int, square: int) -> NDArray[np.intp]:
+    """Find the lights of a list in plain NumPy: the oracle, in no order.
+
+    Args:
+        listed: whose lights. width, square: of the list.
+    """
+    about, farthest = _SQUARES
+    lights = listed.lights.astype(np.float64)
+    off = np.maximum(np.arccos(np.clip(lights[:, :3] @ about[square], -1, 1)) - farthest[square], 0)
+    variance = sigma_of(width) ** 2 + lights[:, 3]
+    weight = lights[:, 4] / variance * np.maximum(1 - (1 - np.cos(off)) / (_SHARPNESS * variance), 0) ** _SHARPNESS
+    heaviest = np.argsort(-weight)[:NUM_LISTED]
+    return np.asarray(heaviest[weight[heaviest] > 0])
+
+
+def sigma_of(width: int) -> float:
+    """Find the σ that lists of a width are made for, radians."""
+    return float(NARROWEST * 2 ** (width / 2))
+
+
+def widths_of(lobes: Lobes) -> tuple[int, ...]:
+    """Find the widths that lobes have, as `relume.moving.highlights.glances` takes them: the two of one together."""
+    if not len(lobes.sigma):
+        return ()
+    angle = np.arccos(np.clip(lobes.cosine.astype(np.float64), -1, 1))
+    middle = lobes.first * np.exp(1j * angle[..., 0]) + (1 - lobes.first) * np.exp(1j * angle[..., 1])
+    sigma = np.sqrt(lobes.sigma**2 + 1 - np.abs(middle))
+    low, high = (int(width_of(np.float32(end))) for end in (sigma.min(), sigma.max()))
+    return tuple(range(low, high + 1))
