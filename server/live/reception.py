@@ -15,8 +15,8 @@ from relume.picture.transfer import Eyes
 from relume.scene.placed_camera import placed_camera
 from server.access.rules import check_message
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
+from server.live.session_state import SessionState
 from server.live.state.pointers import check_held, find_curve
-from server.live.state.session_state import SessionState
 from server.live.state.target import Eye
 from server.wire import protocol
 from server.wire.rooms import PresenceMessage

@@ -26,14 +26,14 @@ from server.live.rooms.guest import Guest, Place
 from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.sending.frame_loop import FrameLoop
+from server.live.session_state import SessionState
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
 from server.live.state.pending_requests import PendingRequests
 from server.live.state.resume import Kept, ResumeStore
-from server.live.state.session_state import SessionState
 from server.live.state.shown_views import ShownViews
-from server.live.state.visit import Visit
+from server.live.visit import Visit
 from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
 from server.running.leave import Leave

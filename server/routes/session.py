@@ -17,7 +17,7 @@ from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of, row_of
 from server.live.rooms.door import door_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
-from server.live.state.visit import Visit
+from server.live.visit import Visit
 from server.records.looks import check_name
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake

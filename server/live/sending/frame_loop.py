@@ -20,7 +20,7 @@ from server.live.sending.answers import Answers
 from server.live.sending.freezing import Freezer
 from server.live.sending.painter import FrameRequest, Painted
 from server.live.sending.viewport import Viewport
-from server.live.state.session_state import SessionState
+from server.live.session_state import SessionState
 from server.live.state.target import Target
 
 if TYPE_CHECKING:
