@@ -5,16 +5,14 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from server.access.roles import Caller
 from server.errors import BusyError
 from server.live.rooms.door import Door
 from server.live.rooms.seat import COLORS, Seat
+from server.live.state.target import Target
 from server.wire.rooms import Person
-
-if TYPE_CHECKING:
-    from server.live.rooms.guest import Guest
 
 OWN = ("display", "transport")
 """Sections of a look that each has for themselves: they are ways of looking."""
@@ -23,6 +21,15 @@ OWN = ("display", "transport")
 def seen_by(document: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """A room's look with somebody's own ways of looking."""
     return {**document, **{name: own[name] for name in OWN}}
+
+
+class Listener(Protocol):
+    """A session in a room, as the room knows it; see `server.live.rooms.guest.Guest`."""
+
+    news: asyncio.Event
+    has_comments: bool
+
+    def follow(self, target: Target, author: int) -> None: ...
 
 
 class Room:
@@ -37,7 +44,7 @@ class Room:
         self, document: dict[str, Any], max_people: int, away_seconds: float, emptied: Callable[[], None]
     ) -> None:
         self.document, self.num_changes = document, 0
-        self.guests: list[Guest] = []
+        self.guests: list[Listener] = []
         self._seats: dict[str, Seat] = {}
         self._max_people, self._away_seconds, self._emptied = max_people, away_seconds, emptied
         self._num_come = 0
