@@ -38,13 +38,14 @@ def _bake(settings: Settings, browser: bool) -> None:
     from cli.sentence import sentence
 
     try:
-        identity = _queue_and_follow(settings, browser)
-        typer.echo(f"bake {identity} is ready: {address(settings.host, settings.port)}   Ctrl-C ends", err=True)
+        identity, editor = _queue_and_follow(settings, browser)
+        typer.echo(f"bake {identity} is ready: {editor}   Ctrl-C ends", err=True)
     except Exception as error:  # the server lives on, so this must be said here
         typer.echo(f"relume: {sentence(error)}", err=True)
 
 
-def _queue_and_follow(settings: Settings, browser: bool) -> str:
+def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:
+    """Returns the bake, and the address of the editor on its scene."""
     from cli.data_folder import open_bakes
     from cli.follow import follow
     from relume.bake import Recipe
@@ -59,14 +60,15 @@ def _queue_and_follow(settings: Settings, browser: bool) -> str:
         register_scene(service.data_dir, service.ledger, scene)
         recipe = Recipe("direct", tuple(camera.name for camera in scene.cameras), preset.size, preset.num_lights)
         identity = service.submit(scene.id, recipe)
+        editor = f"{address(settings.host, settings.port)}?scene={scene.id}"
         _wait_for_server(settings)
         if browser:
-            _open_browser(address(settings.host, settings.port))
+            _open_browser(editor)
         with service.subscribe(identity) as changes:
             status = follow(changes, scene.name)
         if status.state != "ready":
             raise PlanError(f"the bake {status.state}: {status.problem or 'somebody stopped it'}")
-        return identity
+        return identity, editor
     finally:
         service.close()
 
