@@ -53,7 +53,7 @@ def _glance(points, material, visible, listed, lobes, eye, rows, start, stop, ou
             light = listed.lists[place, k]
             if light < 0:
                 break
-            weight = weight_of(listed.lights[light], x, y, z, variance)
+            weight = weight_of(listed.lights, light, x, y, z, variance)
             total += weight
             if (visible[p, light >> 3] >> (light & 7)) & 1:
                 seen += weight

@@ -99,41 +99,49 @@ _SQUARES = _squares()
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def weight_of(light, x, y, z, variance):  # type: ignore[no-untyped-def]
+def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     """Find w of a light.
 
     Args:
-        light: a row of `LobeLights.lights`. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
+        lights, light: of `LobeLights`, and which. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
     """
-    per = np.float32(1) / (variance + light[3])
-    off = np.float32(1) - (x * light[0] + y * light[1] + z * light[2])
+    off = np.float32(1) - (x * lights[light, 0] + y * lights[light, 1] + z * lights[light, 2])
+    return _weight(off, lights[light, 3], lights[light, 4], variance)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _weight(off, spread, luminous, variance):  # type: ignore[no-untyped-def]
+    """Find w from 1 − ω · ω_l, r² and E."""
+    per = np.float32(1) / (variance + spread)
     left = max(np.float32(1) - off * per * np.float32(1 / _SHARPNESS), np.float32(0))
     left *= left
     left *= left
-    return light[4] * per * left * left
+    return luminous * per * left * left
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _list(lights, about, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
-    """List the lights that weigh most anywhere in squares [start, stop)."""
-    num = lights.shape[0]
-    weight, nearest = np.empty(num, np.float32), np.empty(5, np.float32)
+def _list(columns, about, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
+    """List the lights that weigh most anywhere in squares [start, stop). columns: of the lights. (5, lights)"""
+    num, most = columns.shape[1], out.shape[1]
+    weight, near, heavy = np.empty(num, np.float32), np.empty(num, np.int32), np.empty(num, np.float32)
     for square in range(start, stop):
-        cosine, sine = math.cos(radius[square]), math.sin(radius[square])
+        x, y, z = about[square, 0], about[square, 1], about[square, 2]
+        cosine, sine = np.float32(math.cos(radius[square])), np.float32(math.sin(radius[square]))
+        for k in range(num):  # without a branch: eight at once
+            along = x * columns[0, k] + y * columns[1, k] + z * columns[2, k]
+            across = math.sqrt(max(np.float32(1) - along * along, np.float32(0)))
+            nearest = along * cosine + across * sine  # at the place in the square that is nearest to the light
+            off = np.float32(1) - (nearest if along < cosine else np.float32(1))
+            weight[k] = _weight(off, columns[3, k], columns[4, k], variance)
+        found = 0
         for k in range(num):
-            along = about[square, 0] * lights[k, 0] + about[square, 1] * lights[k, 1] + about[square, 2] * lights[k, 2]
-            # of the place in the square that is nearest to the light
-            along = along * cosine + math.sqrt(max(1 - along * along, 0.0)) * sine if along < cosine else 1.0
-            nearest[0], nearest[1], nearest[2] = along, 0, 0
-            nearest[3], nearest[4] = lights[k, 3], lights[k, 4]
-            weight[k] = weight_of(nearest, np.float32(1), np.float32(0), np.float32(0), variance)
-        least = np.float32(0)
-        if num > out.shape[1]:
-            least = np.partition(weight, num - out.shape[1])[num - out.shape[1]]
+            near[found], heavy[found] = k, weight[k]
+            found += weight[k] > 0
+        least = np.partition(heavy[:found], found - most)[found - most] if found > most else np.float32(0)
         n = 0
-        for k in range(num):
-            if n < out.shape[1] and weight[k] > 0 and weight[k] >= least:
-                out[square, n] = k
+        for k in range(found):
+            if n < most and heavy[k] >= least:
+                out[square, n] = near[k]
                 n += 1
         out[square, n:] = -1
 
@@ -149,10 +157,10 @@ def lobe_lights(directions: F32, radius: F32, luminous: F32, of_lamps: F32, widt
         widths: that lobes have, from `widths_of`; ascending, one at least.
     """
     lights = np.column_stack([directions, radius**2 / _WIDTH_OF_RADIUS, luminous]).astype(np.float32)
-    about, farthest = _SQUARES
+    columns, (about, farthest) = np.ascontiguousarray(lights.T), _SQUARES
     lists = np.empty((len(widths), len(about), NUM_LISTED), np.int32)
     for part, width in zip(lists, widths, strict=True):
-        args = lights, about, farthest, np.float32(sigma_of(width) ** 2)
+        args = columns, about.astype(np.float32), farthest, np.float32(sigma_of(width) ** 2)
         for_shares(partial(_list_into, args, part), len(about))
     nearest = np.abs(np.arange(NUM_WIDTHS)[:, None] - np.array(widths)).argmin(axis=1)
     first = (nearest * len(about)).astype(np.int32)
