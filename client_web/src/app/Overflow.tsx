@@ -1,7 +1,8 @@
 /** A row of controls; those that it has no room for are in a menu at its end. */
 import type { ComponentType } from "preact";
-import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { IconButton } from "../ui/Button";
+import { useClosing } from "../ui/useClosing";
 import { leaving } from "./rowRoom";
 
 interface Control {
@@ -33,18 +34,6 @@ function useLeaving(controls: readonly Control[]) {
     return () => observer.disconnect();
   });
   return { row, out };
-}
-
-/** A press beside it closes the menu, as Escape does. */
-function useClosing(open: boolean, menu: { current: HTMLElement | null }, close: () => void): void {
-  useEffect(() => {
-    if (!open) return undefined;
-    const press = (event: PointerEvent) => {
-      if (!menu.current?.contains(event.target as Node)) close();
-    };
-    window.addEventListener("pointerdown", press, { capture: true });
-    return () => window.removeEventListener("pointerdown", press, { capture: true });
-  }, [open]);
 }
 
 export function Overflow({ controls }: { controls: readonly Control[] }) {

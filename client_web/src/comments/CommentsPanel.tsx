@@ -98,7 +98,7 @@ function Entry({ comment }: { comment: CommentBody }) {
 export function CommentsPanel() {
   const numResolved = comments.value.length - openComments.value.length;
   return (
-    <aside class="comments" aria-label="Comments">
+    <aside class="comments beside-picture" aria-label="Comments">
       <header class="panel-head">
         <h2 class="spacer">Comments</h2>
         <IconButton icon="close" label="Close" onClick={() => togglePanel("comments")} />

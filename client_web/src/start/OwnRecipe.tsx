@@ -6,6 +6,11 @@ import { GATHER_RAYS, GATHER_SAMPLES, LIGHTS, recipeProblem, SIDE, type OwnRecip
 import { PlanWords, type Planned } from "./PlanWords";
 
 const TYPING_MS = 300;
+/** What methods that gather light have besides. */
+const GATHERING = [
+  { name: "gather_samples", label: "Gather samples", range: GATHER_SAMPLES },
+  { name: "gather_rays", label: "Rays a sample", range: GATHER_RAYS },
+] as const;
 
 /** The plan of what was typed last; undefined while it is asked for. */
 function usePlan(request: BakeRequest, problem: string | null): Planned {
@@ -85,26 +90,18 @@ export function OwnRecipe({ request, initial, action, onChoose }: Props) {
         <Field label="Width" value={width} range={SIDE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [side, height] })} />
         <Field label="Height" value={height} range={SIDE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [width, side] })} />
         <Field label="Light triangles" value={recipe.lights} range={LIGHTS} step={1} onChange={(lights) => setRecipe({ ...recipe, lights })} />
-        {gathers && (
-          <>
+        {gathers &&
+          GATHERING.map(({ name, label, range }) => (
             <Field
-              label="Gather samples"
-              value={recipe.gather_samples ?? NaN}
+              key={name}
+              label={label}
+              value={recipe[name] ?? NaN}
               placeholder="as fits"
-              range={GATHER_SAMPLES}
+              range={range}
               step={1}
-              onChange={(value) => setNumber("gather_samples", value)}
+              onChange={(value) => setNumber(name, value)}
             />
-            <Field
-              label="Rays a sample"
-              value={recipe.gather_rays ?? NaN}
-              placeholder="as fits"
-              range={GATHER_RAYS}
-              step={1}
-              onChange={(value) => setNumber("gather_rays", value)}
-            />
-          </>
-        )}
+          ))}
       </div>
       <PlanWords plan={plan} />
       <button disabled={plan === undefined || plan instanceof Error} onClick={() => onChoose(recipe)}>

@@ -5,6 +5,7 @@ import { me, mayEdit } from "../state/me";
 import { door, ownName, people, watching, you } from "../state/together";
 import { IconButton } from "../ui/Button";
 import { note } from "../ui/toasts";
+import { useClosing } from "../ui/useClosing";
 import { begin, leaveRoom, linkInto } from "./together";
 
 const MOST_SHOWN = 3;
@@ -122,12 +123,7 @@ function Body() {
 export function Together() {
   const [open, setOpen] = useState(false);
   const menu = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    if (!open) return undefined;
-    const press = (event: PointerEvent) => !menu.current?.contains(event.target as Node) && setOpen(false);
-    window.addEventListener("pointerdown", press, { capture: true });
-    return () => window.removeEventListener("pointerdown", press, { capture: true });
-  }, [open]);
+  useClosing(open, menu, () => setOpen(false));
   if (door.value === null && !mayEdit.value) return null;
   const escape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || !open) return;

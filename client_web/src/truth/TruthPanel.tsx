@@ -79,7 +79,7 @@ export function TruthPanel() {
   const body = truth.value?.body;
   const isOld = truth.value !== null && truth.value.look !== judged();
   return (
-    <aside class="truth" aria-label="How true is this picture?">
+    <aside class="truth beside-picture" aria-label="How true is this picture?">
       <header class="panel-head">
         <h2>How true is this?</h2>
         <IconButton icon="close" label="Close" onClick={toggleTruth} />
