@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from cli.options import Data, LookFile, SceneName, View, read_look
+
+if TYPE_CHECKING:
+    from relume.exr.layers import Layering
 
 Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="Where to write the picture, or frames.")]
 
@@ -51,8 +54,7 @@ def render(
     is_exr = turntable is None and output.suffix.lower() == ".exr"
     if (layers or light_groups or full_float) and not is_exr:
         raise ParameterError("--output", output.name, "a file name that ends in .exr, for layers and --float")
-    if layers and light_groups:
-        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
+    layering = _layering(layers, light_groups)
     partial = read_look(look)
     service = open_bakes(open_settings(data))
     try:
@@ -74,18 +76,19 @@ def render(
             render_turntable(transfer, view_name, document, output, turntable, stills)
         elif is_exr:
             origin = Origin(record.id, record.name, bake.id)
-            save_exr(
-                output,
-                transfer,
-                view_name,
-                document,
-                origin,
-                "light_groups" if light_groups else layers,
-                "float" if full_float else "half",
-                stills=stills,
-            )
+            precision: Literal["half", "float"] = "float" if full_float else "half"
+            save_exr(output, transfer, view_name, document, origin, layering, precision, stills=stills)
         else:
             image = render_image(transfer, view_name, document, for_display=True, stills=stills)
             save(output, image, document)
     finally:
         service.close()
+
+
+def _layering(layers: bool, light_groups: bool) -> Layering:
+    """Which layers are asked for, see `relume.exr.layers`. Raises ParameterError."""
+    from relume.errors import ParameterError
+
+    if layers and light_groups:
+        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
+    return "light_groups" if light_groups else layers

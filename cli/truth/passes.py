@@ -131,8 +131,7 @@ def traced(subject: Subject, spp: int, paths: str, progress: Callable[[float], o
             lambda share, k=k: progress((k + share) / num),  # type: ignore[misc]
             pass_index=k, reflects=subject.reflects, is_whole="all" in asked,
         )  # fmt: skip
-        pictures = {"all": truth.whole, "method": truth.followed}
-        estimates = {name: estimate.add(pictures[name]) for name, estimate in estimates.items()}  # type: ignore[arg-type]
+        estimates = {name: estimate.add(truth.pictures[name]) for name, estimate in estimates.items()}
     return Traced(estimates, truth.left_out, truth.untraced)
 
 
