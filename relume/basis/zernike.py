@@ -26,6 +26,8 @@ DEGREE = 7
 SENT_DEGREE = 6  # of those by which surfaces send light to each other
 QUICK_DEGREE = 4  # of those in which light is followed while a hand moves it
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
+DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
+"""Degree of each function. (K,)"""
 
 
 class Ladder(NamedTuple):

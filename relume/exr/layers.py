@@ -68,7 +68,7 @@ def light_groups_of(look: Look, *, reflects: bool) -> list[Layer]:
     Args:
         look, reflects: as of `layers_for`.
     """
-    paths = look.transport.paths if reflects else look.transport.paths.without_reflections()
+    paths = look.transport.followed(reflects=reflects)
     shown: dict[Show, bool] = {"direct": paths.direct, "reflected": paths.reflect}
     classes = [show for show, is_shown in shown.items() if is_shown]
     whole = look.transport.show == "all"

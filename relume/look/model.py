@@ -215,6 +215,10 @@ class TransportLook(_Frozen):
         paths = Paths(self.show in ("all", "direct"), first, min(most, self.bounces))
         return paths if paths.reflect else paths.without_reflections()
 
+    def followed(self, *, reflects: bool) -> Paths:
+        """Those of the paths that a method follows. reflects: whether it has light between surfaces."""
+        return self.paths if reflects else self.paths.without_reflections()
+
 
 class DisplayLook(_Frozen):
     """How radiance becomes a picture: `exposure` in stops, then the tone map."""

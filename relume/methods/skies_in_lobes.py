@@ -14,7 +14,7 @@ from relume.light.suns import LAMPS, Divided, without_suns
 from relume.look import EnvironmentKey
 from relume.methods.store_io import read_traced_directions
 from relume.methods.transfer import BakedViews
-from relume.moving.highlights.lobe_lights import MOST_LAMPS, LobeLights, lobe_lights
+from relume.moving.highlights.lobe_lights import LobeLights, lobe_lights
 from relume.moving.sky import Sky, sky_of
 
 F32 = NDArray[np.float32]
@@ -42,7 +42,7 @@ class SkiesInLobes:
 
     def lamps(self, environment: EnvironmentKey) -> F32:
         """Lamps of an environment, turned; see `SkyLight`. (lamps, 7) float32"""
-        suns = self._divided(environment.map).suns[:MOST_LAMPS]
+        suns = self._divided(environment.map).suns
         mean, light = (
             np.reshape([getattr(sun, name) for sun in suns], (len(suns), 3)) for name in ("mean", "irradiance")
         )
@@ -54,16 +54,13 @@ class SkiesInLobes:
         """The light triangles of an environment, as lobes of some widths look for them."""
 
         def listed() -> LobeLights:
-            luminous, suns = (
-                luminance(self.lit.preview_lights_in(environment).irradiance),
-                self._divided(environment.map).suns,
-            )
+            luminous = luminance(self.lit.preview_lights_in(environment).irradiance)
+            suns = self._divided(environment.map).suns
             of_lamps = np.zeros((len(suns), len(luminous)), np.float32)
             for share, sun in zip(of_lamps, suns, strict=True):
                 tile = self.lit.tiles.locate(turned(sun.towards.reshape(-1, 3), environment.rotation))
                 share += np.bincount(tile, minlength=len(luminous)) / np.float32(len(tile))
-            lamps = luminance(np.reshape([sun.irradiance for sun in suns], (len(suns), 3)).astype(np.float32))
-            beside = np.maximum(luminous - lamps @ of_lamps, 0)
+            beside = np.maximum(luminous - luminance(self.lamps(environment)[:, 3:6]) @ of_lamps, 0)
             directions = read_traced_directions(self.lit.store)
             return lobe_lights(directions, self.lit.lights.radius, beside, of_lamps, widths)
 

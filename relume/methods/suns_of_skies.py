@@ -30,8 +30,7 @@ class SunsOfSkies:
 
     def are_in(self, light: Light) -> bool:
         """Whether light of suns comes straight to a picture."""
-        comes = light.paths.direct and light.is_environment_lit
-        return comes and bool(self._divided(light.environment.map).suns)
+        return light.shows_sky and bool(self._divided(light.environment.map).suns)
 
     def lights_beside(self, light: Light) -> TriangleLights:
         """The triangles by which light comes straight, without that of suns."""

@@ -287,7 +287,7 @@ class BouncedViews(BakedViews):
 
 def shown_of(lights: TriangleLights, light: Light) -> TriangleLights:
     """The triangles of an environment by which light comes straight to the picture, beside local lights."""
-    if not (light.paths.direct and light.is_environment_lit):
+    if not light.shows_sky:
         return lights.none()
     if light.environment_gain == (1.0, 1.0, 1.0):
         return lights

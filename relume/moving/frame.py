@@ -217,7 +217,7 @@ def _summed(
 def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8], out: F32 | None) -> F32:
     """Look from points along their lobes. out: written; None: new."""
     lobes, light = wanted.materials.lobes, wanted.light
-    widths = widths_of(lobes) if light.paths.direct and light.is_environment_lit else ()
+    widths = widths_of(lobes) if light.shows_sky else ()
     if not widths:
         return np.zeros((len(points), 1 + MOST_LAMPS), np.float32) if out is None else out
     listed = transfer.lobe_lights(light.environment, widths)
@@ -250,8 +250,7 @@ def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> 
 
 def _sky_in(transfer: MovingTransfer, light: Light) -> SkyLight:
     """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
-    is_seen = light.paths.direct and light.is_environment_lit
-    gain = np.array(light.environment_gain if is_seen else (0.0, 0.0, 0.0), np.float32)
+    gain = np.array(light.environment_gain if light.shows_sky else (0.0, 0.0, 0.0), np.float32)
     sky, lamps = transfer.sky_in(light.environment.map), transfer.lamps_in(light.environment)
     return SkyLight(sky, lamps, turn_of(light.environment.rotation), gain)
 

@@ -48,6 +48,11 @@ class Light(NamedTuple):
         """Whether the environment gives any light."""
         return any(self.environment_gain)
 
+    @property
+    def shows_sky(self) -> bool:
+        """Whether light of the environment comes straight."""
+        return self.paths.direct and self.is_environment_lit
+
 
 def of_source(light: Light, geometry: LightGeometry | None) -> Light:
     """The light of one source alone, its gain 1: a local light, or the environment where that is None."""
@@ -71,7 +76,7 @@ def parts_of(light: Light) -> dict[Light, Rgb]:
         The gain of each part, (R, G, B).
     """
     parts = {}
-    if light.paths.direct and light.is_environment_lit:
+    if light.shows_sky:
         parts[_direct(of_source(light, None))] = light.environment_gain
     if light.paths.direct and light.local:
         parts[direct_from(light, light.local)] = _ONE

@@ -25,7 +25,7 @@ from relume.methods.direct import DirectMethod
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
-from relume.reference.paths import followed_paths, left_out, untraced, whole_paths
+from relume.reference.paths import left_out, untraced, whole_paths
 from relume.reference.radiance import Points, reference_radiance
 from relume.reference.texels import Texels, texels_of
 from relume.scene.model import Scene
@@ -59,7 +59,7 @@ def reference_image(
     Returns:
         Linear radiance, the background seen where there is no surface. (height, width, 3) float32
     """
-    wanted = [followed_paths(look, reflects=reflects)]
+    wanted = [look.transport.followed(reflects=reflects)]
     return _images(scene, view, look, size, _Draw(spp, pass_index, cancelled), wanted, progress)[0]
 
 
@@ -77,6 +77,11 @@ class Truth:
     followed: F32
     left_out: tuple[str, ...]
     untraced: tuple[str, ...]
+
+    @property
+    def pictures(self) -> dict[str, F32]:
+        """By whose paths they are: "method", and "all" where they were asked for."""
+        return {"method": self.followed} | ({} if self.whole is None else {"all": self.whole})
 
 
 def reference_truth(
@@ -109,7 +114,7 @@ def reference_truth(
         CancelledError: `cancelled` said so.
         NotFoundError: the look names an environment that is not here.
     """
-    wanted = [followed_paths(look, reflects=reflects), *([whole_paths(look)] if is_whole else [])]
+    wanted = [look.transport.followed(reflects=reflects), *([whole_paths(look)] if is_whole else [])]
     images = _images(scene, view, look, size, _Draw(spp, pass_index, cancelled), wanted, progress)
     return Truth(images[1] if is_whole else None, images[0], left_out(look, reflects=reflects), untraced(scene))
 

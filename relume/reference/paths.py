@@ -8,15 +8,6 @@ from relume.scene.model import Scene
 MOST_BOUNCES = 64  # between surfaces, of which Russian roulette leaves few
 
 
-def followed_paths(look: Look, *, reflects: bool) -> Paths:
-    """The light paths that a method shows of a look.
-
-    Args:
-        look: whose `transport` names them. reflects: whether the method has light between surfaces.
-    """
-    return look.transport.paths if reflects else look.transport.paths.without_reflections()
-
-
 def whole_paths(look: Look) -> Paths:
     """All light paths of the kind that a look shows, however many surfaces they have on their way.
 
@@ -30,9 +21,9 @@ def left_out(look: Look, *, reflects: bool) -> tuple[str, ...]:
     """What a method leaves out of the paths of a look, in sentences.
 
     Args:
-        look, reflects: as of `followed_paths`.
+        look: whose `transport` names them. reflects: whether the method has light between surfaces.
     """
-    whole, followed = whole_paths(look), followed_paths(look, reflects=reflects)
+    whole, followed = whole_paths(look), look.transport.followed(reflects=reflects)
     if not whole.reflect or followed.last >= whole.last:
         return ()
     if not followed.reflect:

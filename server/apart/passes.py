@@ -77,8 +77,7 @@ def make_pass(
     transfer = shop.transfer(asked.bake)
     look, size = _look(asked, transfer), (frame.shape[1], frame.shape[0])
     truth = _pass(shop, transfer, asked, look, size, before["method"].passes, tell, cancelled)
-    pictures = {"all": truth.whole, "method": truth.followed}
-    after = {paths: estimate.add(pictures[paths]) for paths, estimate in before.items()}  # type: ignore[arg-type]
+    after = {paths: estimate.add(truth.pictures[paths]) for paths, estimate in before.items()}
     _keep(where, frame, after)
     _judge(where, frame, after, asked.paths, truth, look.display)
     return {"passes": after["method"].passes}

@@ -12,15 +12,14 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, ladder
+from relume.basis.zernike import DEGREES, NUM_FUNCTIONS, ladder
 from relume.brdf.albedo import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_narrow
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors
 
 F32 = NDArray[np.float32]
 
-_DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)  # of the functions
-_WINDOWS = np.exp(-_DEGREES * (_DEGREES + 2) / (2 * 8.0**2)).astype(np.float32)  # w: e^(−n (n + 2) / 2 d²), d = 8
+_WINDOWS = np.exp(-DEGREES * (DEGREES + 2) / (2 * 8.0**2)).astype(np.float32)  # w: e^(−n (n + 2) / 2 d²), d = 8
 
 
 class Tables(NamedTuple):
@@ -62,13 +61,14 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
         lobes = are_lobes(terms)
         for group, texture in enumerate((None, *TEXTURES)):
             shared = [
-                (term, is_lobe) for term, is_lobe in zip(terms, lobes, strict=True) if term.get("texture") == texture
+                (out_factors(term).table, is_lobe, is_narrow(term))
+                for term, is_lobe in zip(terms, lobes, strict=True)
+                if term.get("texture") == texture
             ]
-            plain, highlights = (
-                [out_factors(term).table for term, is_lobe in shared if is_lobe == of] for of in (False, True)
-            )
-            told = [out_factors(term).table for term, is_lobe in shared if is_lobe and not is_narrow(term)]
-            for first, found in ((0, plain), (2, told), (4, [table * _WINDOWS for table in highlights])):
+            plain = [table for table, is_lobe, _ in shared if not is_lobe]
+            told = [table for table, is_lobe, narrow in shared if is_lobe and not narrow]
+            others = [table * _WINDOWS for table, is_lobe, _ in shared if is_lobe]
+            for first, found in ((0, plain), (2, told), (4, others)):
                 for kind, kept, tables in (
                     (0, even, [t[:, 0][..., rungs.cosine] for t in found if t.shape[1] == 1]),
                     (1, uneven, [t for t in found if t.shape[1] > 1]),

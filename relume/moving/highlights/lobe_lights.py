@@ -20,6 +20,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.light.suns import MOST_SUNS
 from relume.moving.basis.lobes import Lobes
 from relume.parallel import for_shares
 
@@ -28,7 +29,7 @@ F64 = NDArray[np.float64]
 
 SIDE = 24  # of the map, in squares
 NUM_LISTED = 32  # lights in a list, at most
-MOST_LAMPS, LIGHTS_A_LAMP = 2, 16
+MOST_LAMPS, LIGHTS_A_LAMP = MOST_SUNS, 16
 NARROWEST = 0.05  # σ of the first width, radians; each is √2 times the one before
 NUM_WIDTHS = 10
 _SHARPNESS = 8  # of the polynomial

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
+from relume.basis.zernike import DEGREE, DEGREES, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.brdf.albedo import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.frame import Materials, Wanted
@@ -82,8 +82,9 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
             light.environment.map, lambda: {"sky": _words(transfer.sky_in(light.environment.map).texels)}
         )
     if widths := widths_of(lobes):
-        listed = transfer.lobe_lights(light.environment, widths)
-        parts["lobe_lights"] = Part((light.environment, widths), lambda: _listed(listed))
+        parts["lobe_lights"] = Part(
+            (light.environment, widths), lambda: _listed(transfer.lobe_lights(light.environment, widths))
+        )
     if background.kind == "blurred":
         blurred = light.environment.map, background.blur
         parts["background"] = Part(blurred, lambda: {"background": _words(transfer.map_of(*blurred).reshape(-1, 3))})
@@ -97,7 +98,7 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
 def numbers_of(transfer: MovingTransfer, wanted: Wanted) -> Numbers:
     """Find what a shader needs besides its arrays; see `relume.moving.frame`."""
     look, light = wanted.look, wanted.light
-    sky_gain = light.environment_gain if light.paths.direct and light.is_environment_lit else (0.0, 0.0, 0.0)
+    sky_gain = light.environment_gain if light.shows_sky else (0.0, 0.0, 0.0)
     radiance, blur = look.background, look.background.blur if look.background.kind == "blurred" else 0.0
     return Numbers(
         gain=[float(x) for x in wanted.gain],
@@ -178,8 +179,7 @@ def needed_functions(materials: Materials, has_map: NDArray[np.bool_]) -> tuple[
         Of vectors of all light, and of those of others than the sky, which highlights send apart. (materials,) each
     """
     tables = materials.tables
-    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
-    of_even, of_uneven = _degrees(tables.even, of_function[ladder().cosine]), _degrees(tables.uneven, of_function)
+    of_even, of_uneven = _degrees(tables.even, DEGREES[ladder().cosine]), _degrees(tables.uneven, DEGREES)
 
     def needed(columns: slice) -> NDArray[np.int64]:
         out = np.zeros(len(tables.of), np.int64)

@@ -69,7 +69,7 @@ def summed(
         (part, rows), factor = vectors_of(element), np.array(gain, np.float32)
         if not (element.paths.direct and any(lamp in of_beams for lamp, _ in element.local)):
             add_scaled(total, part, factor, rows)
-        if not (element.paths.direct and element.is_environment_lit):
+        if not element.shows_sky:
             add_scaled(others, part, factor, rows)
     for (part, rows), gain in between or ():
         for into in (total, others):
