@@ -34,7 +34,7 @@ def worker(
     settings, asked = open_settings(data), threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: asked.set())
-    with BakeService(settings.data, settings.database_url, num_workers=processes):
+    with BakeService(settings.data, settings.database_url, num_workers=processes, shares=settings.turns):
         typer.echo("waiting for bakes", err=True)
         asked.wait()
     return 0

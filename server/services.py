@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, NamedTuple
 
 from fastapi import Depends
@@ -85,7 +86,7 @@ OpenBatches = Callable[[Settings, Library], Batches]
 
 def open_bakes(settings: Settings) -> BakeService:
     """relume's own bake service."""
-    return BakeService(settings.data, settings.database_url, settings.scheduler)
+    return BakeService(settings.data, settings.database_url, settings.scheduler, shares=settings.turns)
 
 
 def open_batches(settings: Settings, library: Library) -> Batches:
@@ -112,7 +113,8 @@ async def open_services(
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)
     batch, sessions = batches(settings, library), service.ledger.sessions
-    access, queues = Access(sessions, settings), _queues(settings, service, batch)
+    access = Access(sessions, settings)
+    queues = _queues(settings, service, batch, access)
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
     _watch_memory(metrics, library, transfers)
@@ -159,14 +161,14 @@ class _Queues(NamedTuple):
     btfs: BtfQueue
 
 
-def _queues(settings: Settings, service: BakeService, batch: Batches) -> _Queues:
-    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.max_queued_each)
+def _queues(settings: Settings, service: BakeService, batch: Batches, access: Access) -> _Queues:
+    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.max_queued_each, settings.turns)
 
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
     return _Queues(
-        RenderQueue(sessions, settings.data, batch.run, quota, scene_name),
+        RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.measured, "render")),
         ComparisonQueue(sessions, settings.data, batch.run, quota),
         BtfQueue(sessions, settings.data, batch.run, quota),
     )

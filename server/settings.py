@@ -79,6 +79,10 @@ class Settings(BaseSettings):
     user_header: str = Field(default="X-Forwarded-User", min_length=1, description="in which they say it")
     proxy_role: RoleName = Field(default="view", description="role of those whom a proxy names")
     proxy_roles: dict[str, RoleName] = Field(default={}, description="roles of some of them by name, as JSON object")
+    viewers_comment: bool = Field(default=False, description="whether the role view, too, may write comments")
+    turns: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field(
+        default={}, description="turns of some users in the queues, to one of each other user, as JSON object"
+    )
     max_sessions_each: int | None = Field(default=None, ge=1, description="live sessions of one user")
     max_bakes_each: int | None = Field(default=None, ge=1, description="bakes of one user that wait or run")
     max_bytes_each: int | None = Field(default=None, ge=0, description="uploads and bakes of one user")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
@@ -28,6 +29,7 @@ from worker.estimate import Finished, crowding, load_of_machine
 from worker.executor import is_tiny
 from worker.lease import is_alive
 from worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
+from worker.turns import Waiting
 
 
 class Ledger:
@@ -41,12 +43,12 @@ class Ledger:
         """Close the connections to the database."""
         self._engine.dispose()
 
-    def submit(self, scene_id: str, recipe: Recipe, plan: Plan) -> str:
+    def submit(self, scene_id: str, recipe: Recipe, plan: Plan, client: str = "") -> str:
         """Queue a bake; the same recipe under the same code is the same bake, and a failed or cancelled one is resumed.
 
         Args:
             scene_id: of a scene that is kept. recipe: what to bake of it.
-            plan: what it will cost.
+            plan: what it will cost. client: who asks; clients have their turns one after another.
         Returns:
             The bake's id.
         Raises:
@@ -62,6 +64,7 @@ class Ledger:
             created=now,
             queued=now,
             code=bake_code(),
+            client=client,
         )
         if self._get(identity) is None:
             try:
@@ -96,27 +99,27 @@ class Ledger:
         return [_status(row, ahead) for row in rows]
 
     def _ahead(self, rows: Sequence[BakeRow]) -> dict[str, int]:
-        """How many bakes will run before each of those that are queued: tiny ones never wait for others."""
+        """How many bakes will run before each of those that are queued: tiny ones never wait for others, and clients
+        have their turns, here as if their shares were equal."""
         if not any(row.state == "queued" for row in rows):
             return {}
         query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
-        numbers, ahead = {True: 0, False: 0}, {}
+        lanes: dict[bool, list[BakeRow]] = {True: [], False: []}
         with self.sessions() as session:
             for row in session.scalars(query):
-                tiny = is_tiny(_plan(row.plan))
-                ahead[row.id] = numbers[tiny]
-                numbers[tiny] += 1
-        return ahead
+                lanes[is_tiny(_plan(row.plan))].append(row)
+        return {identity: k for rows in lanes.values() for k, identity in enumerate(_in_turns(rows))}
 
     def cancel(self, identity: str) -> bool:
         """Cancel a bake that is queued or running; whoever runs it sees that at its next heartbeat."""
         return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None, phase=None)
 
-    def claimable(self) -> list[str]:
+    def claimable(self) -> list[Waiting]:
         """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
         query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
-            return [row.id for row, now in session.execute(query) if not _is_owned(row, now)]
+            rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
+        return [Waiting(row.id, row.client or "", False, row.queued) for row in rows]
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and make it running. False where somebody else has it."""
@@ -270,6 +273,16 @@ def _execute(session: Session, statement: Any) -> Any:
 
 def _is_owned(row: BakeRow, now: float) -> bool:
     return row.owner is not None and is_alive(row.owner, row.heartbeat, now)
+
+
+def _in_turns(rows: Sequence[BakeRow]) -> list[str]:
+    """Ids, those that run first, then each client's first, each one's second, …; `rows` are in the order of coming."""
+    counts = Counter[str]()
+    ranks = []
+    for row in sorted(rows, key=lambda row: row.state != "running"):
+        ranks.append((row.state != "running", counts[row.client or ""], row.queued, row.id))
+        counts[row.client or ""] += 1
+    return [identity for *_, identity in sorted(ranks)]
 
 
 def _plan(text: str) -> Plan:

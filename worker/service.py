@@ -34,6 +34,7 @@ from worker.runs import forget_run
 from worker.status import BakeStatus, bake_id
 from worker.storage import configured, is_elsewhere, push
 from worker.tasks import Job, idle_timer, scene_of
+from worker.turns import Turns
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +53,7 @@ class BakeService:
         scheduler: str | None = None,
         num_workers: int | None = None,
         methods: Mapping[str, BakeMethod] | None = None,
+        shares: Mapping[str, float] | None = None,
     ) -> None:
         """
         Args:
@@ -60,6 +62,7 @@ class BakeService:
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
+            shares: of some clients, see `worker.turns.Turns`.
         """
         configured()  # what is wrong with its address is said before anything runs
         bake_code()  # of what runs now: its files may be exchanged while it does
@@ -74,6 +77,7 @@ class BakeService:
         self._owner = new_owner()
         self._closing = threading.Event()
         self._is_crowding = threading.Event()
+        self._turns = {is_tiny_lane: Turns(shares or {}) for is_tiny_lane in (True, False)}
         self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
 
@@ -123,8 +127,8 @@ class BakeService:
         check_budget(plan, self.data_dir, processes)
         return plan
 
-    def submit(self, scene_id: str, recipe: Recipe) -> str:
-        """Queue a bake and return its id; raises what `plan` raises.
+    def submit(self, scene_id: str, recipe: Recipe, client: str = "") -> str:
+        """Queue a bake of `scene_id` by a recipe for a client, and return its id; raises what `plan` raises.
 
         The same recipe under the same code is the same bake: one that is queued, running or ready stays as it is, one
         that failed or was cancelled goes on where it stopped.
@@ -132,7 +136,7 @@ class BakeService:
         identity = bake_id(scene_id, recipe)
         if self._is_ready(identity):
             return identity
-        self.ledger.submit(scene_id, recipe, self.plan(scene_id, recipe))
+        self.ledger.submit(scene_id, recipe, self.plan(scene_id, recipe), client)
         self._changed()
         return identity
 
@@ -229,9 +233,11 @@ class BakeService:
                 self._closing.wait(POLL_S)
 
     def _run_next(self, tiny: bool) -> bool:
-        for identity in self.ledger.claimable():
-            status = self.ledger.bake(identity)
-            if is_tiny(status.plan) == tiny and self.ledger.claim(identity, self._owner):
+        turns = self._turns[tiny]
+        for work in turns.order(self.ledger.claimable()):
+            status = self.ledger.bake(work.id)
+            if is_tiny(status.plan) == tiny and self.ledger.claim(work.id, self._owner):
+                turns.take(work.client)
                 self._run(status, tiny)
                 return True
         return False

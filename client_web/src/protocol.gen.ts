@@ -517,12 +517,13 @@ export interface MaterialMapBody {
   triangles: [number, number, number][];
 }
 
-/** Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked). */
+/** Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked). `viewers_comment`: whether those who only look may write comments. */
 export interface MeBody {
   login: boolean;
   name: string;
   role: "anyone" | "view" | "edit" | "admin";
   by: "open" | "nobody" | "token" | "proxy";
+  viewers_comment: boolean;
 }
 
 /** A measured material; looks name it by `data`, `terms` is how it begins. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */

@@ -129,12 +129,19 @@ test("who may only look sends no edits and takes hold of nothing", () => {
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(session.pending).toBe(false);
   expect(session.send({ type: "touch", parameter: SIGMA })).toBe(false);
+  expect(session.send({ type: "touch", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to be told its values
   session.want({ look, hand: null, solo: ["environment"], inputTime: 0 });
   expect(session.send({ type: "probe", x: 1, y: 2 })).toBe(true);
   animate();
+  const direct = { ...look.transport, show: "direct" as const };
+  session.want({ look: { ...look, transport: direct }, hand: null, solo: ["environment"], inputTime: 0 });
+  animate();
+  expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(socket().sent).toEqual([
+    { type: "touch", curve: "/materials/A/terms/0/curves/theta_h" },
     { type: "edit", revision: 1, patch: [], hand: null, solo: ["environment"] },
     { type: "probe", x: 1, y: 2 },
+    { type: "edit", revision: 2, patch: [{ op: "replace", path: "/transport/show", value: "direct" }], hand: null, solo: ["environment"] },
   ]);
 });
 

@@ -18,7 +18,7 @@ from server.access.access import Access
 from server.access.audit import Change
 from server.access.buckets import Buckets
 from server.access.roles import KEY, Caller, Role
-from server.access.rules import SOCKET, is_change, needed
+from server.access.rules import SOCKET, is_change, is_comment, needed
 from server.errors import (
     ForbiddenError,
     LoginError,
@@ -55,7 +55,7 @@ class Gate:
         access: Callable[[], Access],
         clock: Callable[[], float],
     ) -> None:
-        self._app, self._access = app, access
+        self._app, self._access, self._viewers_comment = app, access, settings.viewers_comment
         rate = settings.requests_per_second
         self._buckets = None if rate is None else Buckets(rate, settings.requests_at_once, clock)
 
@@ -68,7 +68,7 @@ class Gate:
         try:
             caller = scope[KEY] = await self._known(scope)
             USER.set(caller.name)
-            self._check(caller, needed(method, scope["path"]))
+            self._check(caller, self._needed(method, scope["path"]))
         except (LoginError, ForbiddenError, RateError) as error:
             await self._refuse(error, scope, receive, send)
             return
@@ -95,6 +95,9 @@ class Gate:
         wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
         if wait_s > 0.0:
             raise RateError(f"too many calls; wait {wait_s:.1f} s, and make them less often", wait_s)
+
+    def _needed(self, method: str, path: str) -> Role:
+        return Role.VIEW if self._viewers_comment and is_comment(method, path) else needed(method, path)
 
     @staticmethod
     def _check(caller: Caller, role: Role) -> None:

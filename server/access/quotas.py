@@ -1,4 +1,4 @@
-"""How much each may have: bytes of uploads and bakes, bakes that wait or run, live sessions."""
+"""How much each may have: bytes of uploads, bakes and renders, bakes that wait or run, live sessions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from server.access.tables import OwnedRow
@@ -18,7 +18,7 @@ from worker.database.models import BakeRow
 if TYPE_CHECKING:
     from server.settings import Settings
 
-Kind = Literal["scene", "environment", "material", "btf-work", "bake"]
+Kind = Literal["scene", "environment", "material", "btf-work", "bake", "render"]
 _ACTIVE = ("queued", "running")
 
 
@@ -73,7 +73,7 @@ class Quotas:
         if used + more > most:
             raise QuotaError(
                 f"you have {used / 1e6:,.1f} MB of at most {most / 1e6:,.1f} MB, and this takes {more / 1e6:,.1f} MB; "
-                "delete a scene or a material of yours first (RELUME_MAX_BYTES_EACH)"
+                "delete a scene, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
             )
 
     def check_bakes(self, who: str) -> None:
@@ -95,8 +95,8 @@ class Quotas:
             )
 
     def used_bytes(self, who: str) -> int:
-        """What somebody's uploads had, finished bakes have, and others are planned to take."""
-        uploads = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
+        """What somebody's uploads had, finished bakes and renders have, and others are planned to take."""
+        others = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
             OwnedRow.owner == who, OwnedRow.kind != "bake"
         )
         bakes = (
@@ -105,7 +105,7 @@ class Quotas:
             .where(OwnedRow.kind == "bake", OwnedRow.owner == who)
         )
         with self._sessions() as session:
-            total = int(session.scalar(uploads) or 0)
+            total = int(session.scalar(others) or 0)
             for planned, written, state in session.execute(bakes):
                 total += planned if state in _ACTIVE else written
         return total
@@ -115,6 +115,13 @@ class Quotas:
         with self._sessions.begin() as session:
             if session.get(OwnedRow, (kind, thing)) is None:
                 session.add(OwnedRow(kind=kind, object=thing, owner=who, bytes=num_bytes))
+
+    def measured(self, kind: Kind, thing: str, num_bytes: int) -> None:
+        """What was planned to take so many bytes is finished and takes these."""
+        with self._sessions.begin() as session:
+            session.execute(
+                update(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object == thing).values(bytes=num_bytes)
+            )
 
     def disown(self, kind: Kind, *things: str) -> None:
         """They are deleted."""

@@ -50,6 +50,11 @@ class Caller:
         return replace(self, role=Role.VIEW, watches=True)
 
     @property
+    def may_edit(self) -> bool:
+        """Whether they may change what others see."""
+        return self.role >= Role.EDIT
+
+    @property
     def shown(self) -> str:
         """As logs and the audit call them."""
         return self.name or self.address

@@ -86,8 +86,9 @@ RULES: Mapping[str, Mapping[str, Role]] = {
 
 MESSAGES: Mapping[str, Role] = {
     "edit": EDIT,
-    "touch": EDIT,  # freezes a curve for edits
-    "solo": VIEW,  # an edit that changes nothing of the look
+    "seen": VIEW,  # an edit of nothing but ways of looking: exposure, light paths, what is shown alone
+    "touch": VIEW,  # who may edit has the curve frozen; who may not is told its values
+    "hold": EDIT,  # a touch of what is no curve: it only prepares edits
     "view": VIEW,
     "views": VIEW,
     "focus": VIEW,
@@ -105,6 +106,8 @@ _COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
     (compile_path(path)[0], roles) for path, roles in RULES.items()
 )
 
+_COMMENTS = compile_path("/api/scenes/{scene}/comments")[0]
+
 
 def needed(method: str, path: str) -> Role:
     """What a call needs: the most that any line asks that fits it; of what is no call, nothing, the editor's files."""
@@ -113,6 +116,11 @@ def needed(method: str, path: str) -> Role:
         return max(fitting)
     is_file = method in ("GET", "HEAD") and not (path == "/api" or path.startswith("/api/"))
     return ANYONE if is_file else ADMIN
+
+
+def is_comment(method: str, path: str) -> bool:
+    """Whether a call writes a comment, which settings may let viewers do."""
+    return method == "POST" and _COMMENTS.match(path) is not None
 
 
 def is_change(method: str, path: str) -> bool:

@@ -23,7 +23,8 @@ class TokenRow(Base):
 
 
 class OwnedRow(Base):
-    """What somebody has put here: an upload of so many bytes, or a bake that was planned to take so many."""
+    """What somebody has put here: an upload or a finished render of so many bytes, or a bake or a render that was
+    planned to take so many."""
 
     __tablename__ = "owned"
 

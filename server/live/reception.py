@@ -15,6 +15,7 @@ from relume.picture.transfer import Eyes
 from relume.scene.placed_camera import placed_camera
 from server.access.rules import check_message
 from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
+from server.live.rooms.room import is_own_way
 from server.live.session_state import SessionState
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.target import Eye
@@ -67,8 +68,7 @@ class Reception:
         await self._socket.refuse(problem)
 
     def _take(self, message: protocol.ClientMessage, received_s: float) -> None:
-        is_solo = isinstance(message, protocol.EditMessage) and not message.patch
-        check_message(self._caller, "solo" if is_solo else message.type)
+        check_message(self._caller, _kind(message))
         match message:
             case protocol.EditMessage():
                 self._edit(message, received_s)
@@ -144,6 +144,16 @@ class Reception:
             self._check_view(name)
         self._shown.show(names)
         self._pending.space = space
+
+
+def _kind(message: protocol.ClientMessage) -> str:
+    """What a message is to the table of roles."""
+    match message:
+        case protocol.EditMessage(patch=patch) if all(is_own_way(operation.path) for operation in patch):
+            return "seen"
+        case protocol.TouchMessage(curve=None):
+            return "hold"
+    return message.type
 
 
 def _text_of(message: Any) -> str | None:

@@ -114,14 +114,14 @@ def _state(
     first = next(iter(transfer.views))
     shown = ShownViews(kept.views, kept.focus) if kept else ShownViews([first], first)
     pending = PendingRequests(look.target(0 if place is None else place.room.num_changes))
-    guest = None if place is None else Guest(place, look, pending)
+    guest = None if place is None else Guest(place, look, pending, may_edit=visit.caller.may_edit)
     socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
     return SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller, guest)
 
 
 async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -> None:
     """A line of the audit where anything was edited."""
-    if num_edits:
+    if num_edits and caller.may_edit:  # of who may not, they are ways of looking
         change = Change.by(caller, f"{num_edits} edits in a session", f"/api/bakes/{bake}/session", 101)
         await asyncio.shield(run_sync(audit.add, change))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session, sessionmaker
 
+from relume.folders import folder_bytes
 from server.apart.step import RunStep
 from server.apart.step_timer import StepTimer
 from server.files.downloads import safe_stem
@@ -15,6 +16,8 @@ from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
 
 Render = Work[RenderRequest]
+HEAD_BYTES = 1 << 16
+"""More than a picture's file has besides its pixels."""
 
 
 class RenderQueue(WorkQueue[RenderRequest]):
@@ -23,15 +26,22 @@ class RenderQueue(WorkQueue[RenderRequest]):
     row, noun, request_type = RenderRow, "render", RenderRequest
 
     def __init__(
-        self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota, scene_name: Callable[[str], str]
+        self,
+        sessions: sessionmaker[Session],
+        data: Path,
+        run: RunStep,
+        quota: Quota,
+        scene_name: Callable[[str], str],
+        measured: Callable[[str, int], object],
     ) -> None:
         """
         Args:
             sessions: of the database. data: directory of bakes and pictures.
             run: does the steps. quota: how much may wait. scene_name: of a bake's id.
+            measured: told the id of a finished render, and what its files take, bytes.
         """
         super().__init__(sessions, data / "renders", run, quota)
-        self._scene_name = scene_name
+        self._scene_name, self._measured = scene_name, measured
 
     def steps(self, request: RenderRequest) -> int:
         """One for each frame."""
@@ -89,7 +99,19 @@ class RenderQueue(WorkQueue[RenderRequest]):
         video = str(self.video_path(work)) if work.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(work)), "video": video, "fps": work.request.fps}
         self.run_apart(work, "pack of a batch", values, lambda share: None)
+        self._measured(work.id, folder_bytes(self.folder / work.id))
         return work.total
+
+
+def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int) -> int:
+    """What the files of a render take at most: its pictures uncompressed, and all of them again, packed.
+
+    Args:
+        request: what is asked for. size: of a picture, pixels. num_layers: of a picture, itself among them.
+    """
+    channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
+    picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers
+    return 2 * request.num_frames * (picture_bytes + HEAD_BYTES)
 
 
 def _stem(render: Render) -> str:

@@ -18,7 +18,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
@@ -31,9 +31,9 @@ from relume.errors import CancelledError, NotFoundError, RelumeError
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
 from server.errors import BusyError, problem_of
-from server.queues.turns import Turns, Waiting
 from server.records.tables import WorkRow
 from worker.database.faults import Complaint
+from worker.turns import Turns, Waiting
 
 log = logging.getLogger(__name__)
 _LOOK_AGAIN_S = 2.0
@@ -45,10 +45,15 @@ Request = TypeVar("Request", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Quota:
-    """How much work of one kind may wait or run: of all clients together, and of each."""
+    """How much work of one kind may wait or run: of all clients together, and of each; and whose turns are how many.
+
+    Attributes:
+        shares: see `worker.turns.Turns`.
+    """
 
     of_all: int
     of_each: int
+    shares: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ class WorkQueue(ABC, Generic[Request]):
             run: does a step, apart from this process. quota: how much may wait.
         """
         self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
-        self._turns, self._timers = Turns(), dict[str, StepTimer]()
+        self._turns, self._timers = Turns(quota.shares), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._wanted: tuple[str, float] = "", 0.0
         self._complaint = Complaint(log, f"the queue of {self.noun}s cannot be read")

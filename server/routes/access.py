@@ -24,7 +24,10 @@ COOKIE_SECONDS = 30 * 86_400
 async def me(caller: Who, services: Shared, response: Response) -> MeBody:
     """Who calls, and what they may do."""
     response.headers["Cache-Control"] = "no-store"
-    return MeBody(login=services.settings.login, name=caller.name, role=caller.role.word, by=caller.by)
+    settings, role = services.settings, caller.role.word
+    return MeBody(
+        login=settings.login, name=caller.name, role=role, by=caller.by, viewers_comment=settings.viewers_comment
+    )
 
 
 @router.post("/login", status_code=204)

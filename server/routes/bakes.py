@@ -46,7 +46,7 @@ def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResp
         return JSONResponse(dry.model_dump())
     with services.access.quotas.deciding:
         _check_quotas(request.scene, recipe, caller, services)
-        identity = services.bakes.submit(request.scene, recipe)
+        identity = services.bakes.submit(request.scene, recipe, caller.name)
         status = services.bakes.get(identity)
         services.access.quotas.own(caller.name, "bake", identity, status.plan.store_bytes)
     services.metrics.bakes.inc()

@@ -11,14 +11,15 @@ from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
-from relume.picture.transfer import Eyes, Opened
-from server.access.roles import Who
-from server.apart.animation import check_animation, document_of
+from relume.exr.layers import layers_for
+from relume.picture.transfer import Axis, Eyes, Opened
+from server.access.roles import Caller, Who
+from server.apart.animation import check_animation, document_of, look_of
 from server.errors import NotReadyError
 from server.files.video import check_encoder
-from server.queues.renders import Render
+from server.queues.renders import Render, planned_bytes
 from server.routes.bakes import ready_bake
-from server.services import Shared
+from server.services import Services, Shared
 from server.wire.body import MAX_NAME, Id
 from server.wire.protocol import MAX_EYE_PIXELS
 from server.wire.renders import (
@@ -41,13 +42,23 @@ async def submit_render(request: RenderRequest, services: Shared, caller: Who, r
     """Queue a batch; every look is checked first."""
     await run_in_threadpool(ready_bake, services, request.bake)
     async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
-        await run_in_threadpool(_check, request, transfer)
+        most_bytes = await run_in_threadpool(_check, request, transfer)
         if request.name is None:
             scene = await run_in_threadpool(get_scene, services.bakes.ledger, transfer.scene_id)
             request.name = f"{scene.name} {request.view}"[:MAX_NAME]
-    identity = await run_in_threadpool(services.renders.submit, request, caller.name)
+    identity = await run_in_threadpool(_queue, request, most_bytes, caller, services)
     response.headers["Location"] = f"/api/renders/{identity}"
     return _body(await run_in_threadpool(services.renders.get, identity))
+
+
+def _queue(request: RenderRequest, most_bytes: int, caller: Caller, services: Services) -> str:
+    """Queue a batch that takes at most so many bytes of whoever asks. Raises QuotaError, BusyError."""
+    quotas = services.access.quotas
+    with quotas.deciding:
+        quotas.check_bytes(caller.name, most_bytes)
+        identity = services.renders.submit(request, caller.name)
+        quotas.own(caller.name, "render", identity, most_bytes)
+    return identity
 
 
 @router.post("/looks")
@@ -94,7 +105,12 @@ def check_look(partial: dict[str, Any], transfer: Opened, pointer: str) -> None:
         raise ParameterError(f"{pointer}{error.name}", error.value, error.allowed) from None
 
 
-def _check(request: RenderRequest, transfer: Opened) -> None:
+def _check(request: RenderRequest, transfer: Opened) -> int:
+    """Raises ParameterError where something cannot be rendered.
+
+    Returns:
+        What its files take at most, bytes.
+    """
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false for this format; only EXR files have layers")
@@ -109,6 +125,9 @@ def _check(request: RenderRequest, transfer: Opened) -> None:
         raise ParameterError("size", list(request.size), baked)
     _check_looks(request, transfer)
     check_animation(request, transfer)
+    look = look_of(request, transfer.default_look, 0)
+    layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
+    return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))
 
 
 @router.get("/{render}")
@@ -121,6 +140,7 @@ def get_render(render: Id, services: Shared) -> RenderBody:
 def delete_render(render: Id, services: Shared) -> Response:
     """Stop a batch and forget its pictures."""
     services.renders.delete(render)
+    services.access.quotas.disown("render", render)
     return Response(status_code=204)
 
 

@@ -18,12 +18,14 @@ class LoginRequest(Body):
 
 
 class MeBody(Body):
-    """Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked)."""
+    """Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked).
+    `viewers_comment`: whether those who only look may write comments."""
 
     login: bool
     name: str
     role: RoleWord
     by: Literal["open", "nobody", "token", "proxy"]
+    viewers_comment: bool
 
 
 class AuditEntry(Body):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -10,6 +11,7 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE, FakeMethod, tiny_scene
 from session_client import Baked
 
+from relume.bake import Recipe
 from server.access.access import Access
 from server.access.audit import Audit, Change
 from server.access.buckets import Buckets
@@ -96,6 +98,48 @@ class TestBytes:
         assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
         assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
+
+    def test_renders_count_by_what_they_may_take_until_they_are_there(
+        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, baked: Baked
+    ) -> None:
+        settings.max_bytes_each = 1_000_000
+        ann = bearer("edit", "Ann")
+        request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr", "size": [16, 16]}
+        large = client.post("/api/renders", json={**request, "frames": 3600}, headers=ann)
+        assert large.status_code == 429
+        assert "a render of yours" in large.json()["detail"]
+        url = client.post("/api/renders", json=request, headers=ann).headers["location"]
+        while client.get(url, headers=ann).json()["state"] != "ready":
+            time.sleep(0.01)
+        files = (settings.data / "renders" / url.rsplit("/", 1)[1]).iterdir()
+        assert access.quotas.used_bytes("Ann") == sum(file.stat().st_size for file in files) > 0
+        assert client.delete(url, headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+
+class TestTurns:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.turns = {"Cem": 2.0}
+        return settings
+
+    def test_bakes_of_one_do_not_wait_for_all_of_another(
+        self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        bakes: BakeService = client.app.state.services.bakes
+        order: list[str] = []
+        monkeypatch.setattr(bakes, "_run", lambda status, tiny: order.append(names.get(status.id, "")))
+        claimable = bakes.ledger.claimable
+        monkeypatch.setattr(bakes.ledger, "claimable", lambda: [])
+        names: dict[str, str] = {}
+        for k, name in enumerate(["Ann"] * 4 + ["Bob"] * 2 + ["Cem"] * 4):
+            names[bakes.submit(baked.scene, Recipe("direct", ("front",), SIZE, 11 + k), name)] = name
+        assert [bakes.get(bake).ahead for bake in names] == [0, 3, 6, 8, 1, 4, 2, 5, 7, 9]
+        monkeypatch.setattr(bakes.ledger, "claimable", claimable)
+        while len(order) < 10:
+            time.sleep(0.01)
+        assert order[:8].count("Cem") == 4
+        assert order[:8].count("Bob") == order[:8].count("Ann") == 2
 
 
 @pytest.mark.usefixtures("_imports")

@@ -33,7 +33,7 @@ def test_every_route_has_a_role_and_every_role_a_route() -> None:
 
 def test_every_message_has_a_role() -> None:
     messages = get_args(get_args(protocol.ClientMessage)[0])
-    assert {get_args(kind.model_fields["type"].annotation)[0] for kind in messages} | {"solo"} == set(MESSAGES)
+    assert {get_args(kind.model_fields["type"].annotation)[0] for kind in messages} | {"seen", "hold"} == set(MESSAGES)
 
 
 def test_a_call_that_is_not_listed_is_for_admins() -> None:

@@ -12,6 +12,7 @@ from session_client import SIGMA, THETA_H, Baked, open_session
 from server.access.access import Access
 from server.settings import Settings
 
+SEEN = {"op": "replace", "path": "/display/exposure", "value": 2.0}
 Bearer = Callable[..., dict[str, str]]
 
 
@@ -43,19 +44,38 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
     with open_session(client, baked.bake, headers=bearer("view", "Vera")) as session:
         assert session.text("hello")["role"] == "view"
         before = session.exact(0)
-        session.edit(1, SIGMA, 0.3)
+        session.send(type="edit", revision=1, patch=[SEEN, {"op": "replace", "path": SIGMA, "value": 0.3}])
         told = session.text("problem")
         assert (told["revision"], told["problem"]["status"]) == (1, 403)
         assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
-        session.send(type="touch", curve=THETA_H)
+        session.send(type="touch", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
+        session.send(type="touch", curve=THETA_H)
+        shape = session.text("curve")
+        assert (shape["curve"], len(shape["bands"])) == (THETA_H, len(shape["generated"]))
         session.send(type="view", name="front")
         again = session.exact(0)
         assert again.payload == before.payload
         session.send(type="edit", revision=2, patch=[], solo=["environment"])
         session.exact(2)
+        session.send(type="edit", revision=3, patch=[SEEN])
+        session.exact(3)
         session.send(type="probe", x=3, y=4)
         assert session.text("probe")["material"] == "Paper"
+
+
+def test_how_viewers_look_is_their_own_and_no_edit(
+    client: TestClient, baked: Baked, bearer: Bearer, access: Access
+) -> None:
+    ann, vera = bearer("edit", "Ann"), bearer("view", "Vera")
+    with open_session(client, baked.bake, query="?room=a", headers=ann) as editor:
+        editor.text("hello")
+        with open_session(client, baked.bake, query="?room=a", headers=vera) as viewer:
+            viewer.send(type="edit", revision=1, patch=[SEEN])
+            viewer.exact(1)
+            with open_session(client, baked.bake, query="?room=a", headers=bearer("edit", "Bob")) as late:
+                assert late.text("hello")["look"]["display"]["exposure"] == 0.0
+    assert access.audit.list() == []
 
 
 def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, bearer: Bearer) -> None:

@@ -44,7 +44,7 @@ def settings(tmp_path: Path, ack_seconds: float) -> Settings:
 
 
 def open_fake_bakes(settings: Settings) -> BakeService:
-    return BakeService(settings.data, settings.database_url, methods={"direct": FakeMethod()})
+    return BakeService(settings.data, settings.database_url, methods={"direct": FakeMethod()}, shares=settings.turns)
 
 
 @pytest.fixture

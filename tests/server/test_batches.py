@@ -15,12 +15,12 @@ from server.apart import process as processes
 from server.apart.pool import Pool
 from server.apart.step import Step
 from server.errors import BusyError
-from server.queues.turns import Turns, Waiting
 from server.queues.work_queue import Quota, WorkQueue
 from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
 from worker.database import open_database
 from worker.ledger import Ledger
+from worker.turns import Turns, Waiting
 
 STAND_IN = """
 import json, os, sys, time
@@ -145,14 +145,21 @@ def wait_for(is_reached: Callable[[], bool]) -> None:
 
 
 def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:
-    turns = Turns()
+    turns = Turns({})
     waiting = [Waiting("a1", "ann", False, 1.0), Waiting("a2", "ann", False, 2.0), Waiting("b1", "bob", False, 3.0)]
     assert [turns.next(waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
     waiting.append(Waiting("a3", "ann", True, 4.0))
     assert [turns.next(waiting).id for _ in range(2)] == ["a3", "a3"]
     del waiting[0], waiting[-1]
     waiting.append(Waiting("c1", "cem", False, 5.0))
-    assert [turns.next(waiting).id for _ in range(3)] == ["c1", "b1", "a2"]
+    assert [turns.next(waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
+
+
+def test_shares_say_how_many_turns_somebody_has() -> None:
+    turns = Turns({"ann": 3.0})
+    waiting = [Waiting("b", "bob", False, 1.0), Waiting("a", "ann", False, 2.0)]
+    assert "".join(turns.next(waiting).id for _ in range(12)).count("a") == 9
+    assert turns.next([Waiting("b", "bob", False, 1.0), Waiting("c", "cem", False, 0.0)]).id == "c"
 
 
 class Counting(WorkQueue[RenderRequest]):

@@ -84,7 +84,7 @@ def test_lease_ends_when_it_is_not_renewed(ledger: Ledger, monkeypatch: pytest.M
     identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
     assert ledger.claim(identity, first)
     monkeypatch.setattr(lease, "LEASE_S", -1.0)
-    assert ledger.claimable() == [identity]
+    assert [work.id for work in ledger.claimable()] == [identity]
     assert ledger.claim(identity, second)
     monkeypatch.undo()
     assert not ledger.beat(identity, first)

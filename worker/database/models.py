@@ -45,6 +45,7 @@ class BakeRow(Base):
 
     Attributes:
         code: names the code that makes or made it; None in rows of a relume that did not write that down.
+        client: who asked for it first; None in rows of a relume that did not write that down.
         run: names its beginning, see `worker.runs`; None in rows of a relume that did not.
         crowding: see `worker.estimate`; None where it is not ready, or was baked before that was measured.
     """
@@ -64,6 +65,7 @@ class BakeRow(Base):
     crowding: Mapped[float | None] = mapped_column(default=None)
     code: Mapped[str | None] = mapped_column(default=None)
     run: Mapped[str | None] = mapped_column(default=None)
+    client: Mapped[str | None] = mapped_column(default=None)
     rays_per_second: Mapped[float | None] = mapped_column(default=None)
     seconds_left: Mapped[float | None] = mapped_column(default=None)
     bytes: Mapped[int] = mapped_column(default=0)

@@ -153,7 +153,7 @@ const CONTROLS = [
 ];
 
 /** What is of no use to one who only looks. */
-const OF_EDITORS = new Set(["steps", "display", "share"]);
+const OF_EDITORS = new Set(["steps", "share"]);
 
 export function TopBar() {
   const controls = mayEdit.value ? CONTROLS : CONTROLS.filter(({ name }) => !OF_EDITORS.has(name));

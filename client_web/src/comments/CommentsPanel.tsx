@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { MAX_COMMENT, type CommentBody } from "../protocol";
 import { comments, listedComments, numberOf, openComments, pinning, resolvedShown, selectedComment } from "../state/comments";
-import { mayEdit } from "../state/me";
+import { mayComment, mayEdit, noCommentWords } from "../state/me";
 import { togglePanel } from "../state/room";
 import { IconButton } from "../ui/Button";
 import { beginComment, cancelComment, keepComment, pointOut, remove, settle } from "./comments";
@@ -103,7 +103,8 @@ export function CommentsPanel() {
         <h2 class="spacer">Comments</h2>
         <IconButton icon="close" label="Close" onClick={() => togglePanel("comments")} />
       </header>
-      {mayEdit.value && pinning.value === null && (
+      {noCommentWords.value !== null && <p class="quiet">{noCommentWords.value}</p>}
+      {mayComment.value && pinning.value === null && (
         <button title="Pin words to a pixel (N: where the pointer is)" onClick={beginComment}>
           New comment
         </button>

@@ -10,7 +10,7 @@ import type { CommentBody, CommentRequest } from "../protocol";
 import { bake } from "../state/bakes";
 import { comments, numberOf, pinning, selectedComment } from "../state/comments";
 import { look } from "../state/look";
-import { mayEdit, refusals } from "../state/me";
+import { noCommentWords } from "../state/me";
 import { commentsOpen } from "../state/panels";
 import { probe } from "../state/probe";
 import { togglePanel } from "../state/room";
@@ -52,10 +52,7 @@ export function pinAt(view: string, x: number, y: number): void {
 
 /** Begin a comment on the pixel that the pointer is over, else on the middle of the active view. */
 export function beginComment(): void {
-  if (!mayEdit.peek()) {
-    refusals.value += 1;
-    return;
-  }
+  if (noCommentWords.peek() !== null) return note(noCommentWords.peek() as string);
   const at = probe.peek();
   const { width, height } = stage.active.pixels;
   if (at === null) pinAt(viewName.peek(), Math.floor(width / 2), Math.floor(height / 2));

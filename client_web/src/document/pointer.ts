@@ -25,3 +25,8 @@ export function getAt(document: unknown, path: string): unknown {
   }
   return value;
 }
+
+/** Whether a pointer is to a way of looking, which each has for themselves and who may not edit, too. */
+export function isWayOfLooking(path: string): boolean {
+  return /^\/(display|transport)(\/|$)/.test(path);
+}

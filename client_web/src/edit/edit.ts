@@ -2,6 +2,7 @@
  * play, is no step until somebody keeps it or changes it. */
 import { signal } from "@preact/signals";
 import { changeAt, changeTo, type Change } from "../document/change";
+import { isWayOfLooking } from "../document/pointer";
 import type { Look } from "../protocol";
 import { look } from "../state/look";
 import { mayEdit, refusals } from "../state/me";
@@ -67,7 +68,7 @@ function isRefused(): boolean {
 }
 
 function commit(label: string, change: Change, key?: string): void {
-  if (change.patch.length === 0 || isRefused()) return;
+  if (change.patch.length === 0 || (!(key !== undefined && isWayOfLooking(key)) && isRefused())) return;
   keepPassing();
   show(change, key === undefined ? null : heldAt(key, change.after));
   history.record({ of: "look", label, ...(key === undefined ? {} : { key }), ...change });

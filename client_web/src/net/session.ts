@@ -1,5 +1,7 @@
 /** One live session with a bake: sends the newest look, acknowledges frames, hands out what comes. */
 import type { Change } from "../document/change";
+import { differenceOf } from "../document/difference";
+import { isWayOfLooking } from "../document/pointer";
 import type {
   BakeMessage,
   ClientMessage,
@@ -49,7 +51,7 @@ export class Session {
   private readonly messages: MessageHandlers;
   private scheduled = false;
   private sentThisFrame = false;
-  /** The only look that there is for one who may not edit; null for who may. */
+  /** The look that there is for one who may change only ways of looking at it; null for who may edit. */
   private fixed: Look | null = null;
   /** How often the room's look had changed when others changed it last. */
   shared = 0;
@@ -153,7 +155,9 @@ export class Session {
 
   /** What to show from now on, and the edit that made it; sent at once, then at most once per animation frame. */
   want(wanted: Wanted, change: Change | null = null): void {
-    if (this.fixed !== null && wanted.look !== this.fixed) return this.handlers.readOnly();
+    if (this.fixed !== null && !differenceOf(this.fixed, wanted.look).every(({ path }) => isWayOfLooking(path))) {
+      return this.handlers.readOnly();
+    }
     this.queue.want(wanted, change);
     if (this.sentThisFrame) this.schedule();
     else this.flush();
@@ -189,7 +193,8 @@ export class Session {
 
   /** Whether the message went. */
   send(message: ClientMessage): boolean {
-    if (this.fixed !== null && message.type === "touch") return false; // nothing of it is edited
+    const isHold = message.type === "touch" && message.curve == null;
+    if (this.fixed !== null && isHold) return false; // nothing of it is edited
     return this.socket.send(message);
   }
 }

@@ -105,8 +105,8 @@ export function Outline() {
         <LightsPanel />
         <EnvironmentPanel />
         <BackgroundPanel />
-        <TransportPanel />
       </div>
+      <TransportPanel />
     </nav>
   );
 }

@@ -1,9 +1,9 @@
 /** Who is here, and what they may do. */
 import { computed, signal } from "@preact/signals";
 import type { MeBody } from "../protocol";
-import { watching } from "./together";
+import { ownName, watching } from "./together";
 
-export const me = signal<MeBody>({ login: false, name: "", role: "admin", by: "open" });
+export const me = signal<MeBody>({ login: false, name: "", role: "admin", by: "open", viewers_comment: false });
 
 const hasRole = computed(() => me.value.role === "edit" || me.value.role === "admin");
 
@@ -18,6 +18,20 @@ export const readOnlyWords = computed(() =>
     : hasRole.value
       ? WATCHING
       : `${me.value.name} may look, but not edit: the role is “view”. An admin can hand out a token with the role “edit”.`,
+);
+
+/** Who only looks may comment where the server lets them, and is known by a name. */
+export const mayComment = computed(
+  () => mayEdit.value || (me.value.viewers_comment && (me.value.name !== "" || ownName.value !== "")),
+);
+
+/** Why no comment can be written; null where one can. */
+export const noCommentWords = computed(() =>
+  mayComment.value
+    ? null
+    : me.value.viewers_comment
+      ? "Say your name under “Work together” to comment."
+      : "Who only looks reads comments here, and does not write them.",
 );
 
 /** Counts edits of somebody who may not. */

@@ -43,13 +43,13 @@ class Guest:
     """Sits between a session and its room; on the event loop.
 
     Args:
-        look, pending: where others' edits come to, and are asked to be shown.
+        look, pending: where others' edits come to, and are asked to be shown. may_edit: more than ways of looking.
     Attributes:
         news: something is to be told to the client. has_comments: such as that there are comments.
     """
 
-    def __init__(self, place: Place, look: LookState, pending: PendingRequests) -> None:
-        self._place, self._room, self._seat = place, place.room, place.seat
+    def __init__(self, place: Place, look: LookState, pending: PendingRequests, *, may_edit: bool) -> None:
+        self._place, self._room, self._seat, self._may_edit = place, place.room, place.seat, may_edit
         self._look, self._pending = look, pending
         self.news, self.has_comments = asyncio.Event(), False
         self._told, self._told_revision = place.room.document, look.revision
@@ -77,7 +77,8 @@ class Guest:
             What is to be shown here, which says how often the room's look has changed.
         """
         is_seen = bool(difference(self._room.document, target.document, OWN))
-        self._room.document = target.document
+        if self._may_edit:  # else it is only a way of looking, which whoever comes next does not begin with
+            self._room.document = target.document
         self._room.num_changes += is_seen
         target = replace(target, shared=self._room.num_changes)
         self._note(self._seat.number, is_own=True)

@@ -18,6 +18,11 @@ OWN = ("display", "transport")
 """Sections of a look that each has for themselves: they are ways of looking."""
 
 
+def is_own_way(path: str) -> bool:
+    """Whether a pointer into a look is one of a way of looking."""
+    return path.split("/")[1:2] in ([name] for name in OWN)
+
+
 def seen_by(document: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """A room's look with somebody's own ways of looking."""
     return {**document, **{name: own[name] for name in OWN}}

@@ -37,7 +37,7 @@ class FrameLoop:
     def __init__(self, state: SessionState, library: Library, threads: Threads) -> None:
         self._socket, self._pending, self._shown, self._window = state.socket, state.pending, state.shown, state.window
         self._look, self._transfer, self._metrics = state.look, state.transfer, state.metrics
-        self._guest = state.guest
+        self._guest, self._may_edit = state.guest, state.caller.may_edit
         self._library, self._work = library, OneAtATime(threads)
         self._freezer = Freezer(state.socket, threads, state.metrics, state.pending.news)
         self._answers = Answers(state.socket, self._work)
@@ -135,7 +135,7 @@ class FrameLoop:
             await self._socket.refuse(error)
             self._shown.hide(name)
             return
-        if self._answers.touched is not None:
+        if self._answers.touched is not None and self._may_edit:
             try:
                 await self._work.quick(painter.touch, [picture], self._answers.touched)
             except RelumeError as error:  # the view is shown all the same
@@ -146,11 +146,11 @@ class FrameLoop:
         return [viewport.picture for viewport in self._viewports.values()]
 
     async def _touch(self, pointer: str) -> None:
-        """Prepare the curve that the user opened, in the newest look there is."""
+        """Prepare the curve that the user opened, in the newest look; who may not edit is only told its values."""
         target = self._pending.target
         self._answers.touch(pointer)
         await self._answers.send_curve(target)
-        if self._answers.touched is not None and not await self._prepare(pointer):
+        if self._answers.touched is not None and self._may_edit and not await self._prepare(pointer):
             self._answers.touched = None
 
     async def _prepare(self, pointer: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from editor_page import Editor, opened_page
+from editor_page import Editor, changed, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
@@ -56,6 +56,13 @@ def test_people_log_in_and_roles_say_what_they_may_do(
         page.get_by_role("option", name="Ball").click()
         expect(page.get_by_role("note")).to_contain_text("Vera may look, but not edit")
         expect(page.locator("aside [inert]")).to_be_attached()
+        expect(page.locator(".readout")).to_contain_text("Click to add a point")  # it is there
+        viewer = Editor(page)
+        before = viewer.pixels()
+        page.get_by_role("slider", name="Exposure").press("ArrowRight")
+        assert changed(viewer.pixels(), before) > 0.01
+        page.keyboard.press("n")
+        expect(page.get_by_role("status").filter(has_text="Who only looks reads comments")).to_be_visible()
         page.get_by_role("button", name="Log out").click()
         expect(page.get_by_label("Token")).to_be_visible()
         editor = log_in(page, access.tokens.add("Ann", "edit"))

@@ -1,0 +1,35 @@
+"""Whether those who only look may comment is a setting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import SIZE
+from session_client import Baked
+
+from server.access.access import Access
+from server.settings import Settings
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    settings.viewers_comment = True
+    return settings
+
+
+def test_viewers_write_under_their_name_and_change_nothing_else(
+    client: TestClient, baked: Baked, bearer: Callable[..., dict[str, str]], access: Access
+) -> None:
+    vera, path = bearer("view", "Vera"), f"/api/scenes/{baked.scene}/comments"
+    pin: dict[str, Any] = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": SIZE, "text": "Too bright"}
+    assert client.get("/api/me", headers=vera).json()["viewers_comment"]
+    made = client.post(path, json={**pin, "author": "Ann"}, headers=vera)
+    assert (made.status_code, made.json()["author"]) == (201, "Vera")
+    assert client.post(path, json=pin).status_code == 401
+    one = f"{path}/{made.json()['id']}"
+    assert client.patch(one, json={"resolved": True}, headers=vera).status_code == 403
+    assert client.delete(one, headers=vera).status_code == 403
+    assert [(line.who, line.what) for line in access.audit.list()] == [("Vera", f"POST {path}")]
