@@ -24,7 +24,8 @@ from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.panes import hide_less, lay_over_glass
 from relume.moving.pixels import FromVertices, Mirrored, combine
-from relume.moving.relief.show import Sight, show_texels
+from relume.moving.relief.light import ReliefLight
+from relume.moving.relief.show import Arrived, Sight, show_texels
 from relume.moving.relief.tables import Cover, covers_of
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
@@ -76,6 +77,7 @@ class Wanted(NamedTuple):
     Attributes:
         look: whose materials and background. light: what arrives, by its sources. gain: of all, in each channel. (3,)
         arriving: light vectors of that light. is_rough: they were found quickly.
+        relief: what was made of them for texels, in frames of before.
     """
 
     look: Look
@@ -84,6 +86,7 @@ class Wanted(NamedTuple):
     gain: F32
     arriving: Arriving
     is_rough: bool
+    relief: ReliefLight
 
 
 class Sums(NamedTuple):
@@ -210,7 +213,8 @@ def _summed(
     pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
     out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
     sight = Sight(eye, pixel_angle, seen)
-    show_texels(materials.covers, surface, transfer.positions, sight, arriving.total, emission, out)
+    arrived = Arrived(arriving.total, wanted.relief)
+    show_texels(materials.covers, surface, transfer.positions, sight, arrived, emission, out)
     return Sums(glances, sent, (broad, along), towards, out)
 
 

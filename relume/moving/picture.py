@@ -21,6 +21,7 @@ from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only
 from relume.moving.look_up import Seen, look
 from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
+from relume.moving.relief.light import ReliefLight
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
 from relume.moving.vectors.arriving import Arriving
@@ -80,6 +81,7 @@ class MovingPicture:
         self._vectors, self._everywhere = LiveVectors(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
+        self._relief = ReliefLight()
         self._by: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
         self.draws = True
@@ -236,7 +238,7 @@ class MovingPicture:
         gain = np.array(gain_of(shown, self._solo), np.float32)
         is_exact_but_for_surfaces = self._vectors.follow(self._asked())
         is_rough = self._is_rough and not is_exact_but_for_surfaces
-        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough)
+        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough, self._relief)
 
     def parts(self) -> tuple[dict[str, Part], Numbers]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""

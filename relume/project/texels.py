@@ -68,11 +68,13 @@ def _from_listed(rings, axes, first, wi, irradiance, out):  # type: ignore[no-un
                     out[p, channel, index[k]] += left * weight[k] * irradiance[channel, ray]
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def _folded(i, count):  # type: ignore[no-untyped-def]
-    """Number of a texel that repeats without end."""
-    rest = i % count
-    return rest + count if rest < 0 else rest
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _beside(place, count):  # type: ignore[no-untyped-def]
+    """Find the two texels of a row beside a place within [0, 1], and the share of the second."""
+    x: Any = place * np.float32(count) - np.float32(0.5)
+    low: Any = min(max(np.int32(math.floor(x)), np.int32(-1)), np.int32(count - 1))  # whatever the place is
+    share = np.float32(x - np.float32(low))
+    return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), share
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -83,33 +85,32 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
         levels: of the BTF. u, v: the place, in repeats. footprint: side of it, in repeats.
         texel: their numbers, written. (8,) int32. share: of each, written. (8,) float32
     Returns:
-        How many there are.
+        How many there are: four of each level that has a share.
     """
-    finest = np.float32(max(levels[0, 1], levels[0, 2]))
-    place = math.log2(max(footprint * finest, np.float32(1)))
-    coarsest = levels.shape[0] - 1
-    level: Any = min(place, np.float32(coarsest))
-    lower: Any = min(np.int64(level), max(coarsest - 1, 0))
-    between = np.float32(level - lower)
+    finest, coarsest = np.float32(max(levels[0, 1], levels[0, 2])), levels.shape[0] - 1
+    level: Any = min(np.float32(math.log2(max(footprint * finest, np.float32(1)))), np.float32(coarsest))
+    lower = np.int64(level)
+    between = np.float32(level - np.float32(lower))
+    u, v = np.float32(u - math.floor(u)), np.float32(v - math.floor(v))  # remainders of integers are slow
     num = 0
     for step in range(2):
         of_level = between if step == 1 else np.float32(1) - between
         if of_level <= 0 or lower + step > coarsest:
             continue
         first, height, width = levels[lower + step, 0], levels[lower + step, 1], levels[lower + step, 2]
-        x: Any = u * np.float32(width) - np.float32(0.5)
-        y: Any = v * np.float32(height) - np.float32(0.5)
-        left, upper = math.floor(x), math.floor(y)
-        fx, fy = np.float32(x - left), np.float32(y - upper)
-        column, row = _folded(np.int64(left), width), _folded(np.int64(upper), height)
-        beside = column + 1 if column + 1 < width else 0
-        below = row + 1 if row + 1 < height else 0
-        for corner in range(4):
-            w = of_level * (fx if corner & 1 else 1 - fx) * (fy if corner >> 1 else 1 - fy)
-            if w > 0:
-                texel[num] = first + (below if corner >> 1 else row) * width + (beside if corner & 1 else column)
-                share[num] = w
-                num += 1
+        left, right, fx = _beside(u, width)
+        upper, below, fy = _beside(v, height)
+        upper, below = first + upper * width, first + below * width
+        texel[num], texel[num + 1], texel[num + 2], texel[num + 3] = (
+            upper + left,
+            upper + right,
+            below + left,
+            below + right,
+        )
+        top, bottom = of_level * (np.float32(1) - fy), of_level * fy
+        share[num], share[num + 1] = top * (np.float32(1) - fx), top * fx
+        share[num + 2], share[num + 3] = bottom * (np.float32(1) - fx), bottom * fx
+        num += 4
     return num
 
 

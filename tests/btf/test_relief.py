@@ -8,17 +8,20 @@ from test_texels import CAMERA, GREY, SIZE, covered, floor, opened
 
 from relume.basis.zernike import in_basis
 from relume.btf.rings import directions, taps_numpy, ubo_rings
+from relume.btf.shelf import btf
 from relume.look import validate
 from relume.moving import frame
 from relume.moving.look_up import look
 from relume.moving.relief import tables
-from relume.moving.relief.light import light_about, light_about_numpy
-from relume.moving.relief.show import Sight, show_texels
-from relume.moving.relief.tables import NUM_FUNCTIONS, covers_of, hat_factors
+from relume.moving.relief.light import ReliefLight, light_about_numpy
+from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF
+from relume.moving.relief.show import Arrived, Sight, show_texels
+from relume.moving.relief.tables import covers_of, hat_factors, in_lanes
 from relume.render.image import render_image
 
 SCALE, ROTATION = 2.0, 40.0
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])
+CONSTANT = int(np.flatnonzero(FUNCTIONS == 0)[0])
 BLACK = np.zeros((1, 3), np.float32)
 
 
@@ -43,32 +46,44 @@ def terms_of(look_of):
     return [[dict(term) for term in look_of.materials["Floor"].terms]]
 
 
+def arrived(surface):
+    return Arrived(vectors_of(surface, TO_LIGHT), ReliefLight())
+
+
+def factors(numbers, axes):
+    """Out-factors, in lanes, that numbers stand for. (…, 24) to (…, 3, F)"""
+    out = np.zeros((*numbers.shape[:-1], 3, 16))
+    for number, (axis, lane) in enumerate(zip(AXIS_OF, LANE_OF, strict=True)):
+        out[..., lane] += numbers[..., number, None] * axes[:, axis]
+    return out
+
+
 def oracle(cover, d, place):
     """r of a ray on the floor, in plain NumPy: its texture's x to the right, y away from the eye."""
-    turn, found = np.radians(ROTATION), cover.texels.btf.with_components(tables.COMPONENTS)
+    turn, found = np.radians(ROTATION), cover.tables
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
-    axes, (height, width) = np.array([across, up, [0, 1, 0]]), found.size
+    axes, (height, width) = np.array([across, up, [0, 1, 0]]), cover.texels.btf.size
     column, row = SCALE * np.array([width * across @ place, -height * up @ place]) - 0.5
-    values = np.zeros((81, 81, 3))
+    numbers = np.zeros(found.mean.shape)
     for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
         share = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
-        values += share * found.texel(number)
-    light = hat_factors(found.rings)[:, :NUM_FUNCTIONS] @ in_basis(axes @ TO_LIGHT)[:NUM_FUNCTIONS]
-    view, of_view, _ = taps_numpy(found.rings, -(axes @ d)[None])
+        numbers += share * found.step * found.weight[:, number].astype(float)
+    light = in_lanes(in_basis(axes @ TO_LIGHT))
+    view, of_view, _ = taps_numpy(cover.texels.btf.rings, -(axes @ d)[None])
 
-    def under(table):
-        return np.einsum("a,alc,l->c", of_view[0], table[view[0]], light)
+    def under(numbers):
+        return np.einsum("a,ack,k->c", of_view[0], factors(numbers, found.axes)[view[0]], light)
 
-    return np.maximum(under(values), 0) / under(found.average.astype(np.float64))
+    return np.maximum(under(found.mean + numbers), 0) / under(found.mean)
 
 
 def test_the_kernel_is_the_oracle(moving, small_btf):
     covers = covers_of(terms_of(covered(moving, small_btf.record, scale=SCALE, rotation=ROTATION)))
     seen_by, surface = sight(moving), moving.surface
     seen, out = seen_by.seen, np.ones((len(seen_by.seen.directions), 3), np.float32)
-    show_texels(covers, surface, moving.positions, seen_by, vectors_of(surface, TO_LIGHT), BLACK, out)
+    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), BLACK, out)
     rays = np.flatnonzero(seen.hits.face >= 0)
     for ray in rays[::61]:
         d = seen.directions[ray].astype(np.float64)
@@ -85,19 +100,52 @@ def test_light_about_a_vertex_is_the_oracles(moving):
     tangent = (np.cos(turn)[:, None] * t + np.sin(turn)[:, None] * np.cross(n, t)).astype(np.float32)
     surface = replace(surface, points=surface.points._replace(tangent=tangent))
     vectors = rng.normal(size=moving.vectors_shape).astype(np.float32)
-    found = light_about(surface, vectors, np.ones(len(surface.vertices.normal), np.uint8))
+    light, num = ReliefLight(), len(surface.vertices.normal)
+    light.about(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
+    found = light.about(surface, vectors, np.ones(num, np.uint8))
     for vertex in range(0, len(found.tangent), 37):
         expected, along = light_about_numpy(surface.vertices, tangent, vectors, vertex)
-        np.testing.assert_allclose(found.vectors[vertex], expected, rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(found.vectors[vertex].reshape(3, 16), in_lanes(expected), rtol=1e-4, atol=1e-5)
         np.testing.assert_allclose(found.tangent[vertex], along)
+
+
+def test_another_light_is_another(moving):
+    """What was kept of the light before is not shown."""
+    surface, light, every = moving.surface, ReliefLight(), np.ones(len(moving.surface.vertices.normal), np.uint8)
+    dark, bright = np.zeros(moving.vectors_shape, np.float32), np.ones(moving.vectors_shape, np.float32)
+    assert light.about(surface, bright, every).vectors.any()
+    assert not light.about(surface, dark, every).vectors.any()
+
+
+def test_few_numbers_tell_out_factors(moving, small_btf):
+    """Of each texel, from all sides, as its own values have them, but for rounding and colours of what is narrow."""
+    cover = covers_of(terms_of(covered(moving, small_btf.record)))[0]
+    found, integrals, squares = cover.tables, hat_factors(cover.texels.btf.rings), np.zeros(2)
+    for texel in range(0, found.weight.shape[1], 29):
+        expected = np.einsum("vlc,lk->vck", cover.texels.btf.texel(texel), integrals)
+        told = factors(found.mean + found.step * found.weight[:, texel], found.axes)
+        squares += np.sum((told - expected) ** 2), np.sum(expected**2)
+    assert squares[0] < 0.05**2 * squares[1]
+
+
+def test_the_finest_texels_of_large_tables_are_left_out(small_btf, monkeypatch):
+    whole = btf(small_btf.record.data)
+    monkeypatch.setattr(tables, "_MOST_BYTES", 81 * 24 * 100)
+    found = tables._tables_of.__wrapped__(whole)
+    assert found.levels[0].tolist() == [0, 8, 8]
+    assert found.weight.shape[1] == 64 + 16 + 4 + 1
+    monkeypatch.undo()
+    complete = tables._tables_of.__wrapped__(whole)
+    one, other = (t.step[:, None] * t.weight for t in (found, complete))
+    np.testing.assert_allclose(one, other[:, 256:], atol=float((found.step + complete.step).max()))
 
 
 def test_a_matt_surface_has_a_single_factor():
     """Its values are the cosine, ∫ cos θ h_k dω = √π for the first function and nothing for the others."""
     rings = ubo_rings()
     found = directions(rings)[:, 2] @ hat_factors(rings)
-    assert found[0] == pytest.approx(np.sqrt(np.pi), rel=0.02)
-    assert np.abs(found[1:]).max() < 0.02 * found[0]
+    assert found[CONSTANT] == pytest.approx(np.sqrt(np.pi), rel=0.02)
+    assert np.abs(np.delete(found, CONSTANT)).max() < 0.02 * found[CONSTANT]
 
 
 def test_a_moving_view_shows_what_a_fixed_one_does(moving, small_btf, tmp_path, monkeypatch):
@@ -124,5 +172,5 @@ def test_emission_is_not_textured(moving, small_btf):
     seen_by = sight(moving, 0.01)
     out = np.full((len(seen_by.seen.directions), 3), 0.7, np.float32)
     shining = np.full((1, 3), 0.7, np.float32)
-    show_texels(covers, surface, moving.positions, seen_by, vectors_of(surface, TO_LIGHT), shining, out)
+    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), shining, out)
     np.testing.assert_allclose(out, 0.7, atol=1e-6)
