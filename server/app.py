@@ -10,6 +10,7 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
+from relume.brdf.channels import IMAGES
 from relume.btf.shelf import STORE as BTFS
 from relume.environments.asset_store import STORE as ENVIRONMENTS
 from relume.measured.asset_store import STORE as MATERIALS
@@ -23,19 +24,14 @@ from server.metrics import Metrics
 from server.routes import (
     access,
     bakes,
-    btf_works,
-    btfs,
     built_ins,
     cameras,
     client,
     comments,
     comparisons,
-    environments,
     finder,
     health,
-    library,
     looks,
-    materials,
     models,
     renders,
     scenes,
@@ -43,12 +39,13 @@ from server.routes import (
     shares,
     surface,
 )
+from server.routes.shelves import btf_works, btfs, environments, images, library, materials
 from server.running.leave import Leave
 from server.running.process import Process
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
-from worker.paths import btfs_path, environments_path, materials_path
+from worker.paths import btfs_path, environments_path, images_path, materials_path
 
 ROUTE_GROUPS = (
     scenes,
@@ -62,6 +59,7 @@ ROUTE_GROUPS = (
     btf_works,
     library,
     environments,
+    images,
     bakes,
     surface,
     renders,
@@ -98,6 +96,7 @@ def create_app(
             MATERIALS.at(materials_path(settings.data)),
             BTFS.at(btfs_path(settings.data)),
             ENVIRONMENTS.at(environments_path(settings.data)),
+            IMAGES.at(images_path(settings.data)),
         ):
             opening = open_services(settings, metrics, leave, open_library, open_bakes, open_batches, clock)
             async with opening as services:

@@ -45,6 +45,10 @@ class NotReadyError(RelumeError):
     """It is here, but it is not in the state that the call needs."""
 
 
+class InUseError(RelumeError):
+    """Something else names it, and would be broken without it."""
+
+
 class BusyError(RelumeError):
     """The server has all it can take; later it may have room."""
 
@@ -108,6 +112,7 @@ class Row:
 TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (InUseError, Row(409, "in-use", "In use", CLOSE_NOT_READY)),
     (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),

@@ -80,6 +80,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,
+    bodies.ImageBody,
     bodies.MeasuredBody,
     bodies.BtfBody,
     btfs.BtfWorkBody,

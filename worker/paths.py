@@ -36,6 +36,11 @@ def environments_path(data_dir: Path) -> Path:
     return data_dir / "environments"
 
 
+def images_path(data_dir: Path) -> Path:
+    """Folder of the images that looks may name; `relume.images.shelf` names what is in it."""
+    return data_dir / "images"
+
+
 def bake_path(data_dir: Path, bake_id: str) -> Path:
     """The published store of a bake."""
     return data_dir / "bakes" / f"{_checked(bake_id)}.zarr"

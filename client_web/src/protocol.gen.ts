@@ -446,6 +446,17 @@ export interface HelloMessage {
   room: RoomInfo | null;
 }
 
+/** An image that terms of looks may name as their `texture`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. */
+export interface ImageBody {
+  id: string;
+  texture: string;
+  name: string;
+  created: string;
+  size: [number, number];
+  warnings: string[];
+  thumbnail: string;
+}
+
 /** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
 export interface InOutBody {
   functions: number;

@@ -17,6 +17,7 @@ export type {
   CurveMessage,
   DryRunBody,
   EnvironmentBody,
+  ImageBody,
   FinderBody,
   FrameHeader,
   HelloMessage,

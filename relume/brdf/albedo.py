@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
+from relume.brdf.channels import TEXTURES, Images, group_of, images_of
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.registry import TERMS
@@ -25,8 +26,6 @@ from relume.brdf.symmetry import about_normal, is_isotropic
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-
-TEXTURES = ("diffuse", "specular")
 
 Reflectances = tuple[bytes, ...]
 """Of each material, from `reflectances_of`; as bytes, which are compared and hashed at every frame."""
@@ -40,6 +39,7 @@ def _pairs() -> tuple[tuple[int, int], ...]:
 PAIRS = _pairs()
 """Rungs j ≤ k of equal order: F is known by their numbers; the first is F_00."""
 
+_SHARE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # of a highlight's numbers, from none to all
@@ -51,12 +51,13 @@ def is_diffuse(term_document: Mapping[str, Any]) -> bool:
 
 
 def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
-    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`.
+    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; and the
+    images that its look names in their place.
 
     Args:
         terms: of a complete look.
     Returns:
-        What `shares_in` reads.
+        What `shares_in` and `images_in` read.
     """
     return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True))
 
@@ -64,17 +65,25 @@ def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
 @lru_cache(maxsize=256)
 def _reflectances(terms_text: str) -> bytes:
     total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
-    for term in json.loads(terms_text):
+    terms = json.loads(terms_text)
+    for term in terms:
         found = shares(term)
         if not is_diffuse(term):  # else all light would be made anew with each step of a hand on a highlight
             found = np.round(found * _STEPS) / _STEPS
-        total[0 if term["texture"] is None else 1 + TEXTURES.index(term["texture"])] += found
-    return total.astype(np.float32).tobytes()
+        total[group_of(term)] += found
+    named = [name or "" for name in images_of(terms)]
+    return total.astype(np.float32).tobytes() + " ".join(named).encode()
 
 
 def shares_in(of_material: bytes) -> F32:
     """F of a material's terms without a texture, then of those with each of `TEXTURES`. (3, channels, pairs) float32"""
-    return np.frombuffer(of_material, np.float32).reshape(1 + len(TEXTURES), 3, len(PAIRS))
+    return np.frombuffer(of_material[:_SHARE_BYTES], np.float32).reshape(1 + len(TEXTURES), 3, len(PAIRS))
+
+
+def images_in(of_material: bytes) -> Images:
+    """What a look names in the place of each of a material's `TEXTURES`. of_material: from `reflectances_of`"""
+    diffuse, specular = of_material[_SHARE_BYTES:].decode().split(" ")
+    return diffuse or None, specular or None
 
 
 def reflectance(term_document: Mapping[str, Any]) -> F64:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from relume.brdf.channels import check_texture
 from relume.brdf.curves import CHANNELS
 from relume.brdf.edited import RELATIVE, is_relative
 from relume.brdf.registry import TERMS
@@ -26,7 +27,6 @@ from relume.checks import (
 
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
-_TEXTURES = ("diffuse", "specular")
 _FIELDS = ("model", "data", "color", "texture", "roughness_map", "params", "curves")
 
 
@@ -47,9 +47,7 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
         raise fail((*pointer, "model"), model, f"one of {names_text(TERMS)}")
     color = given.get("color", [1.0, 1.0, 1.0])
     check_triple((*pointer, "color"), color, 0.0, MAX_COLOR)
-    texture = given.get("texture", term.texture)
-    if texture is not None and texture not in _TEXTURES:
-        raise fail((*pointer, "texture"), texture, f"null or one of {names_text(_TEXTURES)}")
+    texture = check_texture((*pointer, "texture"), given.get("texture", term.texture))
     known_curves = known["curves"] if known is not None and known["model"] == model else {}
     return {
         "model": model,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.environments.primaries import REC_709
 from relume.exr.layers import Layer
+from relume.imageio.primaries import REC_709
 from relume.look import Look
 from relume.scene.model import Camera
 

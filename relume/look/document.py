@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 from relume import environments
+from relume.brdf.channels import check_shared
 from relume.brdf.document import complete_term
 from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.errors import ParameterError
@@ -112,10 +113,12 @@ def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[
     if not isinstance(given, list | tuple) or len(given) > MAX_TERMS:
         raise fail(pointer, given, f"a list of at most {MAX_TERMS} terms")
     before = [*known, *[None] * (len(given) - len(known))]
-    return [
-        term if term is was else complete_term((*pointer, k), term, was)
+    terms = [
+        term if term is was and was is not None else complete_term((*pointer, k), term, was)
         for k, (term, was) in enumerate(zip(given, before, strict=False))
     ]
+    check_shared(pointer, terms)
+    return terms
 
 
 def _complete_environment(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:

@@ -34,13 +34,14 @@ class TermLook(TypedDict):
     """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give.
 
     `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the
-    term is scaled by the material's map of roughness, where it has one.
+    term is scaled by the material's map of roughness, where it has one. `texture` names one of the material's own
+    images by its channel, or "image:<id>", one that was sent.
     """
 
     model: str
     data: NotRequired[str]
     color: Rgb
-    texture: Literal["diffuse", "specular"] | None
+    texture: str | None
     roughness_map: NotRequired[bool]
     params: dict[str, float | Rgb]
     curves: dict[str, DrawnCurve | list[DrawnCurve]]

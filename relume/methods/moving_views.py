@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
+from relume.brdf.channels import Images
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
@@ -23,6 +24,7 @@ from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
 from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.parted import find_parted
+from relume.moving.points.images import dressed
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
 from relume.moving.sky import Sky
 from relume.moving.solid import Solid
@@ -109,6 +111,20 @@ class MovingViews:
     def radiance_of(self, name: str | None) -> F32:
         """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
         return self.lit.radiance_of(name)
+
+    def surface_with(self, images: tuple[Images, ...]) -> Surface:
+        """What the eye sees where a look names images in the place of the materials' own.
+
+        Args:
+            images: of each material.
+        Raises:
+            NotFoundError, SceneError: an image cannot be had.
+        """
+        if not any(map(any, images)):
+            return self.surface
+        key = self.key, "images on surfaces", images
+        found = self.memory.keep(key, lambda: dressed(self.surface, self.positions, images))
+        return replace(self.surface, **found._asdict())
 
     @property
     def has_holes(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.brdf.albedo import TEXTURES
+from relume.brdf.channels import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
@@ -67,7 +67,17 @@ def read_cells(store: StoreReader) -> CellLight:
         make_pattern(links.shape[1] // points_a_cell, 0, int(store.attributes["gather_seed"])),
         material,
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
+        _read_uv_of_cells(store),
     )
+
+
+def _read_uv_of_cells(store: StoreReader) -> F32 | None:
+    """Where the points of cells lie in textures; None in stores that do not say so."""
+    try:
+        store.shape("cells/uv")
+    except StoreError:
+        return None
+    return np.asarray(store.read("cells/uv"), np.float32)
 
 
 def has_holes(store: StoreReader) -> bool:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import Images, images_of
 from relume.look import Look
 from relume.moving.again import Part, Shown, resolve_some
 from relume.moving.basis.lobes import Lobes, lobes_of
@@ -52,6 +53,7 @@ class Materials(NamedTuple):
         sends: whether a material sends anything of a group of terms. (materials, groups) bool
         covers: of materials whose every texel sends something else.
         each: the terms of each, projected.
+        images: that a look names in the place of each one's own.
     """
 
     tables: Tables
@@ -59,6 +61,7 @@ class Materials(NamedTuple):
     sends: NDArray[np.bool_]
     covers: Sequence[Cover]
     each: Sequence[Projected]
+    images: tuple[Images, ...]
 
     @classmethod
     def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Sequence[Projected] = ()) -> Self:
@@ -68,7 +71,7 @@ class Materials(NamedTuple):
         tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends, covers_of(terms), each)
+        return cls(tables, lobes, sends, covers_of(terms), each, tuple(map(images_of, terms)))
 
 
 class Wanted(NamedTuple):
@@ -200,7 +203,8 @@ def _summed(
     into: Sums | None = None,
 ) -> Sums:
     """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
-    surface, materials, arriving = transfer.surface, wanted.materials, wanted.arriving
+    materials, arriving = wanted.materials, wanted.arriving
+    surface = transfer.surface_with(materials.images)
     lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
     glances, sent, (broad, along), towards, out = into or (None, None, (None, None), None, None)
     glances = _glanced(transfer, wanted, eye, points, glances)
@@ -214,7 +218,7 @@ def _summed(
     out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
     sight = Sight(eye, pixel_angle, seen)
     arrived = Arrived(arriving.total, wanted.relief)
-    show_texels(materials.covers, surface, transfer.positions, sight, arrived, emission, out)
+    show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, emission, out)
     return Sums(glances, sent, (broad, along), towards, out)
 
 
@@ -241,7 +245,7 @@ def _add_beams(
     """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
     beams, sky = wanted.arriving.beams, _sky_in(transfer, wanted.light)
     of_eye = seen, camera, camera.yfov / height
-    add_beams(beams, shares, transfer.surface, *of_eye, wanted.materials, sky, rays, out)
+    add_beams(beams, shares, transfer.surface_with(wanted.materials.images), *of_eye, wanted.materials, sky, rays, out)
 
 
 def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:

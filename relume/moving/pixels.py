@@ -131,7 +131,7 @@ def _combine(  # type: ignore[no-untyped-def]
     start, stop, out,
 ):  # fmt: skip
     """Sum what vertices and lobes send along the rays that are [start, stop) of rows, and what surfaces emit."""
-    textures, uvs, tangents, faces, face_material, face_normal, uv_scale, normals = surface
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = surface
     face, uv, distance = hits
     lobes = mirrored.lobes
     texture_value, light = np.empty(3, np.float32), np.empty(3, np.float32)
@@ -151,7 +151,7 @@ def _combine(  # type: ignore[no-untyped-def]
         d = directions[p, 0], directions[p, 1], directions[p, 2]
         along = outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2]
         footprint = footprint_of(distance[p], pixel_angle, uv_scale[f], along)
-        place = in_texture(uvs, corners, at)
+        place = in_texture(uvs, (uv_faces[f, 0], uv_faces[f, 1], uv_faces[f, 2]), at)
         is_mapped = textures.of_material[material, NORMAL_MAP] >= 0
         n = d
         if is_mapped or lobe >= 0:
@@ -230,8 +230,8 @@ def combine(
     asked = np.arange(len(found), dtype=np.int32) if rows is None else rows
     hits = (seen.hits.face, seen.hits.uv, seen.hits.distance)
     of_surface = (
-        surface.textures, surface.uvs, surface.tangents, surface.faces, surface.face_material, surface.face_normal,
-        surface.uv_scale, surface.vertices.normal,
+        surface.textures, surface.uvs, surface.tangents, surface.faces, surface.uv_faces, surface.face_material,
+        surface.face_normal, surface.uv_scale, surface.vertices.normal,
     )  # fmt: skip
     args = (
         of_surface, np.float32(pixel_angle), hits, seen.directions, seen.vertex, seen.weight,

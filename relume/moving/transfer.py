@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import Images
 from relume.look import EnvironmentKey
 from relume.moving.beams.beam import Beam
 from relume.moving.highlights.lobe_lights import LobeLights
@@ -29,6 +30,10 @@ class MovingTransfer(Opened, Protocol):
     def views(self) -> Mapping[str, FreeView]: ...
     @property
     def surface(self) -> Surface: ...
+    def surface_with(self, images: tuple[Images, ...]) -> Surface:
+        """What it is where a look names images in the place of the materials' own. images: of each material"""
+        ...
+
     @property
     def embree(self) -> EmbreeScene: ...
     @property

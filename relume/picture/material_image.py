@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import is_image
 from relume.brdf.mirror import mirrored_share
 from relume.picture.light import Light
 from relume.picture.live_term import LiveTerm
@@ -161,4 +162,6 @@ class MaterialImage:
     def _factors(self, term: LiveTerm) -> tuple[F32, F32, bool]:
         color = np.asarray(term.document["color"], np.float32)
         name = term.document.get("texture")
+        if is_image(name):
+            return color, self._view.image(self.index, name), True
         return color, self._textures[name or "diffuse"], name is not None

@@ -6,7 +6,7 @@ method leaves out alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
+from relume.reference.images import textures_of
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
@@ -184,9 +185,8 @@ def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
     samples = sample_view(scene, geometry, view, size, follows_mirrors=False)  # here mirrors are lobes like others
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
     texels = texels_of(light, look.environment.rotation).times(look.environment.gain)
-    return _Shot(
-        scene, geometry, look, samples, points_of(samples), light, texels, lamps_of(scene, look)
-    )  # fmt: skip
+    points = points_of(samples, textures_of(scene, look, samples.surface, samples.material))
+    return _Shot(scene, geometry, look, samples, points, light, texels, lamps_of(scene, look))
 
 
 def _add_direct(radiance: F64, shot: _Shot, draw: _Draw, progress: Callable[[float], object]) -> None:
@@ -238,13 +238,15 @@ def _add_reflected(
         progress((block + 1) / num_blocks)
 
 
-def points_of(samples: ViewSamples) -> Points:
-    """View samples as points; those of the background have no surface and are not meant."""
-    surface, points = samples.surface, samples.surface.points
+def points_of(samples: ViewSamples, textures: Mapping[str, F32]) -> Points:
+    """View samples as points; those of the background have no surface and are not meant.
+
+    samples: of a view. textures: there, see `Points`.
+    """
+    points, roughness = samples.surface.points, samples.surface.roughness
     towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
-    textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    return Points(points.position, points.normal, points.tangent, wo, textures, surface.roughness)
+    return Points(points.position, points.normal, points.tangent, wo, textures, roughness)
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:

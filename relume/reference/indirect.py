@@ -17,9 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import channel_of
 from relume.brdf.evaluate import eval_brdf
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.look import Look, Paths
+from relume.reference.images import textures_of
 from relume.reference.kinds import Kinds, kinds_of
 from relume.reference.lobes import Lobe
 from relume.reference.local import lamps_of
@@ -89,7 +91,7 @@ def reference_indirect(
             weight = _reflected(weight, share, mirrored, bounce)
             hits = trace_from(geometry.embree, here.position, directions)
             hit = np.nonzero(hits.face >= 0)[0]
-            here, hit_material = _places(scene, geometry, hits, directions, hit)
+            here, hit_material = _places(scene, geometry, look, hits, directions, hit)
             of = kinds.of(hit_material, here.roughness)
             rows, weight = rows[hit], weight[:, hit]
             counts = np.array([_counting(paths, bounce + 1) for paths in wanted])
@@ -157,14 +159,14 @@ def _survivors(
 
 
 def _places(
-    scene: Scene, geometry: Geometry, hits: Hits, directions: F32, hit: NDArray[np.intp]
+    scene: Scene, geometry: Geometry, look: Look, hits: Hits, directions: F32, hit: NDArray[np.intp]
 ) -> tuple[Points, NDArray[np.int32]]:
     """What some of the rays have hit, seen from where they come, and its materials."""
     some = hits.rows(hit)
     surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE)
-    textures = {"diffuse": surface.diffuse, "specular": surface.specular}
-    points = Points(*surface.points[:3], -directions[hit], textures, surface.roughness)
-    return points, geometry.face_material[some.face]
+    material = geometry.face_material[some.face]
+    textures = textures_of(scene, look, surface, material)
+    return Points(*surface.points[:3], -directions[hit], textures, surface.roughness), material
 
 
 def _scattered(
@@ -190,7 +192,8 @@ def _scattered(
         density = np.mean([lobe.density_of(wi[at, None], wo[at])[:, 0] for lobe in of_lobes], axis=0)
         cosine = np.where((wi[at, 2] > 0) & (wo[at, 2] > 0), wi[at, 2], 0.0)
         for term, mirror in zip(of_material, kinds.mirrors[index], strict=True):
-            texture = points.textures[term["texture"]][at] if term["texture"] is not None else 1.0
+            channel = channel_of(term)
+            texture = 1.0 if channel is None else points.textures[channel][at]
             value = texture * eval_brdf(term, wi[at], wo[at])
             of_term = value * (cosine / np.maximum(density, _LEAST_DENSITY))[:, None]
             share[at] += of_term

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.bands import MAX_ANGLE
+from relume.brdf.channels import channel_of
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
@@ -42,7 +43,7 @@ class Points:
 
     Attributes:
         position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
-        textures: what multiplies a term that names it, "diffuse" and "specular". (n, 3) float32 each
+        textures: what multiplies terms of a channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.trace.surface.Surface`. (n,) float32
     """
 
@@ -267,7 +268,7 @@ def _add_lights(
 def _factor(table: _Tables, points: Points, p: int, cos_theta_o: float) -> F64:
     """Colour, texture and curves of the outgoing angle. (3,)"""
     factor = np.asarray(table.document["color"], np.float64)
-    channel = table.document.get("texture")
+    channel = channel_of(table.document)
     if channel is not None:
         factor = factor * points.textures[channel][p]
     theta_o = np.arccos(np.clip(np.array([cos_theta_o]), 0.0, 1.0))

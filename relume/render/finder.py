@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import TEXTURES, is_diffuse, reflectances_of, shares_in
+from relume.brdf.albedo import is_diffuse, reflectances_of, shares_in
+from relume.brdf.channels import TEXTURES, images_of
 from relume.color import srgb_encode
+from relume.images.shelf import texture_of
 from relume.look import default_look
 from relume.scene.coding import mean_of
 from relume.scene.gltf.cameras import framing_camera
-from relume.scene.model import Camera, Material, Scene
+from relume.scene.model import Camera, Material, Scene, Texture
 from relume.trace.geometry import Geometry, merge
 from relume.trace.primary import Hits, camera_directions, trace_from
 
@@ -104,12 +106,13 @@ class Finder:
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
     """About what a material looks like: its diffuse colour, else that of its highlights. (3,)"""
     plain, *textured = shares_in(reflectances_of(list(filter(is_diffuse, terms))))[..., 0].astype(np.float64)
-    color = plain + sum(part * _mean(material, name) for name, part in zip(TEXTURES, textured, strict=True))
+    own = [material.textures.get(channel) for channel in TEXTURES]
+    shown = [own[k] if name is None else texture_of(name) for k, name in enumerate(images_of(terms))]
+    color = plain + sum(part * _mean(texture) for texture, part in zip(shown, textured, strict=True))
     if color.max() < _DARKEST:
         color = np.max([np.asarray(term["color"], np.float64) for term in terms], axis=0)
     return np.asarray(np.clip(color, _DARKEST, 1.0))
 
 
-def _mean(material: Material, name: str) -> F64:
-    texture = material.textures.get(name)
+def _mean(texture: Texture | None) -> F64:
     return np.ones(3) if texture is None else mean_of(texture)

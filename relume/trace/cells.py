@@ -36,6 +36,7 @@ class Cells:
         normal: shading normals there. (C, `POINTS_A_CELL`, 3) float32
         diffuse, specular: texture channels, their means over the cell's points. (C, 3) float32
         material: index into the scene's materials. (C,) uint16
+        uv: where points lie in textures, and the side of what is read about them. (C, `POINTS_A_CELL`, 3) float32
     """
 
     tree: CellTree
@@ -44,6 +45,7 @@ class Cells:
     diffuse: F32
     specular: F32
     material: NDArray[np.uint16]
+    uv: F32
 
     @property
     def num_cells(self) -> int:
@@ -102,4 +104,5 @@ def choose_cells(
         surface.diffuse.reshape(shape).mean(axis=1),
         surface.specular.reshape(shape).mean(axis=1),
         geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),
+        surface.uv[:, :3].reshape(shape),
     )

@@ -182,16 +182,27 @@ def _in_texture(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
     return np.asarray(np.column_stack([uv, none, turn, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
 
 
+def projected_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Axes of a texture that is projected along the axis of the world that faces look along most.
+
+    Args:
+        face_normal: of n faces. (n, 3)
+    Returns:
+        Along u, and against v, unit. (n, 3) each
+    """
+    axis = np.abs(face_normal).argmax(axis=1)
+    sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
+    across = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
+    return across, np.cross(sign[:, None] * np.eye(3)[axis], across)
+
+
 def _projected(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
     """Places of a texture that is projected along the axes of the world, a metre wide; see `Surface.uv`.
 
     Args:
         position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, metres. (n,)
     """
-    axis = np.abs(face_normal).argmax(axis=1)
-    sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
-    across = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
-    up = np.cross(sign[:, None] * np.eye(3)[axis], across)
+    across, up = projected_axes(face_normal)
     u, v = np.einsum("nc,nc->n", position, across), -np.einsum("nc,nc->n", position, up)
     x = np.einsum("nc,nc->n", across, tangent)
     y = np.einsum("nc,nc->n", across, np.cross(normal, tangent))

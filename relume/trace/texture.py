@@ -10,11 +10,13 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.parallel import for_ranges
 from relume.scene.coding import ROWS_AT_ONCE, decode, wrapped
 from relume.scene.model import WRAPS, Texture
 
 F32 = NDArray[np.float32]
 
+_LOOKUPS_A_RANGE = 16_384
 _REPEAT, _, _CLAMP = range(len(WRAPS))  # as kernels know them
 
 
@@ -78,6 +80,24 @@ class MipMap:
         of = [[decode(image[row, column], coding) for column in columns] for row in rows]
         top, bottom = (left * (1 - fx) + right * fx for left, right in of)
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
+
+
+def sample_image(texture: Texture, uv: F32) -> F32:
+    """Look a texture up at places, some at once on every thread.
+
+    Args:
+        texture: any. uv: u, v, and the side of what a pixel covers there, as `relume.trace.surface.Surface` has them.
+            (n, ≥ 3) float32
+    Returns:
+        (n, channels) float32
+    """
+    pyramid, out = MipMap.of(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
+
+    def look_up(start: int, stop: int) -> None:
+        out[start:stop] = pyramid.sample(uv[start:stop, :2], uv[start:stop, 2])
+
+    for_ranges(look_up, len(uv), _LOOKUPS_A_RANGE)
+    return out
 
 
 _pyramids: dict[int, MipMap] = {}

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.brdf.levels import Levels
-from relume.errors import ChunkDamagedError
+from relume.errors import ChunkDamagedError, StoreError
 from relume.eye.view_samples import BACKGROUND
+from relume.images.shelf import texture_of
 from relume.memory import Memory
 from relume.points import Points
 from relume.project.receivers import GatherRays, LocalRays, Receivers
 from relume.project.sent import Sent
 from relume.scene.model import Camera
 from relume.sharing import Sharing
+from relume.trace.texture import sample_image
 from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
 from relume.views.store_io import (
@@ -99,6 +101,25 @@ class View:
     def levels(self, material: int) -> Levels:
         """Find how rough a material's samples are."""
         return Levels(self.ratios[material], self.level[self.rows(material)])
+
+    def image(self, material: int, name: str) -> F32:
+        """Look up what a material's samples show of an image that a look names. (n, 3) float32
+
+        Args:
+            material: its index. name: "image:<id>".
+        Raises:
+            StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: the
+                image cannot be had.
+        """
+
+        def found() -> F32:
+            rows = self.rows(material)
+            uv = read_uv(self.store, self.index, rows.start, rows.stop)
+            if uv is None:
+                raise StoreError("this bake is too old to show images; bake the scene again")
+            return sample_image(texture_of(name), uv)
+
+        return self.memory.keep((self.key, "image", self.name, material, name), found)
 
     def shining(self, material: int) -> F32:
         """Read how brightly a material's samples shine, over its mean. (n, 1) float32, (n, 3) where images say it"""

@@ -18,7 +18,7 @@ from worker.database.models import BakeRow
 if TYPE_CHECKING:
     from server.settings import Settings
 
-Kind = Literal["scene", "environment", "material", "btf-work", "bake", "render"]
+Kind = Literal["scene", "environment", "material", "btf-work", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 
 

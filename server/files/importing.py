@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # the import process itself has no use for them, or not at on
 MAX_OUTPUT_BYTES = 64 * 1024
 DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 UPLOAD_PREFIX = "upload-"
-Kind = Literal["scene", "environment", "built_in", "grounded"]
+Kind = Literal["scene", "environment", "built_in", "grounded", "image"]
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,8 @@ def answer_of(request: ImportRequest) -> dict[str, str]:
 def _import(request: ImportRequest) -> str:
     if request.kind == "grounded":
         return _put_on_ground(request)
+    if request.kind == "image":
+        return _import_image(request)
     return _import_environment(request) if request.kind == "environment" else _import_scene(request)
 
 
@@ -139,6 +141,13 @@ def _import_environment(request: ImportRequest) -> str:
     from worker.paths import environments_path
 
     return keep(environments_path(Path(request.data)), Path(request.file), request.name).id
+
+
+def _import_image(request: ImportRequest) -> str:
+    from relume.images.shelf import keep
+    from worker.paths import images_path
+
+    return keep(images_path(Path(request.data)), Path(request.file), request.name).id
 
 
 def _import_scene(request: ImportRequest) -> str:

@@ -83,6 +83,12 @@ class LookStore:
             raise NotFoundError(f"there is no look {name!r}; save it first")
         return _saved(row)
 
+    def naming(self, text: str) -> tuple[str, ...]:
+        """Names of looks whose documents hold a text, sorted; of wildcards none are known."""
+        with self._sessions() as session:
+            found = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
+            return tuple(sorted(session.scalars(found)))
+
     def put(self, name: str, document: str, if_match: str | None, if_none_match: str | None) -> tuple[SavedLook, bool]:
         """Save a look; whether it is new.
 

@@ -65,6 +65,12 @@ class ShareStore:
             raise NotFoundError(f"there is no shared look {identity[:40]}; ask who sent the link to share it again")
         return Share(row.id, json.loads(row.document), row.created)
 
+    def naming(self, text: str) -> tuple[str, ...]:
+        """Ids of links whose contents hold a text, sorted; of wildcards none are known."""
+        with self._sessions() as session:
+            found = select(ShareRow.id).where(ShareRow.document.contains(text, autoescape=True))
+            return tuple(sorted(session.scalars(found)))
+
     def delete(self, identity: str) -> None:
         """Make room: the link opens nothing any more. Raises NotFoundError."""
         self.get(identity)

@@ -170,6 +170,21 @@ class EnvironmentBody(Body):
     thumbnail: str
 
 
+class ImageBody(Body):
+    """An image that terms of looks may name as their `texture`, in the place of their material's own.
+
+    `size`: width and height. `warnings`: what was changed when its file was read.
+    """
+
+    id: str
+    texture: str
+    name: str
+    created: str
+    size: tuple[int, int]
+    warnings: list[str]
+    thumbnail: str
+
+
 class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 

@@ -4,16 +4,18 @@ import re
 from pathlib import Path
 
 from relume.brdf import document as terms
+from relume.brdf.channels import IMAGES
 from relume.environments import asset_store as environments
 from relume.environments import reading as environment
 from relume.eye.merged import POSITIONS_A_PIXEL
+from relume.imageio import decoding as images
+from relume.images import reading
 from relume.light import tiles
 from relume.look import document, patch
 from relume.measured import asset_store as materials
 from relume.methods import bounds
 from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
-from relume.scene.gltf import images
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
 from server.files import moments
 from server.live.rooms import door
@@ -47,6 +49,9 @@ ROWS = {
         f"{environment.OF_SCENES:,} wide"
     ),
     "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
+    "images that looks may name; each; its file": (
+        f"{IMAGES.max_entries:,}; {reading.MAX_SIDE:,} × {reading.MAX_SIDE:,}; {reading.MAX_FILE_BYTES // MILLION} MB"
+    ),
     "imported measured materials": f"{materials.STORE.max_entries}",
     "pixels of a baked view; light triangles of a bake": f"{direct.MAX_PIXELS:,}; {tiles.MAX_LIGHTS:,}",
     "points of a drawn curve": f"{terms.MAX_POINTS:,}",

@@ -38,7 +38,7 @@ def test_defaults_are_optional_in_inputs_only() -> None:
 def test_look_is_typed_whole() -> None:
     text = typescript.generate_look()
     assert "  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;" in text
-    assert '  texture: "diffuse" | "specular" | null;' in text
+    assert "  texture: string | null;" in text
     assert "  catcher?: boolean;" in text
 
 

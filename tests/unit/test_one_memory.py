@@ -152,6 +152,7 @@ BOUNDED = {
     "code_version.py",
     "environments/asset_store.py",
     "environments/built_in.py",
+    "images/shelf.py",
     "kernel_cache.py",
     "look/library/materials.py",
     "look/library/navigation.py",

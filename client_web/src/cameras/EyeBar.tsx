@@ -27,7 +27,7 @@ const CHOICES: Record<Draws, string> = { auto: "automatic", browser: "this brows
 
 /** Who draws while the eye moves. */
 function DrawnBy() {
-  const there = hasTexels.value ? "The server draws while the eye moves: it shows textures from all sides" : SENT;
+  const there = hasTexels.value ? "The server draws while the eye moves: it shows textures from all sides, or images that are projected" : SENT;
   const title = drawsHere.value ? HERE : there;
   return (
     <label class="drawn-by" title={title}>

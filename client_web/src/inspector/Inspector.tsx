@@ -2,6 +2,7 @@
 import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
 import { history } from "../edit/history";
+import { BaseImage } from "../images/BaseImage";
 import { openLibrary } from "../library/library";
 import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lights";
@@ -117,6 +118,7 @@ function MaterialInspector() {
       </header>
       <Catcher material={material} />
       <Glass material={material} />
+      {!isCaught && <BaseImage key={material} material={material} terms={terms.value} />}
       {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}

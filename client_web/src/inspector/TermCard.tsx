@@ -4,11 +4,13 @@ import { toHex } from "../color/color";
 import { CurveEditor } from "../curve/CurveEditor";
 import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
+import { isImage, withTexture } from "../images/colour";
+import { imageOf } from "../images/images";
 import { hold } from "../live/touch";
 import type { ModelBody, Rgb, Term } from "../protocol";
 import { defaultLook } from "../state/look";
 import { modelOf, models } from "../state/scene";
-import { selectedCurve, selectedTerm, selectTerm } from "../state/selection";
+import { selectedCurve, selectedTerm, selectTerm, terms } from "../state/selection";
 import { moves } from "../state/views";
 import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
@@ -69,12 +71,14 @@ interface TextureProps {
 
 /** Which image of the material multiplies the colour. */
 function Texture({ channels, value, onChange }: TextureProps) {
-  if (channels.length === 0) return null;
+  const image = isImage(value) ? value : null;
+  if (channels.length === 0 && image === null) return null;
   return (
     <label class="param texture">
       <span class="param-label">Texture</span>
-      <select value={channels.find((name) => name === value) ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
+      <select value={image ?? channels.find((name) => name === value) ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
         <option value="">None</option>
+        {image !== null && <option value={image}>{imageOf(image)?.name ?? "Image"}</option>}
         {channels.map((name) => (
           <option key={name} value={name}>
             {TEXTURES[name]}
@@ -162,7 +166,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
           <Texture
             channels={texturesOf(material)}
             value={term.texture ?? null}
-            onChange={(value) => edit("Texture", `${path}/texture`, value)}
+            onChange={(value) => edit("Texture", pointer("materials", material, "terms"), withTexture(terms.value, index, value))}
           />
           {model?.width != null && hasRoughnessMap(material) && (
             <RoughnessMap

@@ -1,4 +1,5 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
+import { isImage } from "../images/colour";
 import type { ModelBody, Term } from "../protocol";
 import { materialOf, modelOf } from "../state/scene";
 
@@ -19,7 +20,8 @@ export function hasRoughnessMap(material: string): boolean {
 /** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/mirror.py`. */
 function isMirror(term: Term): boolean {
   const { mirrors_below: below, width, curves } = modelOf(term) ?? {};
-  if (below == null || width == null || term.roughness_map === true || term.texture === "diffuse") return false;
+  if (below == null || width == null || term.roughness_map === true) return false;
+  if (term.texture === "diffuse" || isImage(term.texture)) return false;
   const facets = curves?.find(({ angle }) => angle === "theta_h");
   if (facets !== undefined && term.curves?.[facets.name] !== undefined) return false;
   return [term.params?.[width] ?? below].flat().some((value) => value < below);

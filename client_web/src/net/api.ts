@@ -8,6 +8,7 @@ import type {
   CommentRequest,
   DryRunBody,
   EnvironmentBody,
+  ImageBody,
   InOutBody,
   Keyframes,
   Look,
@@ -125,6 +126,10 @@ export const measuredThumbnail = (data: string) => {
 export const listEnvironments = () => getJson<EnvironmentBody[]>("/api/environments");
 export async function deleteEnvironment(id: string): Promise<void> {
   await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+export const listImages = () => getJson<ImageBody[]>("/api/images");
+export async function deleteImage(id: string): Promise<void> {
+  await request(`/api/images/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 /** The light that a bake's scene came with. */
 export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;

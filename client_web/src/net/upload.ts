@@ -1,6 +1,6 @@
 /** Imports: multipart uploads with progress, which fetch cannot report. */
 import type { Dropped } from "../files/dropped";
-import type { BtfWorkBody, EnvironmentBody, MeasuredBody, SceneBody } from "../protocol";
+import type { BtfWorkBody, EnvironmentBody, ImageBody, MeasuredBody, SceneBody } from "../protocol";
 import { ApiError } from "./api";
 
 export interface Upload {
@@ -55,6 +55,13 @@ export function uploadEnvironment(file: File, progress: (fraction: number) => vo
   const form = new FormData();
   form.append("environment", file);
   return post("/api/environments", form, progress) as Promise<EnvironmentBody>;
+}
+
+/** An image that terms of looks may name; it is called as its file is. */
+export function uploadImage(file: File, progress: (fraction: number) => void): Promise<ImageBody> {
+  const form = new FormData();
+  form.append("image", file);
+  return post("/api/images", form, progress) as Promise<ImageBody>;
 }
 
 /** A MERL file; what it is called in the library is its file's name. */

@@ -51,7 +51,7 @@ export function environmentOf(files: readonly File[]): File | null {
 export async function take(files: readonly File[]): Promise<void> {
   const file = environmentOf(files);
   if (file === null) {
-    showError(`${files.map((each) => each.name).join(", ")}: give an environment as .hdr or .exr.`);
+    showError(`${files.map((each) => each.name).join(", ")}: give an environment as .hdr or .exr, or an image as .png, .jpg or .webp.`);
     return;
   }
   if (importing.value !== null) {

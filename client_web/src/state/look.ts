@@ -1,6 +1,7 @@
 /** The look as the user wants it, and the scene's own. */
 import { computed, signal } from "@preact/signals";
 import type { Look, Term } from "../protocol";
+import { materialOf } from "./scene";
 
 export const look = signal<Look | null>(null);
 /** The scene's own look, for resets. */
@@ -12,5 +13,10 @@ export const toneMap = computed(() => look.value?.display.tone_map ?? "agx");
 export const bakedLight = computed(() => (look.value?.environment.map ?? null) === null);
 /** A term whose every texel looks different from every side: this browser draws the mean of them. */
 export const isTexels = (term: Term): boolean => term.model === "measured_btf";
-/** Whether any material has such a term. */
-export const hasTexels = computed(() => Object.values(look.value?.materials ?? {}).some(({ terms }) => terms.some(isTexels)));
+/** Whether a material shows an image that is projected, for it has no places in textures: this browser knows no others. */
+const showsProjected = (name: string, terms: readonly Term[]) =>
+  materialOf(name)?.is_projected === true && terms.some(({ texture }) => texture?.startsWith("image:") === true);
+/** Whether any material shows either. */
+export const hasTexels = computed(() =>
+  Object.entries(look.value?.materials ?? {}).some(([name, { terms }]) => terms.some(isTexels) || showsProjected(name, terms)),
+);

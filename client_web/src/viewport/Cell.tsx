@@ -5,6 +5,7 @@ import { approached, panned, turned } from "../cameras/orbit";
 import { nearer, step, TURN } from "../cameras/useHand";
 import { pinAt } from "../comments/comments";
 import { Pins } from "../comments/Pins";
+import { acceptImages } from "../images/drop";
 import { acceptMaterials } from "../library/drop";
 import { LightHandles } from "../lights/LightHandles";
 import { placeAt, placing } from "../lights/placing";
@@ -56,7 +57,7 @@ function connect(screen: Screen): () => void {
   };
   const observer = new ResizeObserver(fit);
   const wheel = (event: WheelEvent) => onWheel(screen, event);
-  const refuse = acceptMaterials(screen);
+  const refusals = [acceptMaterials(screen), acceptImages(screen)];
   fit();
   observer.observe(canvas);
   // Preact's own wheel listeners are passive, and the page must not scroll
@@ -64,7 +65,7 @@ function connect(screen: Screen): () => void {
   return () => {
     observer.disconnect();
     canvas.removeEventListener("wheel", wheel);
-    refuse();
+    for (const refuse of refusals) refuse();
     screen.close();
   };
 }

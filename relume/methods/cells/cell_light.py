@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import SENT_DEGREE, ladder
-from relume.brdf.albedo import Reflectances
+from relume.brdf.albedo import Reflectances, images_in
+from relume.images.shelf import texture_of
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.methods.cells.bounces import irradiance
@@ -20,7 +21,10 @@ from relume.project.light_vectors import light_vectors, ray_vectors
 from relume.project.receivers import GatherRays
 from relume.project.sent import NUM_SENT, Sent
 from relume.project.squares import Squares, coming_squares, leaving_squares
+from relume.scene.coding import mean_of
+from relume.scene.model import Texture
 from relume.trace.surface import any_tangent
+from relume.trace.texture import MipMap
 from relume.trace.visibility import visible_of
 
 F32 = NDArray[np.float32]
@@ -38,7 +42,9 @@ class CellLight:
         visible: lights that those points see. (C, points a cell, bytes) uint8
         links: of their gather rays. (C, rays) uint16. pattern: the directions of a point's.
         material: index into the scene's materials. (C,) uint16
-        textures: multipliers of each of `relume.brdf.albedo.TEXTURES`. (2, C, 3) float32
+        textures: multipliers of each of `relume.brdf.channels.TEXTURES`. (2, C, 3) float32
+        uv: where points lie in textures, and the side of what is read about them, for images that looks name; None in
+            stores that do not say so. (C, points a cell, 3) float32
     """
 
     points: Points
@@ -47,6 +53,7 @@ class CellLight:
     pattern: Pattern
     material: NDArray[np.uint16]
     textures: F32
+    uv: F32 | None = None
 
     @cached_property
     def few_links(self) -> NDArray[np.uint16]:
@@ -76,7 +83,28 @@ class CellLight:
 
     def reflecting(self, reflectances: Reflectances) -> Reflecting:
         """What the cells make of light in a look."""
-        return Reflecting.of(reflectances, self.material, self.textures)
+        return Reflecting.of(reflectances, self.material, self._textures_in(reflectances))
+
+    def _textures_in(self, reflectances: Reflectances) -> F32:
+        """Multipliers of cells, those of images that a look names in their place. (2, C, 3) float32"""
+        named = [images_in(of_material) for of_material in reflectances]
+        if not any(map(any, named)):
+            return self.textures
+        found = self.textures.copy()
+        for material, images in enumerate(named):
+            rows = np.flatnonzero(self.material == material)
+            for channel, name in enumerate(images):
+                if name is not None:
+                    found[channel, rows] = self._mean_of(texture_of(name), rows)
+        return found
+
+    def _mean_of(self, texture: Texture, rows: NDArray[np.intp]) -> F32:
+        """What some cells show of a texture: its own mean where nobody knows where they lie in it. (rows or 1, 3)"""
+        if self.uv is None:
+            return mean_of(texture)[None].astype(np.float32)
+        u, v, side = self.uv[rows].reshape(-1, 3).T
+        of_points = MipMap.of(texture).sample(np.stack([u, v], axis=1), side)
+        return np.asarray(of_points.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
     def irradiance(self, lights: TriangleLights, among: NDArray[np.intp] | None = None) -> F32:
         """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32

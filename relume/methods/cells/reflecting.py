@@ -48,7 +48,7 @@ class Reflecting:
 
         Args:
             reflectances: of all materials. material: of each cell. (C,) uint16
-            textures: multipliers of each of `relume.brdf.albedo.TEXTURES`. (2, C, 3) float32
+            textures: multipliers of each of `relume.brdf.channels.TEXTURES`. (2, C, 3) float32
         """
         known = np.stack([shares_in(of_material) for of_material in reflectances])
         plain = np.concatenate([np.ones_like(textures[:1]), textures])

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import TEXTURES
+from relume.brdf.channels import TEXTURES, group_of
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_mirrored
@@ -127,7 +127,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         for term in seen:
             found = _lobe_of(json.dumps({**term, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
-            by_group[:, 0 if term.get("texture") is None else 1 + TEXTURES.index(term["texture"])] += sent
+            by_group[:, group_of(term)] += sent
             about += sent.mean(axis=1, keepdims=True) * found[:, 3:]
         total = by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(by_group)

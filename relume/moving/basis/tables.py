@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import DEGREES, NUM_FUNCTIONS, ladder
-from relume.brdf.albedo import TEXTURES
+from relume.brdf.channels import group_of
 from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_narrow
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors
 
@@ -30,7 +30,7 @@ class Tables(NamedTuple):
         uneven: of the others summed. (tables, `NUM_ROWS`, `NUM_COLUMNS`, 3, K) float32
         of: table of each material and group in both, −1 for none: of terms without a highlight; of what those with one
             send of the sky, where the in-basis tells it; of what these send of other light. Groups are terms without a
-            texture, and those that each of `TEXTURES` multiplies. (materials, groups, 6) int32
+            texture, and those that each of `relume.brdf.channels.TEXTURES` multiplies. (materials, groups, 6) int32
     """
 
     even: F32
@@ -59,11 +59,11 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     of = np.full((len(materials), NUM_GROUPS, 6), -1, np.int32)
     for index, terms in enumerate(materials):
         lobes = are_lobes(terms)
-        for group, texture in enumerate((None, *TEXTURES)):
+        for group in range(NUM_GROUPS):
             shared = [
                 (out_factors(term).table, is_lobe, is_narrow(term))
                 for term, is_lobe in zip(terms, lobes, strict=True)
-                if term.get("texture") == texture
+                if group_of(term) == group
             ]
             plain = [table for table, is_lobe, _ in shared if not is_lobe]
             told = [table for table, is_lobe, narrow in shared if is_lobe and not narrow]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.brdf.albedo import TEXTURES
+from relume.brdf.channels import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import Pattern, make_pattern
 from relume.moving.points.lattice import Lattice, num_nodes
@@ -124,6 +124,7 @@ class Surface:
         tangents: along u, of the same, with the sign of the bitangent; empty where no material has a normal map.
             (num_vertices, 4) float32
         faces: the triangles. (num_faces, 3) uint32. face_material: of each. (num_faces,) int32
+        uv_faces: the triangles' corners among `uvs`. (num_faces, 3) uint32
         face_normal: where the corners are counter-clockwise, unit. (num_faces, 3) float32
         uv_scale: side in textures of a square metre of each. (num_faces,) float32
     """
@@ -139,6 +140,7 @@ class Surface:
     face_normal: F32
     uv_scale: F32
     textures: Textures
+    uv_faces: NDArray[np.uint32]
 
 
 def read_surface_points(store: StoreReader, start: int = 0, stop: int | None = None) -> Points:
@@ -165,13 +167,15 @@ def read_surface(store: StoreReader) -> Surface:
     """
     lattice = Lattice(*(store.read(f"lattice/{name}") for name in Lattice._fields))
     vertices = Vertices(*(store.read(f"vertices/{name}") for name in Vertices._fields))
+    of_faces = _read_faces(store)
     surface = Surface(
         lattice,
         vertices,
         read_surface_points(store),
         store.read("points/material"),
-        *_read_faces(store),
+        *of_faces,
         _read_textures(store),
+        of_faces[2],
     )
     has_maps = bool((surface.textures.of_material[:, NORMAL_MAP] >= 0).any())
     if has_maps and len(surface.tangents) != len(surface.uvs):
@@ -213,19 +217,30 @@ def _read_textures(store: StoreReader) -> Textures:
         raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error
     if of_material.size and not -1 <= of_material.min() <= of_material.max() < len(wraps):
         raise ChunkDamagedError("textures", "a material has a texture that the store has not")
-    texels, levels, first, end = [], [], [0], 0
-    for k in range(len(wraps)):
-        pixels = store.read(f"textures/{k}").astype(np.float32)
-        pyramid = MipMap(Texture(pixels))
-        for level in map(pyramid.level, range(len(pyramid.levels))):
+    textures = (Texture(store.read(f"textures/{k}").astype(np.float32)) for k in range(len(wraps)))
+    return Textures(*stacked(textures), wraps, of_material)
+
+
+class Stacked(NamedTuple):
+    """Levels of textures one after another, as in `Textures`."""
+
+    texels: F32
+    levels: NDArray[np.int64]
+    first: NDArray[np.int64]
+
+
+def stacked(textures: Iterable[Texture], most_side: int = MAX_TEXTURE_SIDE) -> Stacked:
+    """Stack textures with their halvings.
+
+    Args:
+        textures: in their order. most_side: texels; levels that are wider or higher are left out.
+    """
+    texels, levels, first, end = [np.empty((0, 3), np.float32)], [], [0], 0
+    for texture in textures:
+        pyramid = MipMap.of(texture)
+        for level in map(pyramid.level, range(_number_of_level(pyramid, most_side), len(pyramid.levels))):
             levels.append((end, *level.shape[:2]))
             texels.append(level.reshape(-1, 3))
             end += len(texels[-1])
         first.append(len(levels))
-    return Textures(
-        np.concatenate(texels) if texels else np.empty((0, 3), np.float32),
-        np.array(levels, np.int64).reshape(-1, 3),
-        np.array(first, np.int64),
-        wraps,
-        of_material,
-    )
+    return Stacked(np.concatenate(texels), np.array(levels, np.int64).reshape(-1, 3), np.array(first, np.int64))

@@ -128,6 +128,16 @@ def _of_textures(surface: Surface, textures: Textures) -> dict[str, Callable[[],
     }
 
 
+def textures_with(baked: Surface, surface: Surface) -> dict[str, Texels]:
+    """Find what takes the place of a bake's arrays of textures where a look names images: textures keep their numbers.
+
+    Args:
+        baked: what is seen. surface: it with the images.
+    """
+    found = _of_textures(surface, surface.textures)
+    return {name: make() for name, make in found.items() if name != "uvs" or not len(baked.textures.wraps)}
+
+
 def _corner_frames(surface: Surface) -> Texels:
     out = np.zeros((len(surface.uvs), 2, 4), np.float32)
     out[:, 0, :2] = surface.uvs

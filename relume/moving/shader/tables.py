@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import DEGREE, DEGREES, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
-from relume.brdf.albedo import TEXTURES
+from relume.brdf.channels import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.frame import Materials, Wanted
 from relume.moving.highlights.lobe_lights import LobeLights, widths_of
 from relume.moving.points.surface import EMISSION, NORMAL_MAP
-from relume.moving.shader.geometry import first_points
+from relume.moving.shader.geometry import first_points, textures_with
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import emission_of
@@ -70,6 +70,9 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
             (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, wanted)
         ),
     }
+    if any(map(any, wanted.materials.images)):
+        surface = transfer.surface_with(wanted.materials.images)
+        parts["images"] = Part(wanted.materials.images, lambda: textures_with(transfer.surface, surface))
     needs = needed_functions(wanted.materials, transfer.surface.textures.of_material[:, NORMAL_MAP] >= 0)
     of_all, first = (wanted.arriving.total, wanted.arriving.others), first_points(transfer)
     for name, vectors, needed in zip(("vectors", "others"), of_all, needs, strict=True):
@@ -155,7 +158,7 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
     each group both tables of the sky in its highlights, and both of other light. −1 for none.
     (materials · (2 groups + 2), 4) int32"""
     tables, lobes, sends = materials.tables, materials.lobes, materials.sends
-    of_material = transfer.surface.textures.of_material
+    of_material = transfer.surface_with(materials.images).textures.of_material
     out = np.full((len(sends), 2 * NUM_GROUPS + 2, 4), -1, np.int32)
     out[:, :NUM_GROUPS, :2], out[:, NUM_GROUPS + 2 :] = tables.of[..., :2], tables.of[..., 2:]
     out[:, :NUM_GROUPS, 2] = sends

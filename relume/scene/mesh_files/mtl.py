@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
 from relume.errors import SceneError
+from relume.imageio.decoding import U8, Decoder
 from relume.remarks import Remark, simplified, wrong
 from relume.scene.companions import Companions
-from relume.scene.gltf.images import U8, Decoder
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import NOISE
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms

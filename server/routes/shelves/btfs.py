@@ -7,7 +7,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.btf.shelf import STORE, BtfRecord, get_record, records
 from server.files.png import A_DAY, PngResponse
-from server.routes.materials import terms_of, thumbnail_of
+from server.routes.shelves.materials import terms_of, thumbnail_of
 from server.services import Shared
 from server.wire.bodies import BtfBody, moment
 from server.wire.body import Id

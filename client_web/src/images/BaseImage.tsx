@@ -1,0 +1,62 @@
+/** The image in the place of a material's base colour: choose one, send one, take it off. */
+import { useEffect, useRef } from "preact/hooks";
+import type { Term } from "../protocol";
+import { IconButton } from "../ui/Button";
+import { baseTexture, isImage } from "./colour";
+import { imageOf, images, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
+
+const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
+
+export function BaseImage({ material, terms }: { material: string; terms: readonly Term[] }) {
+  const file = useRef<HTMLInputElement>(null);
+  useEffect(() => void loadImages(), []);
+  const texture = baseTexture(terms);
+  const shown = isImage(texture) ? texture : null;
+  const image = shown === null ? undefined : imageOf(shown);
+  return (
+    <section class="base-image" aria-label="Image">
+      <div class="base-image-row">
+        {image !== undefined && <img src={image.thumbnail} alt="" width={24} height={24} />}
+        <select
+          aria-label="Image of the base colour"
+          title="An image in the place of the base colour. An image file can be dropped on the object, too."
+          value={shown ?? ""}
+          onChange={(event) => {
+            const chosen = imageOf(event.currentTarget.value);
+            if (chosen === undefined) takeOff(material);
+            else putImage(material, chosen);
+          }}
+        >
+          <option value="">{shown === null && texture !== null ? "The scene’s own image" : "No image"}</option>
+          {shown !== null && image === undefined && <option value={shown}>An image that is not here</option>}
+          {images.value.map((each) => (
+            <option key={each.id} value={each.texture}>
+              {each.name}
+            </option>
+          ))}
+        </select>
+        <button type="button" disabled={sending.value !== null} onClick={() => file.current?.click()}>
+          Image…
+        </button>
+        {image !== undefined && (
+          <IconButton icon="trash" label={`Delete the image ${image.name}`} onClick={() => offerToDelete(material, image)} />
+        )}
+      </div>
+      <input
+        ref={file}
+        type="file"
+        hidden
+        accept={TYPES}
+        aria-label="File of an image"
+        onChange={(event) => {
+          const chosen = event.currentTarget.files?.[0];
+          event.currentTarget.value = "";
+          if (chosen !== undefined) void sendOnto(material, chosen);
+        }}
+      />
+      <p class="aside" role="status">
+        {sending.value}
+      </p>
+    </section>
+  );
+}

@@ -1,0 +1,89 @@
+/** Images that were sent: the list, sending one, and putting one onto a material. */
+import { signal } from "@preact/signals";
+import { pointer } from "../document/pointer";
+import { edit } from "../edit/edit";
+import { history } from "../edit/history";
+import { deleteImage, listImages } from "../net/api";
+import { uploadImage } from "../net/upload";
+import type { ImageBody } from "../protocol";
+import { defaultLook, look } from "../state/look";
+import { select, selectedMaterial } from "../state/selection";
+import { attempt, note } from "../ui/toasts";
+import { withBaseImage, withoutBaseImage } from "./colour";
+
+export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
+export const images = signal<readonly ImageBody[]>([]);
+/** What is on its way, in words. */
+export const sending = signal<string | null>(null);
+/** The material that files were let go over, until they are taken. */
+let target: Promise<string | null> | null = null;
+
+export const imageOf = (texture: string): ImageBody | undefined => images.value.find((image) => image.texture === texture);
+export const isImageFile = (file: File): boolean => IMAGE_TYPES.includes(file.type);
+
+export async function loadImages(): Promise<void> {
+  await attempt(async () => {
+    images.value = await listImages();
+  });
+}
+
+/** Files were let go over a material, which is known now or soon. */
+export function letGoOver(material: Promise<string | null>): void {
+  target = material;
+}
+
+function replaceTerms(label: string, material: string, make: typeof withoutBaseImage): void {
+  const terms = look.value?.materials[material]?.terms;
+  if (terms === undefined) return;
+  history.seal();
+  edit(label, pointer("materials", material, "terms"), make(terms, defaultLook.value?.materials[material]?.terms ?? []));
+}
+
+/** Show an image as the base colour of a material. */
+export function putImage(material: string, { texture, name }: ImageBody): void {
+  replaceTerms(`Image · ${name}`, material, (terms) => withBaseImage(terms, texture));
+  select(material);
+}
+
+/** The material shows its own colours again. */
+export function takeOff(material: string): void {
+  replaceTerms("Image off", material, withoutBaseImage);
+}
+
+/** Send an image, and show it as the base colour of a material. */
+export async function sendOnto(material: string, file: File): Promise<void> {
+  if (sending.value !== null) return note("One image is on its way already; give the next one when it is there.");
+  const tell = (share: number) =>
+    (sending.value = share < 1 ? `Sending ${file.name}, ${Math.round(100 * share)} %` : `Reading ${file.name}…`);
+  tell(0);
+  const image = await attempt(() => uploadImage(file, tell));
+  sending.value = null;
+  if (image === undefined) return;
+  await loadImages();
+  putImage(material, image);
+  for (const warning of image.warnings) note(warning);
+}
+
+/** Take images that were dropped on the page: by what they were let go over, else by what is selected. */
+export async function takeImages(files: readonly File[]): Promise<void> {
+  const over = target;
+  target = null;
+  const material = (await attempt(async () => over)) ?? selectedMaterial.value;
+  const file = files.find(isImageFile);
+  if (file === undefined) return;
+  if (material === null) return note("Drop the image on an object, or choose a material first; it takes what comes next.");
+  await sendOnto(material, file);
+}
+
+/** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */
+export function offerToDelete(material: string, { id, name }: ImageBody): void {
+  note(`Delete the image “${name}”? It can be sent again.`, {
+    label: "Delete",
+    run: () =>
+      void attempt(async () => {
+        takeOff(material);
+        await deleteImage(id);
+        await loadImages();
+      }),
+  });
+}

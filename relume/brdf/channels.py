@@ -1,0 +1,77 @@
+"""What multiplies a term's colour: an image of its material by channel, or one that its look names in that place.
+
+Terms of one channel share what multiplies them: finished pictures are summed by channel before textures are looked up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeGuard, cast
+
+from relume.asset_store import AssetStore
+from relume.brdf.registry import TERMS
+from relume.checks import Pointer, fail
+from relume.errors import SceneError
+
+TEXTURES = ("diffuse", "specular")
+
+Images = tuple[str | None, str | None]
+"""What a look names in the place of each of a material's `TEXTURES`; None where it names nothing."""
+
+IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_000)
+"""Where such images are kept, by `relume.images.shelf`."""
+
+
+def is_image(texture: str | None) -> TypeGuard[str]:
+    """Whether a term's `texture` names an image rather than a channel."""
+    return texture is not None and texture.startswith(IMAGES.prefix)
+
+
+def channel_of(document: Mapping[str, Any]) -> str | None:
+    """The channel of a term's texture: that which it names, or that which its model takes where it names an image.
+
+    Args:
+        document: a term, with its `model` and `texture`.
+    """
+    texture = document.get("texture")
+    return TERMS[document["model"]].texture if is_image(texture) else texture
+
+
+def group_of(document: Mapping[str, Any]) -> int:
+    """Number of the sum that a term is part of: 0 without a texture, 1 + place in `TEXTURES` with one. document: it"""
+    channel = channel_of(document)
+    return 0 if channel is None else 1 + TEXTURES.index(channel)
+
+
+def images_of(documents: Sequence[Mapping[str, Any]]) -> Images:
+    """What the terms of a material name in the place of each of `TEXTURES`. documents: its terms"""
+    found: dict[int, str] = {group_of(one): one["texture"] for one in documents if is_image(one.get("texture"))}
+    return found.get(1), found.get(2)
+
+
+def check_texture(pointer: Pointer, texture: Any) -> str | None:
+    """A term's `texture`. Raises ParameterError unless it is a channel, an image that is here, or nothing.
+
+    Args:
+        pointer: where it stands in its look. texture: what stands there.
+    """
+    if texture is None or texture in TEXTURES or (isinstance(texture, str) and IMAGES.is_known(texture)):
+        return cast(str | None, texture)
+    channels = " or ".join(map(repr, TEXTURES))
+    raise fail(pointer, texture, f"null, {channels}, or an image that was sent to /api/images and is here")
+
+
+def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
+    """Raises ParameterError where terms of one channel are multiplied by different textures.
+
+    Args:
+        pointer: where the list stands in its look. documents: complete terms of one material.
+    """
+    textures: dict[int, str | None] = {}
+    for k, document in enumerate(documents):
+        texture = document["texture"]
+        first = textures.setdefault(group_of(document), texture)
+        if texture != first:
+            channel = channel_of(document)
+            allowed = f"{first!r}, as the other {channel} terms of this material have; change them together"
+            raise fail((*pointer, k, "texture"), texture, allowed)

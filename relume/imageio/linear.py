@@ -1,0 +1,115 @@
+"""Reads pixels of .hdr and .exr files, which may be hostile, in linear Rec. 709."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio  # noqa: N813  (the name its own documentation gives it)
+from numpy.typing import NDArray
+
+from relume.errors import SceneError
+from relume.imageio.primaries import convert, to_rec_709
+
+F32 = NDArray[np.float32]
+
+MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near it
+FREE_BYTES = 64 << 20  # may be claimed by any file, however small
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+CheckSize = Callable[[int, int], None]
+
+
+def check_claim(claimed_bytes: int, data: bytes, what: str) -> None:
+    """Hold what a header claims to what the file could unpack to: a few bytes may claim gigabytes.
+
+    claimed_bytes: of pixels. data: of the file. what: it is, in messages. Raises SceneError.
+    """
+    if claimed_bytes > max(FREE_BYTES, MAX_EXPANSION * len(data)):
+        raise SceneError(
+            f"{what} claims {claimed_bytes / 1e6:,.0f} MB of pixels and holds {len(data) / 1e6:,.1f} MB; "
+            "it is truncated or damaged, export it again"
+        )
+
+
+def _check_tiles(spec: oiio.ImageSpec, data: bytes, what: str) -> None:
+    """Hold tiles to what can be in the file: each has 8 bytes in its table, and the decoder holds a whole one."""
+    if spec.tile_width == 0:
+        return
+    num_tiles = -(-spec.width // spec.tile_width) * -(-spec.height // spec.tile_height)
+    if 8 * num_tiles > len(data):
+        raise SceneError(f"{what} has more tiles than data; it is damaged, export it again")
+    check_claim(spec.tile_width * spec.tile_height * spec.nchannels * 4, data, what)
+
+
+def read_pixels(data: bytes, suffix: str, what: str, check_size: CheckSize) -> F32:
+    """Let OpenImageIO decode from a private temporary file, header first, pixels only when the size is allowed.
+
+    Args:
+        data: of the file. suffix: that its first bytes tell. what: it is, in messages.
+        check_size: raises SceneError where width and height are not taken.
+    Returns:
+        The first R, G and B, or one channel for all. (height, width, 3) float32
+    Raises:
+        SceneError: damaged, too large, or of no plain image.
+    """
+    handle, path = tempfile.mkstemp(suffix=suffix)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        image = oiio.ImageInput.open(path)
+        if image is None:
+            _forget_error(oiio.geterror)
+            raise SceneError(f"{what} is damaged or not what its first bytes say; export it again")
+        try:
+            return _read_open_image(image, data, what, check_size)
+        except UnicodeDecodeError:  # names in the header that are no text
+            raise SceneError(f"{what} is damaged; export it again") from None
+        finally:
+            image.close()
+    finally:
+        Path(path).unlink()
+
+
+def _read_open_image(image: oiio.ImageInput, data: bytes, what: str, check_size: CheckSize) -> F32:
+    spec = image.spec()
+    check_size(spec.width, spec.height)
+    if spec.depth != 1 or spec.deep or not 1 <= spec.nchannels <= 16:
+        raise SceneError(f"{what} is deep or has {spec.nchannels} channels; save it as plain RGB")
+    matrix = _primaries_of(spec, what)
+    names = [channel.rpartition(".")[2].upper() for channel in spec.channelnames]
+    order = [names.index(c) for c in "RGB"] if {"R", "G", "B"} <= set(names) else [0, 0, 0]
+    first, last = min(order), max(order)
+    if last - first > 3 and spec.width * spec.height > 1 << 24:
+        raise SceneError(f"{what} has channels between its RGB; save it as plain RGB")
+    _check_tiles(spec, data, what)
+    check_claim(spec.width * spec.height * (last + 1 - first) * 4, data, what)
+    pixels = image.read_image(0, 0, first, last + 1, oiio.FLOAT)
+    if pixels is None:
+        _forget_error(image.geterror)
+        raise SceneError(f"{what} ends early or is damaged; export it again")
+    found = np.asarray(pixels, np.float32)
+    found = found if order == [first, first + 1, first + 2] else found[..., [channel - first for channel in order]]
+    if matrix is not None and last > first:  # grey has no primaries
+        convert(found, matrix)
+    return found
+
+
+def _primaries_of(spec: oiio.ImageSpec, what: str) -> NDArray[np.float64] | None:
+    """What converts the file's colours to ours; None where they are."""
+    told = spec.getattribute("chromaticities")
+    if told is None:
+        return None
+    try:
+        return to_rec_709(told)
+    except (TypeError, ValueError) as problem:
+        raise SceneError(f"{what} has odd primaries ({problem}); export it as linear Rec. 709") from None
+
+
+def _forget_error(take_error: Callable[[], str]) -> None:
+    """Take the message that OpenImageIO keeps until it is asked for; it may quote bytes that are no text."""
+    with suppress(UnicodeDecodeError):
+        take_error()

@@ -1,0 +1,34 @@
+"""What textures of places on surfaces show: the scene's own images, and those that a look names in their place."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.channels import TEXTURES, images_of
+from relume.images.shelf import texture_of
+from relume.look import Look
+from relume.scene.model import Scene
+from relume.trace.surface import Surface
+from relume.trace.texture import sample_image
+
+F32 = NDArray[np.float32]
+
+
+def textures_of(scene: Scene, look: Look, surface: Surface, material: NDArray[np.integer]) -> dict[str, F32]:
+    """What multiplies terms by their channel, at places on surfaces.
+
+    Args:
+        scene: whose materials they are. look: that is shown. surface: the places.
+        material: index of each into the scene's materials; others are left as they are. (n,)
+    Returns:
+        (n, 3) float32 each
+    """
+    found = {"diffuse": surface.diffuse, "specular": surface.specular}
+    for index, own in enumerate(scene.materials):
+        for channel, name in zip(TEXTURES, images_of(look.materials[own.name].terms), strict=True):
+            if name is not None:
+                rows = np.flatnonzero(material == index)
+                found[channel] = found[channel].copy()
+                found[channel][rows] = sample_image(texture_of(name), surface.uv[rows])
+    return found

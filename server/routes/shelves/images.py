@@ -1,0 +1,98 @@
+"""/api/images: send, list, show and delete images that looks may name in place of a material's own."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi.concurrency import run_in_threadpool
+
+from relume.asset_store import check_name
+from relume.brdf.channels import IMAGES
+from relume.folders import folder_bytes
+from relume.images.shelf import ImageRecord, get_record, records, thumbnail_path
+from server.access.roles import Who
+from server.errors import InUseError
+from server.files.importing import UPLOAD_PREFIX, ImportRequest
+from server.files.png import FOREVER, PngResponse
+from server.files.uploads import keep_upload, plain_stem, upload_bytes
+from server.services import Services, Shared
+from server.wire.bodies import ImageBody, moment
+from server.wire.body import Id
+from worker.paths import images_path
+
+router = APIRouter(prefix="/api/images", tags=["images"])
+ImageFile = Annotated[UploadFile, File(description="an image: .png, .jpg, .webp or .exr")]
+ImageName = Annotated[str, Form(max_length=200)]
+_MOST_NAMED = 3  # of what uses an image, in a message
+
+
+@router.post("", status_code=201)
+async def send_image(
+    image: ImageFile, services: Shared, caller: Who, response: Response, name: ImageName = ""
+) -> ImageBody:
+    """Keep an image, read in a process of its own; the body says how terms of looks name it."""
+    quotas = services.access.quotas
+    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(image))
+    async with services.import_slots:
+        identity = await run_in_threadpool(_import, image, name, services)
+    num_bytes = await run_in_threadpool(folder_bytes, images_path(services.settings.data) / identity)
+    await run_in_threadpool(quotas.own, caller.name, "image", identity, num_bytes)
+    response.headers["Location"] = f"/api/images/{identity}"
+    return await run_in_threadpool(get_image, identity, services)
+
+
+def _import(image: UploadFile, name: str, services: Services) -> str:
+    settings = services.settings
+    name = check_name(name or plain_stem(image.filename) or "Image")
+    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
+        return services.importers.run(
+            ImportRequest.of(settings, "image", keep_upload(image, Path(folder) / "image"), name)
+        )
+
+
+@router.get("")
+def list_images(services: Shared) -> list[ImageBody]:
+    """All of them, newest first."""
+    return [_body(record) for record in records(images_path(services.settings.data))]
+
+
+@router.get("/{image}")
+def get_image(image: Id, services: Shared) -> ImageBody:
+    """One image."""
+    return _body(get_record(images_path(services.settings.data), image))
+
+
+@router.get("/{image}/thumbnail.png", response_class=PngResponse)
+def get_image_thumbnail(image: Id, services: Shared) -> PngResponse:
+    """A small picture of it, 96 × 96."""
+    return PngResponse(thumbnail_path(images_path(services.settings.data), image).read_bytes(), headers=FOREVER)
+
+
+@router.delete("/{image}", status_code=204)
+def delete_image(image: Id, services: Shared) -> Response:
+    """Delete an image that no saved look and no link names."""
+    record = get_record(images_path(services.settings.data), image)
+    looks = [f"look {name!r}" for name in services.looks.naming(f'"{record.texture}"')]
+    users = looks + [f"link {identity}" for identity in services.shares.naming(f'"{record.texture}"')]
+    if users:
+        more = f" and {len(users) - _MOST_NAMED} more" if len(users) > _MOST_NAMED else ""
+        shown = ", ".join(users[:_MOST_NAMED])
+        raise InUseError(f"image {record.name!r} is shown by {shown}{more}; change or delete these first")
+    IMAGES.remove(images_path(services.settings.data), image)
+    services.access.quotas.disown("image", image)
+    return Response(status_code=204)
+
+
+def _body(record: ImageRecord) -> ImageBody:
+    return ImageBody(
+        id=record.id,
+        texture=record.texture,
+        name=record.name,
+        created=moment(record.created),
+        size=record.size,
+        warnings=list(record.warnings),
+        thumbnail=f"/api/images/{record.id}/thumbnail.png",
+    )

@@ -1,0 +1,54 @@
+"""An image on a material in a browser: by a button, by a drop on the object; taken off, and undone."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+
+import pytest
+from editor_page import Editor
+from PIL import Image
+from playwright.sync_api import expect
+
+
+@pytest.fixture(scope="module")
+def stripes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("image") / "stripes.png"
+    image = Image.new("RGB", (64, 64), (230, 60, 20))
+    image.paste((20, 60, 230), (0, 0, 32, 64))
+    image.save(path)
+    return path
+
+
+def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: Path) -> None:
+    page = editor.page
+    chosen = page.get_by_label("Image of the base colour")
+    editor.choose("Floor", 0)
+    page.get_by_label("File of an image").set_input_files(stripes)
+    expect(chosen.locator("option:checked")).to_have_text("stripes")
+    editor.wait_until_exact()
+    chosen.select_option("")  # by keys alone: a list and a button
+    expect(chosen.locator("option:checked")).to_have_text("The scene’s own image")
+    page.get_by_role("button", name="Undo", exact=True).click()
+    expect(chosen.locator("option:checked")).to_have_text("stripes")
+    page.get_by_role("button", name="Undo", exact=True).click()
+    box = editor.canvas.bounding_box()
+    assert box is not None
+    place = {"clientX": box["x"] + 0.5 * box["width"], "clientY": box["y"] + 0.5 * box["height"]}
+    page.mouse.move(place["clientX"], place["clientY"])
+    material = page.locator(".picture-bar .material").inner_text()
+    told = base64.b64encode(stripes.read_bytes()).decode()
+    carried = page.evaluate_handle(
+        """told => {
+          const held = new DataTransfer();
+          const bytes = Uint8Array.from(atob(told), (c) => c.charCodeAt(0));
+          held.items.add(new File([bytes], "dropped.png", { type: "image/png" }));
+          return held;
+        }""",
+        told,
+    )
+    editor.canvas.dispatch_event("dragover", {"dataTransfer": carried, **place})
+    editor.canvas.dispatch_event("drop", {"dataTransfer": carried, **place})
+    expect(page.locator(".inspector h2")).to_have_text(material)
+    expect(chosen.locator("option:checked")).to_have_text("dropped")
+    editor.wait_until_exact()

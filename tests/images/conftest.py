@@ -1,0 +1,31 @@
+"""Fixtures: a file of an image, and the shelf that it is on."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from relume.brdf.channels import IMAGES
+from relume.images.shelf import keep
+
+SIDE = 32
+
+
+def stripes(side=SIDE):
+    """Colours that differ everywhere. (side, side, 3) uint8"""
+    ramp = np.linspace(20, 250, side).astype(np.uint8)
+    rows, columns = np.meshgrid(ramp, ramp, indexing="ij")
+    return np.stack([rows, columns, 255 - rows // 2], axis=-1)
+
+
+@pytest.fixture(scope="session")
+def image_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("image") / "stripes.png"
+    Image.fromarray(stripes()).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def named(image_file, tmp_path_factory):
+    """The name by which looks mean the image."""
+    with IMAGES.at(tmp_path_factory.mktemp("shelf") / "images") as shelf:
+        yield keep(shelf, image_file, "Stripes").texture

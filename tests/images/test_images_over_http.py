@@ -1,0 +1,137 @@
+"""Images over HTTP: sent, listed, shown by a session and its undo, refused, and deleted when nobody needs them."""
+
+import io
+import time
+
+import numpy as np
+import OpenImageIO
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from session_client import open_session
+from tiny_scenes import still_life
+
+from relume.bake import Recipe
+from relume.brdf.channels import IMAGES
+from relume.errors import SceneError
+from relume.images.reading import MAX_SIDE
+from relume.images.shelf import keep, records, texture_of
+from server.app import create_app
+from server.settings import Settings
+from worker.scenes import register_scene
+
+URL = "/api/images"
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory):
+    data = tmp_path_factory.mktemp("data")
+    with TestClient(create_app(Settings(data=data, allowed_hosts=["testserver"]))) as opened:
+        yield opened
+
+
+def send(client, content, name="stripes.png"):
+    return client.post(URL, files={"image": (name, content)})
+
+
+@pytest.fixture(scope="module")
+def sent(client, image_file):
+    response = send(client, image_file.read_bytes())
+    assert response.status_code == 201, response.text
+    assert response.headers["Location"] == f"{URL}/{response.json()['id']}"
+    return response.json()
+
+
+def test_it_is_listed_and_shown(client, sent):
+    assert (sent["name"], sent["size"], sent["warnings"]) == ("stripes", [32, 32], [])
+    assert client.get(URL).json() == [sent] == [client.get(f"{URL}/{sent['id']}").json()]
+    with Image.open(io.BytesIO(client.get(sent["thumbnail"]).content)) as picture:
+        assert picture.size == (96, 96)
+
+
+def png(width, height):
+    kept = io.BytesIO()
+    Image.new("RGB", (width, height)).save(kept, "PNG")
+    return kept.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "damaged or neither"),
+        (b"\x89PNG\r\n\x1a\n" + 40 * b"x", "damaged or neither"),
+        (b"\x76\x2f\x31\x01" + 40 * b"x", "damaged"),
+        (b"GIF89a" + 40 * b"\0", "damaged or neither"),
+        (png(MAX_SIDE + 1, 1), f"at most {MAX_SIDE}×{MAX_SIDE}"),
+    ],
+)
+def test_what_is_no_image_or_too_large_leaves_nothing(content, says, tmp_path):
+    (tmp_path / "x.png").write_bytes(content)
+    with pytest.raises(SceneError, match=says):
+        keep(tmp_path / "shelf", tmp_path / "x.png", "x")
+    assert not (tmp_path / "shelf").exists()
+
+
+def test_the_same_file_again_takes_the_new_name(image_file, tmp_path):
+    first, again = (keep(tmp_path / "shelf", image_file, name) for name in ("One", "Two"))
+    assert (again.id, again.name, len(records(tmp_path / "shelf"))) == (first.id, "Two", 1)
+
+
+def test_an_exr_keeps_its_reflectances_and_says_what_was_held(tmp_path):
+    pixels = np.array([[[0.001, 0.5, 2.0], [0.25, -1.0, np.nan]]], np.float32)
+    path = str(tmp_path / "map.exr")
+    out = OpenImageIO.ImageOutput.create(path)
+    assert out.open(path, OpenImageIO.ImageSpec(2, 1, 3, OpenImageIO.FLOAT))
+    assert out.write_image(pixels)
+    assert out.close()
+    with IMAGES.at(tmp_path / "shelf") as shelf:
+        record = keep(shelf, tmp_path / "map.exr", "map")
+        found = texture_of(record.texture).pixels.astype(np.float32)
+        IMAGES.remove(shelf, record.id)
+        assert not IMAGES.is_known(record.texture)
+    assert len(record.warnings) == 2
+    np.testing.assert_allclose(found, [[[0.001, 0.5, 1.0], [0, 0, 0]]], rtol=1e-3)
+
+
+def test_one_that_a_saved_look_or_a_link_shows_stays(client, sent):
+    look = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+    assert client.put("/api/looks/painted", json=look).status_code == 201
+    response = client.delete(f"{URL}/{sent['id']}")
+    assert response.status_code == 409
+    assert "look 'painted'" in response.json()["detail"]
+    assert client.delete("/api/looks/painted", headers={"If-Match": "*"}).status_code == 204
+    assert client.get(f"{URL}/{sent['id']}").status_code == 200
+
+
+def wait(is_done):
+    for _ in range(600):
+        if is_done():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it takes too long")
+
+
+@pytest.mark.slow
+def test_a_session_shows_what_a_batch_renders_and_goes_back(client, sent):
+    services = client.app.state.services
+    scene = register_scene(services.bakes.data_dir, services.bakes.ledger, still_life())
+    bake = services.bakes.submit(scene, Recipe("direct", ("front",), (64, 48), 60))
+    wait(lambda: client.get(f"/api/bakes/{bake}").json()["state"] == "ready")
+    with open_session(client, bake) as session:
+        path = "/materials/Floor/terms/0/texture"
+        pictures = [session.exact(0)]
+        for revision, texture in enumerate((sent["texture"], "image:0000000000000000", "diffuse"), 1):
+            session.edit(revision, path, texture)
+            if revision == 2:
+                assert "image that was sent" in session.text("problem")["problem"]["detail"]
+            else:
+                pictures.append(session.exact(revision))
+    before, painted, after = (picture.payload for picture in pictures)
+    assert before != painted
+    assert len(after) == len(painted)
+    look = {"materials": {"Floor": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+    request = {"bake": bake, "view": "front", "looks": [look, {}], "format": "png"}
+    url = client.post("/api/renders", json=request).headers["location"]
+    wait(lambda: client.get(url).json()["state"] == "ready")
+    frames = [client.get(f"{url}/frames/{k}").content for k in range(2)]
+    assert frames[0] != frames[1]
