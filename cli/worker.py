@@ -29,9 +29,11 @@ def worker(
 
         return join(scheduler, processes)
     from cli.data_folder import open_settings
+    from server.logs.setting_up import set_up
     from worker.service import BakeService
 
     settings, asked = open_settings(data), threading.Event()
+    set_up(settings.log_format, settings.log_level)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: asked.set())
     with BakeService(settings.data, settings.database_url, num_workers=processes, shares=settings.turns):

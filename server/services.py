@@ -41,6 +41,7 @@ from server.records.looks import LookStore
 from server.records.shares import ShareStore
 from server.running.leave import Leave
 from server.settings import Settings
+from server.traces import Traces, open_traces
 from worker.executor import num_cores
 from worker.scenes import get_scene
 from worker.service import BakeService
@@ -125,6 +126,7 @@ async def open_services(
     for queue in queues:
         queue.start()
     rounds = asyncio.create_task(caretaker.run())
+    traces = open_traces() if settings.traces else None
     rooms = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds)
     try:
         yield Services(
@@ -141,7 +143,7 @@ async def open_services(
             transfers=transfers,
             caretaker=caretaker,
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
-            live=_live(settings, metrics, library, threads, service, access, leave, rooms),
+            live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms),
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
@@ -149,7 +151,7 @@ async def open_services(
         rounds.cancel()
         rooms.close()
         ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
-        for end in ends:
+        for end in (*ends, *([] if traces is None else [traces.close])):
             await asyncio.to_thread(end)
 
 
@@ -175,14 +177,15 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Ac
 
 
 def _live(
-    settings: Settings, metrics: Metrics, library: Library, threads: Threads, service: BakeService, access: Access,
-    leave: Leave, rooms: Rooms,
+    settings: Settings, metrics: Metrics, traces: Traces | None, library: Library, threads: Threads,
+    service: BakeService, access: Access, leave: Leave, rooms: Rooms,
 ) -> SessionServices:  # fmt: skip
     """What live sessions need of all this."""
     return SessionServices(
         library=library,
         threads=threads,
         metrics=metrics,
+        traces=traces,
         resumes=ResumeStore(settings.resume_seconds),
         rooms=rooms,
         bake_news=BakeNews(service.bakes),

@@ -95,6 +95,7 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="warning", description="least level that is logged; info has a line for each request"
     )
+    traces: bool = Field(default=False, description="whether spans of edits go to a collector, as OTEL_… variables say")
     drain_seconds: float = Field(default=10.0, ge=0, description="how long sessions may take to leave after SIGTERM")
     stop_seconds: float = Field(default=30.0, gt=0, description="how long all else may take to stop after that")
     allowed_origins: list[str] = Field(default=[], description="origins besides the server's own, as JSON list")

@@ -85,7 +85,7 @@ class BakeRunner:
         except Exception as error:  # whatever a method raises must not end the service
             self._land()
             if not isinstance(error, RelumeError | OSError):
-                log.exception("bake %s failed", identity)
+                log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
             self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
         else:
             self._ask(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
@@ -121,7 +121,7 @@ class BakeRunner:
         is_of_others = bool(self._ask(self.ledger.finished_tasks, identity)) and not is_here
         why = TAKEN_OVER if is_of_others else UPGRADED if has_begun else None
         if why is not None:
-            log.warning("bake %s: %s", identity, why)
+            log.warning("bake %s: %s", identity, why, extra={"fields": {"bake": identity}})
         shutil.rmtree(staging, ignore_errors=True)
         self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, begin_run(staging), why)
 
@@ -175,7 +175,8 @@ class BakeRunner:
                     f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
                     "or take fewer lights or a smaller size, then bake again; finished parts are kept"
                 ) from error
-            log.warning("a worker process died; task %s is given to another", task)
+            about = {"fields": {"bake": self.job.bake_id}}
+            log.warning("a worker process died; task %s is given to another", task, extra=about)
             waiting.append((task, attempt + 1))
             return
         self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)

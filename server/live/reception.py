@@ -31,7 +31,8 @@ class Reception:
     def __init__(self, websocket: WebSocket, state: SessionState) -> None:
         self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
         self._window, self._look, self._transfer = state.window, state.look, state.transfer
-        self._metrics, self._caller, self._guest = state.metrics, state.caller, state.guest
+        self._metrics, self._traces = state.metrics, state.traces
+        self._caller, self._guest = state.caller, state.guest
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -113,8 +114,10 @@ class Reception:
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
             target = self._look.apply(message, received_s)
-        except RelumeError:
+        except RelumeError as error:
             self._metrics.edits.labels("refused").inc()
+            if self._traces is not None:
+                self._traces.refused(received_s, str(error), {"revision": message.revision})
             raise
         self._pending.target = target if self._guest is None else self._guest.edited(target)
         self._metrics.edits.labels("applied").inc()

@@ -37,6 +37,7 @@ from server.live.visit import Visit
 from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
 from server.running.leave import Leave
+from server.traces import Traces
 from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, ViewInfo
 from worker.database.faults import AWAY, told
 
@@ -53,6 +54,7 @@ class SessionServices:
     library: Library
     threads: Threads
     metrics: Metrics
+    traces: Traces | None
     resumes: ResumeStore
     rooms: Rooms
     bake_news: BakeNews
@@ -116,7 +118,8 @@ def _state(
     pending = PendingRequests(look.target(0 if place is None else place.room.num_changes))
     guest = None if place is None else Guest(place, look, pending, may_edit=visit.caller.may_edit)
     socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
-    return SessionState(socket, pending, shown, window, look, transfer, services.metrics, visit.caller, guest)
+    of_all = services.metrics, services.traces
+    return SessionState(socket, pending, shown, window, look, transfer, *of_all, visit.caller, guest)
 
 
 async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -> None:

@@ -13,6 +13,7 @@ from server.live.state.look_state import LookState
 from server.live.state.pending_requests import PendingRequests
 from server.live.state.shown_views import ShownViews
 from server.metrics import Metrics
+from server.traces import Traces
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class SessionState:
     """The receiving half fills them, the sending half follows; all on the event loop.
 
     Attributes:
-        caller: who is at the other end. guest: the session in its room; None where nobody shares it.
+        traces: None where nobody wants any. caller: who is at the other end. guest: the session in its room; None where
+            nobody shares it.
     """
 
     socket: ClientSocket
@@ -30,5 +32,6 @@ class SessionState:
     look: LookState
     transfer: Opened
     metrics: Metrics
+    traces: Traces | None
     caller: Caller
     guest: Guest | None

@@ -278,7 +278,7 @@ class WorkQueue(ABC, Generic[Request]):
             raise
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
-                log.exception("%s %s failed", self.noun, work.id)
+                log.exception("%s %s failed", self.noun, work.id, extra={"fields": {self.noun.lower(): work.id}})
             self._update(work.id, _ACTIVE, state="failed", problem=problem_of(error).detail)
         if not self._is_there(work.id):
             shutil.rmtree(folder, ignore_errors=True)

@@ -49,7 +49,7 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context["message"]))
         threads, news = Threads(), asyncio.Event()
         try:
-            await scenario(Freezer(told, threads, Metrics(), news), Control(), news)  # type: ignore[arg-type]
+            await scenario(Freezer(told, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
         finally:
             threads.close()
         gc.collect()

@@ -19,6 +19,7 @@ from server.live.sending import painter
 from server.live.sending.answers import Answers
 from server.live.sending.freezing import Freezer
 from server.live.sending.painter import FrameRequest, Painted
+from server.live.sending.tracing import told_of
 from server.live.sending.viewport import Viewport
 from server.live.session_state import SessionState
 from server.live.state.target import Target
@@ -36,10 +37,15 @@ class FrameLoop:
 
     def __init__(self, state: SessionState, library: Library, threads: Threads) -> None:
         self._socket, self._pending, self._shown, self._window = state.socket, state.pending, state.shown, state.window
-        self._look, self._transfer, self._metrics = state.look, state.transfer, state.metrics
+        self._look, self._transfer, self._metrics, self._traces = (
+            state.look,
+            state.transfer,
+            state.metrics,
+            state.traces,
+        )
         self._guest, self._may_edit = state.guest, state.caller.may_edit
         self._library, self._work = library, OneAtATime(threads)
-        self._freezer = Freezer(state.socket, threads, state.metrics, state.pending.news)
+        self._freezer = Freezer(state.socket, threads, state.metrics, state.traces, state.pending.news)
         self._answers = Answers(state.socket, self._work)
         self._accepted: Target | None = None
         self._viewports: dict[str, Viewport] = {}
@@ -242,6 +248,7 @@ class FrameLoop:
         await self._answers.send_curve(target)
 
     async def _deliver(self, viewport: Viewport, request: FrameRequest, painted: Painted, message: bytes) -> None:
+        sending_s = time.perf_counter()
         await self._send_frame(viewport, message, "picture", request.form)
         now_s = time.perf_counter()
         viewport.sent(now_s)
@@ -249,6 +256,9 @@ class FrameLoop:
         self._metrics.encode.observe(painted.encode_ms / 1e3)
         if request.received_s is not None:
             self._metrics.edit_to_socket.observe(now_s - request.received_s)
+            if self._traces is not None:
+                name, times, about = told_of(request, painted, len(message), sending_s, now_s)
+                self._traces.frame(name, times, about)
 
     async def _send_frame(self, viewport: Viewport, frame: bytes, kind: str, form: str) -> None:
         self._window.sent(viewport.name, len(frame), time.perf_counter())

@@ -13,6 +13,7 @@ from server.library.threads import Threads
 from server.live.sending.viewport import Viewport
 from server.live.state.client_socket import ClientSocket
 from server.metrics import Metrics
+from server.traces import Traces
 from server.wire.protocol import StatusMessage
 
 if TYPE_CHECKING:
@@ -35,8 +36,10 @@ class _Running:
 class Freezer:
     """Starts a job, says how far it is, and hands out what it made; `news` is set when there is something to take."""
 
-    def __init__(self, socket: ClientSocket, threads: Threads, metrics: Metrics, news: asyncio.Event) -> None:
-        self._socket, self._threads, self._metrics, self._news = socket, threads, metrics, news
+    def __init__(
+        self, socket: ClientSocket, threads: Threads, metrics: Metrics, traces: Traces | None, news: asyncio.Event
+    ) -> None:
+        self._socket, self._threads, self._metrics, self._traces, self._news = socket, threads, metrics, traces, news
         self._running: _Running | None = None
         self._cancel = threading.Event()
 
@@ -80,6 +83,9 @@ class Freezer:
             raise error
         if running.job.state != "following":
             self._metrics.freeze.observe(time.perf_counter() - running.start_s)
+        if self._traces is not None:
+            about = {"view": running.viewport.name, "what": running.job.what, "state": running.job.state}
+            self._traces.frozen(running.start_s, about)
         return running.viewport, running.job, running.future.result()
 
     async def say_ready(self, viewport: Viewport, job: Job) -> None:

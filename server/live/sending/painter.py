@@ -72,6 +72,7 @@ class Painted:
         job: what must be made before the picture can go on to where it should, or None.
         advance: what the step changed, and what the picture shows since.
         message: the packed frame, or None where none is to be sent.
+        started_s: when the thread began, seconds of `time.perf_counter`.
         known: keys of the parts that the client's shader has when it has got the message.
     """
 
@@ -79,6 +80,7 @@ class Painted:
     advance: Advance
     message: bytes | None
     update_ms: float
+    started_s: float
     encode_ms: float = 0.0
     known: Mapping[str, Hashable] | None = None
 
@@ -122,12 +124,12 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     has_news = bool(advance.tiles) or request.is_due
     is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not request.only_exact)
     if not is_sent:
-        return Painted(job, advance, None, update_ms)
+        return Painted(job, advance, None, update_ms, start_s)
     tiles, payload, alpha = _payload(picture, request, advance.tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
     of_picture = {"tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None}
     header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_picture)
-    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, encode_ms)
+    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, start_s, encode_ms)
 
 
 def _waited_ms(request: FrameRequest, start_s: float) -> float:
@@ -164,7 +166,7 @@ def _tables(
     update_ms = (updated_s - start_s) * 1e3
     lacking = [part for name, part in parts.items() if known.get(name, _NOTHING) != part.key]
     if not lacking and request.received_s is None:
-        return Painted(job, advance, None, update_ms, known=known)
+        return Painted(job, advance, None, update_ms, start_s, known=known)
     arrays = {name: array for part in lacking for name, array in part.make().items()}
     infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]
     tables = TablesInfo(**numbers._asdict(), arrays=infos)
@@ -173,7 +175,7 @@ def _tables(
     of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables}
     header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_tables)
     now_known = {**known, **{name: part.key for name, part in parts.items()}}
-    return Painted(job, advance, pack(header, payload), update_ms, encode_ms, now_known)
+    return Painted(job, advance, pack(header, payload), update_ms, start_s, encode_ms, now_known)
 
 
 def _payload(

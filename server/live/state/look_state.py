@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from relume import look as looks
@@ -47,12 +48,14 @@ class LookState:
         self.num_edits += 1
         if message.says_solo:
             self.solo = None if message.solo is None else frozenset(message.solo)
-        return Target(look, document, message.revision, received_s, message.hand, self.solo)
+        taken_s = time.perf_counter()
+        return Target(look, document, message.revision, received_s, message.hand, self.solo, taken_s=taken_s)
 
     def follow(self, document: dict[str, Any], of: Target) -> Target:
         """Show a document that somebody else's edit led to, as they see it; the revision stays."""
         self.document = document
-        return Target(self._read(document), document, self.revision, of.received_s, of.hand, self.solo, of.shared)
+        look = self._read(document)
+        return Target(look, document, self.revision, of.received_s, of.hand, self.solo, of.shared, of.taken_s)
 
     def revert(self, shown: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""

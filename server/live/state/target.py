@@ -15,7 +15,7 @@ class Target:
 
     Attributes:
         look: validated. document: the same as JSON.
-        received_s: when the edit came in; None for a look that no edit asked for.
+        received_s: when the edit came in; None for a look that no edit asked for. taken_s: when it had been applied.
         hand: pointer to what the hand was on that made it, where the client said so.
         solo: names of sources of light that alone are shown; None: all.
         shared: how often a room's look had changed by then; 0 where nobody shares it.
@@ -28,6 +28,7 @@ class Target:
     hand: str | None = None
     solo: frozenset[str] | None = None
     shared: int = 0
+    taken_s: float = 0.0
 
 
 @dataclass(frozen=True)
