@@ -1,4 +1,5 @@
-"""Who runs a bake. Several services may share one ledger; a lease keeps each bake with one of them.
+"""Who runs a bake, or a step of another work. Several services may share one ledger; a lease keeps each with one
+of them.
 
 An owner is named host/process/nonce/number. Its lease ends when it stops renewing it, and at once when it ran on this
 host and its process is gone, so that a restart after a crash does not wait.
@@ -53,13 +54,14 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
 
 
 class LeaseKeeper:
-    """Calls `renew` for the lease of a bake while it runs, also through long steps such as the check before publishing.
+    """Calls `renew` for the lease of a bake or another work while it runs, also through long steps such as the check
+    before publishing.
 
-    The bake and its owner are those that the ledger knows.
+    The work and its owner are those that the ledger knows.
     """
 
-    def __init__(self, renew: Callable[[str, str], None], bake_id: str, owner: str) -> None:
-        self._renew, self._bake_id, self._owner = renew, bake_id, owner
+    def __init__(self, renew: Callable[[str, str], None], work_id: str, owner: str) -> None:
+        self._renew, self._work_id, self._owner = renew, work_id, owner
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._run, name="relume-lease", daemon=True)
 
@@ -72,10 +74,10 @@ class LeaseKeeper:
         self._thread.join()
 
     def _run(self) -> None:
-        complaint = Complaint(log, f"the lease of bake {self._bake_id} cannot be renewed")
+        complaint = Complaint(log, f"the lease of {self._work_id} cannot be renewed")
         while not self._done.wait(HEARTBEAT_S):
             try:
-                self._renew(self._bake_id, self._owner)
+                self._renew(self._work_id, self._owner)
                 complaint.well()
             except AWAY as error:  # a database that is away for some seconds costs no lease
                 complaint.meet(error)

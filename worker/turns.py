@@ -46,9 +46,3 @@ class Turns:
     def take(self, client: str) -> None:
         """A client of those that were ordered has a turn."""
         self._times[client] += 1.0 / self._shares.get(client, 1.0)
-
-    def next(self, waiting: Sequence[Waiting]) -> Waiting:
-        """Whose turn it is now, among at least one; it has had it then."""
-        chosen = self.order(waiting)[0]
-        self.take(chosen.client)
-        return chosen

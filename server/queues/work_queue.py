@@ -1,6 +1,7 @@
 """The one queue of long work: rows of a table, and one thread that has them done step by step, in fair turns.
 
-A row is queued, running, ready, failed or stopped. What a killed server left running is gone on with at the next
+A row is queued, running, ready, failed or stopped. Several servers may share the rows and the folder of their files:
+who does a step holds the row's lease meanwhile. What a killed server left is gone on with by another, or at the next
 start; the work itself must keep on disk what it has done.
 
 Libraries for this (Celery, Dramatiq, RQ, Huey) run functions in processes of their own behind a broker. Here the row is
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from pydantic import BaseModel
-from sqlalchemy import CursorResult, select, update
+from sqlalchemy import CursorResult, or_, select, update
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
@@ -32,13 +33,16 @@ from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
 from server.errors import BusyError, problem_of
 from server.records.tables import WorkRow
+from worker.database.clock import epoch_s
 from worker.database.faults import Complaint
+from worker.lease import LeaseKeeper, is_alive, new_owner
 from worker.turns import Turns, Waiting
 
 log = logging.getLogger(__name__)
 _LOOK_AGAIN_S = 2.0
 _ASK_AGAIN_S = 0.1
 _ACTIVE = ("queued", "running")
+_STATES = (*_ACTIVE, "ready", "failed", "stopped")
 
 Request = TypeVar("Request", bound=BaseModel)
 
@@ -95,6 +99,7 @@ class WorkQueue(ABC, Generic[Request]):
             run: does a step, apart from this process. quota: how much may wait.
         """
         self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
+        self._owner = new_owner()
         self._turns, self._timers = Turns(quota.shares), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._wanted: tuple[str, float] = "", 0.0
@@ -214,7 +219,7 @@ class WorkQueue(ABC, Generic[Request]):
 
     def note(self, identity: str, done: int) -> None:
         """Record progress. Raises CancelledError where the work was stopped, its row deleted, or the server closes."""
-        if not self._update(identity, _ACTIVE, state="running", done=done) or self.is_closing:
+        if not self._update_own(identity, state="running", done=done) or self.is_closing:
             raise CancelledError(f"the {self.noun} was stopped")
 
     @property
@@ -234,9 +239,14 @@ class WorkQueue(ABC, Generic[Request]):
         self._wanted = identity if is_wanted else "", time.monotonic() + _ASK_AGAIN_S
         return is_wanted
 
-    def _update(self, identity: str, states: Sequence[str], **values: Any) -> bool:
+    def _update_own(self, identity: str, **values: Any) -> bool:
+        """Change a row that is under way, and whose lease is here. False where it is not any more."""
+        return self._update(identity, _ACTIVE, self.row.owner == self._owner, **values)
+
+    def _update(self, identity: str, states: Sequence[str], *conditions: Any, **values: Any) -> bool:
         row = self.row
-        statement = update(row).where(row.id == identity, row.state.in_(states)).values(**values)
+        statement = update(row).where(row.id == identity, row.state.in_(states), *conditions).values(**values)
+        statement = statement.execution_options(synchronize_session=False)
         with self._sessions.begin() as session:
             return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
 
@@ -255,23 +265,34 @@ class WorkQueue(ABC, Generic[Request]):
             self._wake.clear()
 
     def _next(self) -> str | None:
+        """Take the lease of the row whose turn it is, of those that nobody works on; None where there is none."""
         row = self.row
-        query = select(row.id, row.client, row.is_first, row.created).where(row.state.in_(_ACTIVE))
+        query = select(row, epoch_s()).where(row.state.in_(_ACTIVE))
         with self._sessions() as session:
-            found = session.execute(query).all()
+            found = [one for one, now in session.execute(query) if not self._is_others(one, now)]
+        owners = {one.id: one.owner for one in found}
         waiting = [Waiting(one.id, one.client or "", bool(one.is_first), one.created) for one in found]
         self._timers = {one.id: self._timers[one.id] for one in waiting if one.id in self._timers}
-        return self._turns.next(waiting).id if waiting else None
+        for work in self._turns.order(waiting):
+            unchanged = or_(row.owner.is_(None), row.owner == owners[work.id])
+            if self._update(work.id, _ACTIVE, unchanged, owner=self._owner, heartbeat=epoch_s()):
+                self._turns.take(work.client)
+                return work.id
+        return None
+
+    def _keep(self, identity: str, owner: str) -> None:
+        self._update(identity, _STATES, self.row.owner == owner, heartbeat=epoch_s())
 
     def _do(self, work: Work[Request]) -> None:
         """A step of one row; every failure ends in it as a sentence."""
-        folder = self.folder / work.id
+        folder, row = self.folder / work.id, self.row
         timer = self._timers.setdefault(work.id, StepTimer(self.step_s(work.request)))
         timer.begin()
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            done = self.step(work, timer)
-            self._update(work.id, _ACTIVE, done=done, **({"state": "ready"} if done >= work.total else {}))
+            with LeaseKeeper(self._keep, work.id, self._owner):
+                done = self.step(work, timer)
+            self._update_own(work.id, done=done, **({"state": "ready"} if done >= work.total else {}))
         except CancelledError:  # closing, stopped, or deleted
             pass
         except OperationalError:  # the database is away: the step is done again, and finds what is on the disk
@@ -279,10 +300,15 @@ class WorkQueue(ABC, Generic[Request]):
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self.noun, work.id, extra={"fields": {self.noun.lower(): work.id}})
-            self._update(work.id, _ACTIVE, state="failed", problem=problem_of(error).detail)
+            self._update_own(work.id, state="failed", problem=problem_of(error).detail)
+        finally:
+            self._update(work.id, _STATES, row.owner == self._owner, owner=None)
         if not self._is_there(work.id):
             shutil.rmtree(folder, ignore_errors=True)
 
     def _is_there(self, identity: str) -> bool:
         with self._sessions() as session:
             return session.get(self.row, identity) is not None
+
+    def _is_others(self, row: WorkRow, now: float) -> bool:
+        return row.owner not in (None, self._owner) and is_alive(str(row.owner), row.heartbeat or 0.0, now)

@@ -33,7 +33,8 @@ class ShareRow(Base):
 class WorkRow(Base):
     """A long work of the server, see `server.queues.work_queue`. `request` is the body as JSON.
 
-    `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither.
+    `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither. Whoever
+    does a step of it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock).
     """
 
     __abstract__ = True
@@ -46,6 +47,8 @@ class WorkRow(Base):
     created: Mapped[float]
     client: Mapped[str | None]
     is_first: Mapped[bool | None]
+    owner: Mapped[str | None] = mapped_column(default=None)
+    heartbeat: Mapped[float | None] = mapped_column(default=None)
 
 
 class RenderRow(WorkRow):

@@ -1,13 +1,15 @@
 """Processes that do steps: killed, stopped, exchanged; and whose turn it is."""
 
+import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import select, update
 
 from relume.errors import CancelledError, RelumeError
 from relume.resident import resident_bytes
@@ -144,22 +146,28 @@ def wait_for(is_reached: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
+def following(turns: Turns, waiting: Sequence[Waiting]) -> Waiting:
+    chosen = turns.order(waiting)[0]
+    turns.take(chosen.client)
+    return chosen
+
+
 def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:
     turns = Turns({})
     waiting = [Waiting("a1", "ann", False, 1.0), Waiting("a2", "ann", False, 2.0), Waiting("b1", "bob", False, 3.0)]
-    assert [turns.next(waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
+    assert [following(turns, waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
     waiting.append(Waiting("a3", "ann", True, 4.0))
-    assert [turns.next(waiting).id for _ in range(2)] == ["a3", "a3"]
+    assert [following(turns, waiting).id for _ in range(2)] == ["a3", "a3"]
     del waiting[0], waiting[-1]
     waiting.append(Waiting("c1", "cem", False, 5.0))
-    assert [turns.next(waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
+    assert [following(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
 
 
 def test_shares_say_how_many_turns_somebody_has() -> None:
     turns = Turns({"ann": 3.0})
     waiting = [Waiting("b", "bob", False, 1.0), Waiting("a", "ann", False, 2.0)]
-    assert "".join(turns.next(waiting).id for _ in range(12)).count("a") == 9
-    assert turns.next([Waiting("b", "bob", False, 1.0), Waiting("c", "cem", False, 0.0)]).id == "c"
+    assert "".join(following(turns, waiting).id for _ in range(12)).count("a") == 9
+    assert following(turns, [Waiting("b", "bob", False, 1.0), Waiting("c", "cem", False, 0.0)]).id == "c"
 
 
 class Counting(WorkQueue[RenderRequest]):
@@ -207,6 +215,38 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         wait_for(lambda: queue.get(last).state == "ready")
         queue.close()
     assert done == ["a", "b", "a", "b", "A", "A"]
+
+
+def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Path) -> None:
+    done: list[str] = []
+    at_work: set[str] = set()
+
+    def run(step: Step, tell: object, is_wanted: Callable[[], bool]) -> Mapping[str, Any]:
+        assert step.kind not in at_work, "two do the same"
+        at_work.add(step.kind)
+        time.sleep(0.01)
+        at_work.remove(step.kind)
+        done.append(step.kind)
+        return {}
+
+    with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as ledger:
+        queues = [Counting(ledger.sessions, tmp_path / "renders", run, Quota(9, 9)) for _ in range(2)]
+        asked = {"bake": "0" * 16, "view": "front", "format": "png"}
+        works = {
+            name: queues[0].submit(RenderRequest.model_validate({**asked, "looks": [{}] * 4, "name": name}))
+            for name in "abc"
+        }
+        gone = f"{socket.gethostname()}/{2**22 + 1}/nobody/0"  # no process has this number
+        with ledger.sessions.begin() as session:
+            session.execute(update(RenderRow).values(owner=gone, heartbeat=time.time(), state="running"))
+        for queue in queues:
+            queue.start()
+        wait_for(lambda: all(queues[1].get(work).state == "ready" for work in works.values()))
+        for queue in queues:
+            queue.close()
+        with ledger.sessions() as session:
+            assert session.scalars(select(RenderRow.owner)).all() == [None] * 3
+    assert sorted(done) == sorted("abc" * 4)
 
 
 def test_a_process_that_ends_is_asked_no_more_though_it_is_not_gone_yet(

@@ -1,0 +1,17 @@
+"""Who does a step of a render, a comparison or a BTF: several servers may share them."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0006"
+down_revision = "0005"
+is_additive = True
+
+
+def upgrade() -> None:
+    """From the revision before."""
+    for table in ("renders", "truths", "btfs"):
+        op.add_column(table, sa.Column("owner", sa.String(), nullable=True))
+        op.add_column(table, sa.Column("heartbeat", sa.Double(), nullable=True))
