@@ -111,8 +111,19 @@ def test_the_overlay_sets_what_there_is_and_gives_time_to_stop(tmp_path: Path, m
     assert settings.drain_seconds + settings.stop_seconds < float(server["stop_grace_period"].removesuffix("s"))
 
 
-def test_files_that_the_overlay_mounts_are_there() -> None:
-    for service in compose("compose.production.yml")["services"].values():
+def test_the_overlay_of_several_servers_sets_what_there_is() -> None:
+    services = compose("compose.replicas.yml")["services"]
+    environment = services["server"]["environment"]
+    assert {name.removeprefix("RELUME_").lower() for name in environment} <= set(Settings.model_fields)
+    (network,) = compose("compose.replicas.yml")["networks"]["replicas"]["ipam"]["config"]
+    assert network["subnet"] in environment["RELUME_TRUSTED_PROXIES"]
+    assert "replicas" in services["server"]["networks"]
+    assert "replicas" in services["proxy"]["networks"]
+
+
+@pytest.mark.parametrize("name", ["compose.production.yml", "compose.replicas.yml"])
+def test_files_that_the_overlay_mounts_are_there(name: str) -> None:
+    for service in compose(name)["services"].values():
         for volume in service.get("volumes", ()):
             if volume.startswith("./"):
                 assert (ROOT / "docker" / volume.split(":")[0]).is_file(), volume

@@ -12,6 +12,8 @@ from relume.errors import ParameterError
 from server.wire.rooms import MAX_PERSON_NAME
 
 MAX_ROOM = 64
+PLACE, MIN_PLACED = 8, 24
+"""Characters of a name by which balancers choose a server, and how long a name has to be to have such."""
 _MAX_SEAT = 64
 _ROOM = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_ROOM}}}")
 
@@ -46,8 +48,13 @@ def door_of(asked: Mapping[str, str]) -> Door | None:
 
 
 def watch_of(room: str) -> str:
-    """What opens a room to watch."""
-    return hashlib.sha256(b"relume watch " + room.encode()).hexdigest()[:32]
+    """What opens a room to watch.
+
+    It begins as a long name does, so that a balancer sends both to one server; the rest of the name nobody finds, and
+    of a short one nothing is shown.
+    """
+    hashed = hashlib.sha256(b"relume watch " + room.encode()).hexdigest()
+    return (room[:PLACE] if len(room) >= MIN_PLACED else hashed[:PLACE]) + hashed[PLACE:32]
 
 
 def check_person(name: str) -> str:

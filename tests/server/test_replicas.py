@@ -1,0 +1,125 @@
+"""docker/replicas/nginx.conf, run: everybody of a room comes to one server, and so does everybody on a bake."""
+
+from __future__ import annotations
+
+import re
+import secrets
+import shutil
+import socket
+import subprocess
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from websockets.sync.client import connect
+from websockets.sync.server import ServerConnection, serve
+
+from server.live.rooms.door import MIN_PLACED, watch_of
+
+CONFIGURATION = Path(__file__).parents[2] / "docker" / "replicas" / "nginx.conf"
+NUM_SERVERS = 3
+NGINX = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
+
+
+@pytest.fixture(scope="module")
+def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """Port of nginx before servers that say which of them they are, and what they were told."""
+    if NGINX is None:
+        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
+    folder = tmp_path_factory.mktemp("nginx")
+    with ExitStack() as stack:
+        ports = [stack.enter_context(_server(number)) for number in range(NUM_SERVERS)]
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        text = CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
+        text = text.replace("listen 8420", f"listen 127.0.0.1:{port}")
+        (line,) = re.findall(r"server server:8420[^;]*;", text)
+        lines = "".join(line.replace("server:8420", f"127.0.0.1:{each}") for each in ports)
+        (folder / "nginx.conf").write_text(text.replace(line, lines))
+        command = [NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", "daemon off;"]
+        process = subprocess.Popen(command)
+        stack.callback(process.wait)
+        stack.callback(process.terminate)
+        _wait_for(port)
+        yield port
+
+
+class _server:  # noqa: N801  (a context)
+    """A stand-in for relume: answers with its number, as HTTP and as WebSocket."""
+
+    def __init__(self, number: int) -> None:
+        self._number = str(number)
+
+    def __enter__(self) -> int:
+        def answer(connection: ServerConnection, request: object) -> object:
+            headers = request.headers  # type: ignore[attr-defined]
+            if "Upgrade" in headers:
+                return None
+            told = " ".join((self._number, headers["Host"], headers["X-Request-ID"], headers["X-Forwarded-For"]))
+            return connection.respond(200, told)
+
+        self._server = serve(lambda each: each.send(self._number), "127.0.0.1", 0, process_request=answer)  # type: ignore[arg-type]
+        Thread(target=self._server.serve_forever, daemon=True).start()
+        return int(self._server.socket.getsockname()[1])
+
+    def __exit__(self, *_: object) -> None:
+        self._server.shutdown()
+
+
+def _wait_for(port: int) -> None:
+    while True:
+        try:
+            return socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        except OSError:
+            time.sleep(0.02)
+
+
+def session(port: int, bake: str, query: str) -> str:
+    with connect(f"ws://127.0.0.1:{port}/api/bakes/{bake}/session{query}", proxy=None) as opened:
+        return str(opened.recv())
+
+
+def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> None:
+    rooms = [secrets.token_hex(16) for _ in range(12)]
+    servers = {}
+    for k, room in enumerate(rooms):
+        queries = (f"?room={room}", f"?name=Ann&room={room}&seat=x", f"?watch={watch_of(room)}")
+        found = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
+        assert len(found) == 1, room
+        servers[room] = found.pop()
+    assert len(set(servers.values())) > 1
+
+
+def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
+    bakes = [f"{k:016x}" for k in range(12)]
+    found = {}
+    for bake in bakes:
+        first, again = (session(proxy, bake, query) for query in ("", "?resume=abc"))
+        told = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/surface/points")
+        assert first == again == told.split()[0]
+        found[bake] = first
+    assert len(set(found.values())) > 1
+
+
+def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -> None:
+    told = [_get(f"http://127.0.0.1:{proxy}/api/scenes").split() for _ in range(12)]
+    assert len({number for number, *_ in told}) > 1
+    assert len({request for _, _, request, _ in told}) == 12
+    assert {(host, address) for _, host, _, address in told} == {(f"127.0.0.1:{proxy}", "127.0.0.1")}
+
+
+def _get(url: str) -> str:
+    with urllib.request.urlopen(url, timeout=10) as answer:
+        return str(answer.read().decode())
+
+
+def test_what_opens_a_room_to_watch_says_its_place_and_no_more() -> None:
+    long, short = "a" * MIN_PLACED, "a" * (MIN_PLACED - 1)
+    assert watch_of(long)[:8] == long[:8]
+    assert len(watch_of(long)) == len(watch_of(short)) == 32
+    assert not watch_of(short).startswith("aa")
+    assert watch_of(long)[8:] not in watch_of(long + "a")
