@@ -1,11 +1,20 @@
-"""Maps of roughness: at how many levels of it a material is shown, and which one each of its samples has."""
+"""Maps of roughness: at how many levels of it a material is shown, and which one each of its samples has.
+
+A normal map that is seen from far makes its material rougher: the facets of what a pixel covers lean as its normals do.
+With n̄ their mean, slopes have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a lobe of facets
+whose slopes have the variance α² / 2 becomes one of α² + 2 σ² (Olano and Baker 2010). So, α = r²,
+
+    r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   over the r that the material's own terms say,
+
+which is exact while a look leaves that r as it is, and grows with it where it does not.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.coding import decode
+from relume.scene.coding import decode, rows_of
 from relume.scene.model import Material, Texture
 
 F32 = NDArray[np.float32]
@@ -16,20 +25,51 @@ MAX_LEVELS = 24
 # ratios where they are rough.
 _STEP = 0.02
 _STRAYS = 1e-3  # share of texels at each end that no level is made for
+_BLOCKS = (8, 64)  # texels across, whose normals are taken together
+_LEAST_LENGTH = 0.2  # of a mean of normals: rougher than anything is
 
 
 def levels_of(material: Material) -> tuple[float, ...]:
     """The levels of a material: roughness over what its terms say, rising. None where it has no map, or a plain one."""
-    texture = material.textures.get("roughness")
-    if texture is None:
+    texture, own = material.textures.get("roughness"), widening_base(material)
+    if texture is None and own is None:
         return ()
-    roots, count = _histogram(texture)
-    share = np.cumsum(count) / count.sum()
-    low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
+    low = high = 1.0
+    if texture is not None:
+        roots, count = _histogram(texture)
+        share = np.cumsum(count) / count.sum()
+        low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
+    if own is not None and material.normal_map is not None:
+        shortest = np.array([_shortest(material.normal_map)])
+        high = float(np.sqrt(widened(np.array([high**2], np.float32), shortest.astype(np.float32), own)[0]))
     num = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
     if num < 3:
         return ()
     return tuple(np.round(np.square(np.linspace(low, high, num)), 6).tolist())
+
+
+def widening_base(material: Material) -> float | None:
+    """The roughness r of the terms that a material's normal map widens; None where none follows a map, or there is no
+    normal map."""
+    if material.normal_map is None:
+        return None
+    followed = (term for term in material.terms if term.get("roughness_map"))
+    given = (term.get("params", {}).get("roughness") for term in followed)
+    return next((float(np.mean(value)) for value in given if value is not None), None)
+
+
+def widened(ratio: F32, length: F32, own: float) -> F32:
+    """Roughness over `own`, of what covers normals that differ.
+
+    Args:
+        ratio: of a map of roughness. (n,) length: of the mean of the normals, at most 1. (n,)
+        own: the roughness of the material's terms.
+    Returns:
+        (n,) float32
+    """
+    held = np.clip(length, _LEAST_LENGTH, 1)
+    variance = (1 - held) / held
+    return np.asarray(((own * ratio) ** 4 + 2 * variance) ** 0.25 / own, np.float32)
 
 
 def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5) -> NDArray[np.uint8]:
@@ -45,6 +85,19 @@ def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5
     roots, given = np.sqrt(ratios), np.sqrt(ratio)
     place = np.interp(given, roots, np.arange(len(roots)))
     return np.asarray(place + 1 - threshold, np.uint8)
+
+
+def _shortest(normal_map: Texture) -> float:
+    """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays."""
+    lengths = []
+    for rows in rows_of(normal_map):
+        for side in _BLOCKS:
+            height, width = (max(1, size // side) for size in rows.shape[:2])
+            cut = rows[: height * side, : width * side]
+            tall, wide = len(cut) // height, cut.shape[1] // width
+            means = cut[: height * tall, : width * wide].reshape(height, tall, width, wide, 3).mean(axis=(1, 3))
+            lengths.append(np.quantile(np.linalg.norm(means, axis=-1), _STRAYS))
+    return float(np.min(lengths))
 
 
 def _histogram(texture: Texture) -> tuple[F64, F64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.parallel import for_ranges
 from relume.points import Points
 from relume.scene.model import Material
+from relume.scene.roughness import widened, widening_base
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
 from relume.trace.texture import MipMap
@@ -140,7 +141,11 @@ def _surface_at(
                 if name in m.textures and len(rows):
                     out[rows] = MipMap.of(m.textures[name]).sample(uv[rows], footprint[rows])
             if m.normal_map is not None and len(rows):
-                mapped = MipMap.of(m.normal_map).sample(uv[rows], footprint[rows])
+                pyramid = MipMap.of(m.normal_map)
+                mapped = pyramid.sample(uv[rows], footprint[rows])
+                if (own := widening_base(m)) is not None:
+                    length = covered_length(mapped, pyramid.texels(footprint[rows]))
+                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length, own)
                 normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
     normal = _towards(normal, directions)
     tangent = _across(tangents[:, :3], normal)
@@ -227,6 +232,19 @@ def least_shares(p: F32, twice_area: F32, epsilon: float) -> F32:
     edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to each corner
     least = np.minimum(epsilon * edges, 0.1 * twice_area[:, None]) / np.maximum(twice_area, 1e-20)[:, None]
     return np.asarray(least, np.float32)
+
+
+def covered_length(mapped: F32, texels: F32) -> F32:
+    """How long the mean of the normals is that a pixel covers: one where it covers no more than a texel, for what is
+    between two is turned from one to the other, and covers nothing.
+
+    Args:
+        mapped: means of normals. (n, 3) texels: side of the pixel, in those of the map. (n,)
+    Returns:
+        (n,) float32
+    """
+    covers = np.clip(np.log2(np.maximum(texels, 1)), 0, 1)
+    return np.asarray(1 - covers * (1 - np.minimum(np.linalg.norm(mapped, axis=1), 1)), np.float32)
 
 
 def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:

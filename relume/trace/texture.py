@@ -50,6 +50,10 @@ class MipMap:
             weakref.finalize(texture, _pyramids.pop, key, None).atexit = False
         return _pyramids[key]
 
+    def texels(self, footprint: F32) -> F32:
+        """Sides of filters, in texels. footprint: in uv. (n,)"""
+        return np.asarray(footprint * max(self.levels[0].shape[:2]), np.float32)
+
     def sample(self, uv: F32, footprint: F32) -> F32:
         """Look filtered values up.
 
@@ -58,7 +62,7 @@ class MipMap:
         Returns:
             (n, channels) float32
         """
-        texels = np.maximum(footprint * max(self.levels[0].shape[:2]), 1.0)
+        texels = np.maximum(self.texels(footprint), 1.0)
         level = np.minimum(np.log2(texels), len(self.levels) - 1)
         lower = np.floor(level).astype(np.int64)
         out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)

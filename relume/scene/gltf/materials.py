@@ -83,7 +83,7 @@ class MaterialReader:
             )
         made = Material(
             name,
-            make_terms(surface, over),
+            make_terms(replace(surface, has_normal_map=normal_map is not None), over),
             surface.textures | shining,
             normal_map,
             material.doubleSided,

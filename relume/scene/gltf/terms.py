@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.mirror import SOFT
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
 from relume.scene.gltf.sheen import sheen_curve
@@ -35,6 +36,7 @@ class Surface:
         roughness: as artists know it.
         reflected: mean share that what is not metal reflects before light comes to what scatters it.
         textures: multipliers of the two terms, and of the roughness.
+        has_normal_map: which makes it rougher where it is seen from far, see `relume.scene.roughness`.
     """
 
     diffuse: F64
@@ -43,6 +45,7 @@ class Surface:
     roughness: float
     reflected: float = 0.0
     textures: dict[str, Texture] = field(default_factory=dict)
+    has_normal_map: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,8 @@ def _highlight(surface: Surface, anisotropy: float) -> dict[str, Any]:
     f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
     if anisotropy == 0:
         params = _within(TERMS["ggx"], roughness=surface.roughness, f0=f0)
-        follows = {"roughness_map": True} if "roughness" in surface.textures else {}
+        widens = surface.has_normal_map and surface.roughness >= SOFT  # mirrors are pictures, which nothing widens
+        follows = {"roughness_map": True} if "roughness" in surface.textures or widens else {}
         return {"model": "ggx", "color": color, "params": params, **follows}
     across = max(surface.roughness**2, 1e-3)
     along = across + (1 - across) * anisotropy**2

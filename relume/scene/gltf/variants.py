@@ -128,9 +128,11 @@ def _smoothed(
     own: Understood, other: Understood, term: dict[str, Any], what: str, warnings: list[Remark]
 ) -> dict[str, Any]:
     """A term that follows a map of roughness follows none where the own material has not the same."""
-    if not term.get("roughness_map") or _same_image(own, other, "roughness"):
+    mine, theirs = ("roughness" in one.material.textures for one in (own, other))
+    if not term.get("roughness_map") or _same_image(own, other, "roughness") or not (mine or theirs):
         return term
-    warnings.append(simplified(f"{what} has a roughness texture of its own; its mean stands for it"))
+    if theirs:
+        warnings.append(simplified(f"{what} has a roughness texture of its own; its mean stands for it"))
     return {name: value for name, value in term.items() if name != "roughness_map"}
 
 

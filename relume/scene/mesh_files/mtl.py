@@ -6,7 +6,7 @@ Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), a
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -106,7 +106,8 @@ class MaterialMaker:
         self._warn_of_the_rest(described, what)
         normal_map = self._image(described, "norm", f"the normal map of {what}", Coding("normal"))
         opacity = self._opacity(described, what)
-        terms = _terms(described, textures, self._roughness(described, textures, what))
+        roughness = self._roughness(described, textures, what)
+        terms = _terms(described, textures, roughness, has_normal_map=normal_map is not None)
         return Material(own_name, terms, textures, normal_map, opacity=opacity)
 
     def _roughness(self, described: Described, textures: dict[str, Texture], what: str) -> float | None:
@@ -173,14 +174,17 @@ class MaterialMaker:
             self._warnings.append(simplified(f"{keyword[:40]} of {what} is not used"))
 
 
-def _terms(described: Described, textures: dict[str, Texture], roughness: float | None) -> tuple[dict[str, Any], ...]:
+def _terms(
+    described: Described, textures: dict[str, Texture], roughness: float | None, *, has_normal_map: bool
+) -> tuple[dict[str, Any], ...]:
     numbers = described.numbers
     base = numbers.get("Kd", GREY)
     if "diffuse" in textures and not any(base):
         base = [1.0, 1.0, 1.0]  # exporters write zeros where they mean the image
     if roughness is not None or "Pm" in numbers:
         metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
-        return make_terms(_plastic(np.array(base), metallic, 0.5 if roughness is None else roughness, textures), Over())
+        surface = _plastic(np.array(base), metallic, 0.5 if roughness is None else roughness, textures)
+        return make_terms(replace(surface, has_normal_map=has_normal_map), Over())
     diffuse = {"model": "lambert", "color": base, "texture": "diffuse" if "diffuse" in textures else None}
     tint = numbers.get("Ks", [0.0, 0.0, 0.0])
     if not any(tint):
