@@ -21,6 +21,7 @@ F32 = NDArray[np.float32]
 
 _LEAST_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
 _SHARES = 4  # for each thread: a ray that sees a highlight costs five times as much as others
+_MOST_TAKEN = np.float32(0.5)  # by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
 _ALL_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
 
 
@@ -187,7 +188,8 @@ def _combine(  # type: ignore[no-untyped-def]
                 if lobe >= 0:
                     near = lobes.albedo[lobe, row, group, channel]
                     albedo = near + share * (lobes.albedo[lobe, row + 1, group, channel] - near)
-                    total += albedo * light[channel]
+                    shown = albedo * light[channel]
+                    total = max(total, -_MOST_TAKEN * shown) + shown
                 out[p, channel] += texture_value[channel] * max(total, np.float32(0))
 
 

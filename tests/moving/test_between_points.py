@@ -12,6 +12,7 @@ from relume.light.suns import without_suns
 from relume.look import complete, validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
+from relume.moving import frame as frame_module
 from relume.moving.basis import lobes as lobes_module
 from relume.moving.basis.lobes import is_narrow, lobes_of
 from relume.moving.basis.out_factors import NUM_ROWS
@@ -21,6 +22,7 @@ from relume.moving.highlights.between_points import add_sky_in_highlights
 from relume.moving.highlights.glances import glance
 from relume.moving.highlights.lobe_lights import SIDE, lists_numpy, lobe_lights, widths_of
 from relume.moving.highlights.looking import SkyLight
+from relume.moving.pixels import combine
 from relume.moving.points.lattice import pieces_of, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import sky_of, turn_of
@@ -69,6 +71,19 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
     monkeypatch.setattr(lobes_module, "_has_highlight", lambda term: False)
     assert kept < 0.08
     assert error() > 2.5 * kept
+
+
+def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_ball, monkeypatch):
+    def shown_beside(broad):
+        def changed(surface, seen, pixel_angle, sent, *others):
+            return combine(surface, seen, pixel_angle, sent._replace(broad=np.full_like(sent.broad, broad)), *others)
+
+        monkeypatch.setattr(frame_module, "combine", changed)
+        return picture_of(shiny_ball[0])[16:32, 24:40]  # the ball's middle
+
+    alone, most = shown_beside(0.0), shown_beside(-1e4)
+    assert alone.max() > 0.1
+    np.testing.assert_allclose(most, alone / 2, rtol=1e-5, atol=1e-7)
 
 
 LAMPS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0, 2.0, 1e-3]], np.float32)

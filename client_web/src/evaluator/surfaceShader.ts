@@ -137,7 +137,7 @@ function group(number: number, sent: string, { lobes, textures }: Shows, rows: n
     ivec4 of = texelFetch(uMaterials, at(material + ${number}), 0);
     if (of.z > 0) {
       vec3 total = ratio * ${sent};
-      ${lobes ? `total += light * ${albedo};` : ""}
+      ${lobes ? `vec3 shown = light * ${albedo};\n      total = max(total, -0.5 * shown) + shown;` : ""}
       ${textures ? "if (of.w >= 0) total *= textureAt(of.w, place, footprint);" : ""}
       color += max(total, 0.0);
     }
