@@ -222,10 +222,10 @@ def _found(rows_of: Callable[[], F32], size: tuple[int, int], chosen: _Chosen, v
         np.rint(eigen * (LARGEST / most)[:, :, None]),
         (most * reach / (LARGEST * most_steps)).astype(np.float32),
     )
-    by_light = (len(mean), -1, 3)
+    by_light = (rows.shape[1] // 3, 3)
     part = _Part(
-        of.astype(np.uint8), weight.astype(np.int8), mean.reshape(by_light),
-        eigen.astype(np.int8).reshape(*step.shape, -1, 3), step, span.centre.reshape(-1, 3),
+        of.astype(np.uint8), weight.astype(np.int8), mean.reshape(-1, *by_light),
+        eigen.astype(np.int8).reshape(*step.shape, *by_light), step, span.centre.reshape(by_light),
         np.array(span.energy), np.zeros(0),
     )  # fmt: skip
     return part._replace(missed=_missed(rows, part))._asdict()
@@ -243,7 +243,7 @@ def _missed(rows: F32, part: _Part) -> F64:
     """Squares that what is kept misses of the finest texels, by how many components are used. (C + 1,)"""
     num = part.step.shape[1]
     left, of = np.zeros(num + 1), part.cluster[: len(rows)]
-    tables = (part.eigen * part.step[:, :, None, None]).astype(np.float32).reshape(*part.step.shape, -1)
+    tables = (part.eigen * part.step[:, :, None, None]).astype(np.float32).reshape(*part.step.shape, rows.shape[1])
     for k in np.unique(of):
         mine = np.flatnonzero(of == k)
         away = rows[mine] - part.mean[k].astype(np.float32).ravel()

@@ -9,9 +9,11 @@ from pathlib import Path
 from relume.btf.begun import Begun
 from relume.btf.compress import compress
 from relume.btf.container import FIRST_BYTE
+from relume.btf.eigen import EigenBtf
 from relume.btf.factored import FactoredBtf
 from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.zips import ZippedBtf
+from relume.errors import MaterialError
 
 
 def import_btf(
@@ -36,7 +38,15 @@ def import_btf(
     images = _images(file)
     making = making or folder / "making" / STORE.identity_of(file)
     begun = Begun(making, {"bound": bound})
-    record = keep(folder, file, name, None, lambda: compress(images, bound, progress, cancelled, begun))
+
+    def make() -> EigenBtf:
+        try:
+            return compress(images, bound, progress, cancelled, begun)
+        except MaterialError:  # the file's own fault: nothing could go on from here
+            shutil.rmtree(making, ignore_errors=True)
+            raise
+
+    record = keep(folder, file, name, None, make)
     shutil.rmtree(making, ignore_errors=True)
     return record
 

@@ -28,6 +28,11 @@ _SUFFIXES = (".jpg", ".jpeg", ".png")
 _MOST_ENTRIES = MOST_DIRECTIONS**2 + 1000
 _MOST_IMAGE_BYTES = 16 << 20
 _FORMATS = ("JPEG", "PNG")
+_DEEP = ("I", "F")  # modes that begin so have 16 or 32 bits, which would be cut off at a byte
+_UNREADABLE = (
+    OSError, ValueError, SyntaxError, zipfile.BadZipFile, RuntimeError, NotImplementedError,
+    Image.DecompressionBombError, Image.DecompressionBombWarning,
+)  # fmt: skip
 _WRONG = (
     "the file is not a zip of images that are named by their directions, such as 'tl030 pl060 tv045 pv270.jpg', "
     "and no .btf container either"
@@ -66,10 +71,10 @@ class ZippedBtf:
         pairs = ((view, light) for view in self._order for light in self._order)
         missing = [pair for pair in pairs if pair not in self._by_pair]
         if missing:
-            (view, light), count = missing[0], len(missing)
+            (view, light), others = missing[0], len(missing) - 1
+            more = f"; it is the first of {others + 1:,}" if others else ""
             raise MaterialError(
-                f"{count} images of the BTF are missing, the first with light from {light} and seen from {view} "
-                "(degrees of θ and φ)"
+                f"the image with light from {light} and seen from {view} (degrees of θ and φ) is missing{more}"
             )
 
     def seen_from(self, view: int) -> F32:
@@ -86,10 +91,12 @@ class ZippedBtf:
                     raise MaterialError(f"{name[:100]} has more than {MOST_TEXELS:,} texels")
                 if getattr(self, "size", None) not in (None, (image.height, image.width)):
                     raise MaterialError(f"{name[:100]} has another size than the first image")
+                if image.mode.startswith(_DEEP):
+                    raise MaterialError(f"{name[:100]} has more than a byte a channel; write it with one, as sRGB")
                 pixels = np.asarray(image.convert("RGB"))
-        except (OSError, ValueError, SyntaxError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
-            if isinstance(error, MaterialError):
-                raise
+        except MaterialError:
+            raise
+        except _UNREADABLE as error:
             raise MaterialError(f"{name[:100]} cannot be read as an image") from error
         return np.asarray(srgb_decode(pixels.astype(np.float32) / np.float32(255)), np.float32)
 
@@ -116,5 +123,7 @@ def _named(entries: Iterable[zipfile.ZipInfo]) -> dict[tuple[Direction, Directio
 def _direction(theta: int, phi: int) -> Direction:
     """A direction of a name; at the pole φ says nothing."""
     if theta >= 90 or phi > 360:
-        raise MaterialError(f"a direction of the BTF lies at θ = {theta}°, φ = {phi}°: at or below the horizon")
+        raise MaterialError(
+            f"a direction of the BTF lies at θ = {theta}°, φ = {phi}°: at or below the horizon, or nowhere"
+        )
     return theta, 0 if theta == 0 else phi % 360

@@ -1,10 +1,16 @@
 """Zips of measured images: read as they are, and refused where they are not what they seem."""
 
+import io
+import struct
+import zlib
+
 import numpy as np
 import pytest
 from btf_zips import DIRECTIONS, image_of, name_of, zipped
+from PIL import Image
 
 from cli.main import main
+from relume.btf.importing import import_btf
 from relume.btf.rings import rings_of
 from relume.btf.zips import ZippedBtf
 from relume.errors import MaterialError
@@ -29,6 +35,18 @@ def renamed(old, new):
 FIRST, SECOND = (name_of(DIRECTIONS[k], DIRECTIONS[2]) for k in (1, 3))
 
 
+def told_as(side, png):
+    """A PNG whose header tells another size: nothing of it may be allocated."""
+    header = png[12:16] + struct.pack(">II", side, side) + png[24:29]
+    return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
+
+
+def of_16_bits():
+    file = io.BytesIO()
+    Image.fromarray(np.full((6, 5), 40_000, np.uint16)).save(file, "PNG")
+    return file.getvalue()
+
+
 def whole(path):
     found = ZippedBtf(path)
     return [found.seen_from(view) for view in range(len(DIRECTIONS))]
@@ -37,7 +55,12 @@ def whole(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda files: files.pop(FIRST), "1 images of the BTF are missing"),
+        (lambda files: files.pop(FIRST), "is missing$"),
+        (lambda files: [files.pop(FIRST), files.pop(SECOND)], "is missing; it is the first of 2$"),
+        (lambda files: files.update({FIRST: told_as(60_000, files[FIRST])}), "cannot be read"),
+        (lambda files: files.update({FIRST: told_as(11_000, files[FIRST])}), "cannot be read|more than"),
+        (lambda files: files.update({FIRST: of_16_bits()}), "more than a byte a channel"),
+        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv040 pv999")), "nowhere"),
         (lambda files: files.update({FIRST.replace("tv040/", "again/"): files[FIRST]}), "two images"),
         (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
         (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}), "another size"),
@@ -75,3 +98,20 @@ def test_the_command_line_imports_one(tmp_path, capsys):
     first, _, words = capsys.readouterr().out.splitlines()
     assert first.startswith("btf:")
     assert "relative RMS" in words
+
+
+def test_one_that_is_refused_leaves_nothing(tmp_path):
+    path = zipped(tmp_path / "a.zip", lambda files: files.update({FIRST: files[FIRST][:60]}))
+    with pytest.raises(MaterialError, match="cannot be read"):
+        import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda share: None, lambda: False)
+    assert not list((tmp_path / "btfs" / "making").iterdir())
+
+
+def test_a_texel_alone_is_kept(tmp_path):
+    def of_one_texel(files):
+        for name in [name for name in files if name.endswith(".png")]:
+            files[name] = image_of(DIRECTIONS[1], DIRECTIONS[2], (1, 1))[0]
+
+    path = zipped(tmp_path / "a.zip", of_one_texel)
+    record = import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda share: None, lambda: False)
+    assert record.size == (1, 1)
