@@ -275,6 +275,7 @@ def _joined(images: Images, parts: list[_Part], bits: NDArray[np.uint8], energy:
         eigen=stacked("eigen"),
         step=stacked("step"),
         average=np.stack([part.average for part in parts]),
+        height=np.zeros((1, 1), np.float32),
         error=tuple(float(one) for one in np.sqrt(np.sum([part.missed for part in parts], axis=0) / energy)),
     )
 

@@ -23,6 +23,8 @@ I8 = NDArray[np.int8]
 
 
 LARGEST = 127  # of what is kept in a byte
+MOST_HEIGHT = 4.0
+"""Of a relief, in sides of its texture: a ray would pass many periods of a higher one."""
 U8 = NDArray[np.uint8]
 
 
@@ -41,6 +43,8 @@ class EigenBtf:
         eigen: E, in steps of `step`. (V, K, C, L, 3) int8
         step: (V, K, C) float32
         average: of all texels. (V, L, 3) float32
+        height: of the relief over the plane, in sides of the texture; one zero where it is not known.
+            (height, width) float32
         error: of the texels, relative RMS, by how many components are used, from none on. (C + 1,)
     """
 
@@ -53,6 +57,7 @@ class EigenBtf:
     eigen: I8
     step: F32
     average: F32
+    height: F32
     error: tuple[float, ...]
 
     @property
@@ -69,7 +74,8 @@ class EigenBtf:
     def num_bytes(self) -> int:
         """What is kept, the coarser levels left out, which files of measurements do not have either."""
         of_texels = packed_bytes(self.size[0] * self.size[1], np.append(self.bits, np.uint8(8)))  # their clusters, too
-        return self.rings.num_directions * of_texels + self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
+        tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
+        return self.rings.num_directions * of_texels + tables + self.height.nbytes
 
     @property
     def measured_bytes(self) -> int:

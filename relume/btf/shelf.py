@@ -19,7 +19,7 @@ import numpy as np
 
 from relume.asset_store import AssetStore
 from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
-from relume.btf.eigen import I8, U8, EigenBtf
+from relume.btf.eigen import I8, MOST_HEIGHT, U8, EigenBtf
 from relume.btf.packing import packed, packed_bytes, unpacked
 from relume.btf.rings import rings_of
 from relume.errors import MaterialError
@@ -29,6 +29,7 @@ _PACKED = "packed.npy"
 _ARRAYS = {
     "levels": np.int32, "cluster": np.uint8, "mean": np.float16, "eigen": np.int8,
     "step": np.float32, "average": np.float32,
+    "height": np.float32,
 }  # fmt: skip
 
 
@@ -130,7 +131,8 @@ def _load(path: Path) -> EigenBtf:
         shift = [float(one) for one in document.get("shift", [])]  # all rings began at φ = 0 before there was one
         rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]], shift)
         error = tuple(float(one) for one in document["error"])
-        arrays = {name: _array(path, name) for name in _ARRAYS}
+        arrays = {name: _array(path, name) for name in _ARRAYS if name != "height" or (path / "height.npy").exists()}
+        arrays.setdefault("height", np.zeros((1, 1), np.float32))  # before there was one
         bits, weight = _weights(path, document)
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
         raise STORE.damaged(path) from problem
@@ -190,5 +192,7 @@ def _is_sound(found: EigenBtf) -> bool:
         and found.eigen.shape == (directions, clusters, components, directions, 3)
         and found.step.shape == (directions, clusters, components)
         and found.average.shape == (directions, directions, 3)
-        and all(np.isfinite(array).all() for array in (found.mean, found.step, found.average))
+        and found.height.shape in ((1, 1), found.size)
+        and all(np.isfinite(array).all() for array in (found.mean, found.step, found.average, found.height))
+        and float(np.abs(found.height).max()) <= MOST_HEIGHT
     )

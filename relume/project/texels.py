@@ -4,7 +4,8 @@
 
 where a is all light that arrives at a place, shared out to the directions l in which the BTF is known: its values are
 linear between these (`relume.btf.rings`), so that the sum over light is exact for what is known. The weights w have no
-cosine: it is in the BTF's values.
+cosine: it is in the BTF's values. Where relief is known, x is from each side v where the same of it is seen
+(`relume.btf.parallax`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.terms.btf import Texels
+from relume.btf.parallax import height_seen, height_seen_numpy, slant_of, slants
 from relume.btf.rings import Rings, taps, taps_numpy
 from relume.light.triangles import TriangleLights
 from relume.project.receivers import Listed, Rays, Receivers
@@ -25,6 +27,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _LEAST_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
+_TEXEL = np.float32(0.5)  # side of the texels for a footprint, in footprints: a mean between four is twice as wide
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -88,7 +91,7 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
         How many there are: four of each level that has a share.
     """
     finest, coarsest = np.float32(max(levels[0, 1], levels[0, 2])), levels.shape[0] - 1
-    level: Any = min(np.float32(math.log2(max(footprint * finest, np.float32(1)))), np.float32(coarsest))
+    level: Any = min(np.float32(math.log2(max(_TEXEL * footprint * finest, np.float32(1)))), np.float32(coarsest))
     lower = np.int64(level)
     between = np.float32(level - np.float32(lower))
     u, v = np.float32(u - math.floor(u)), np.float32(v - math.floor(v))  # remainders of integers are slow
@@ -143,14 +146,16 @@ def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: ignore[no-untyped-def]
+def _send(rings, tables, texels, relief, arriving, axes, wo, places, out):  # type: ignore[no-untyped-def]
     """Sum what n points send.
 
     Args:
+        relief: heights, the lowest and the highest of them, slants of the sides.
         arriving: (n, 3, L). wo: in shading frames. (n, 3). places: u and v in repeats, side of the footprint. (n, 3)
         out: written. (n, 3)
     """
     levels, cluster, weight = texels
+    height, lowest, highest, sides = relief
     index, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
     texel, share = np.empty(8, np.int32), np.empty(8, np.float32)
     found, sums = np.empty(8, np.int32), np.empty((8, tables.shape[2]), np.float32)
@@ -160,10 +165,15 @@ def _send(rings, tables, texels, arriving, axes, wo, places, out):  # type: igno
             continue
         vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
         taps(rings, vx, vy, wo[p, 2], index, of_view)
-        num = texels_about(levels, places[p, 0], places[p, 1], places[p, 2], texel, share)
+        u, v, footprint = places[p, 0], places[p, 1], places[p, 2]
+        slant = slant_of(rings, vx, vy, wo[p, 2])
+        h = height_seen(height, lowest, highest, u, v, slant)
         for tap in range(4):
             if of_view[tap] <= 0:
                 continue
+            side = sides[index[tap]]
+            across, up = h * (slant[0] - side[0]), h * (slant[1] - side[1])
+            num = texels_about(levels, u + across, v - up, footprint, texel, share)
             num_found = sum_weights(cluster, weight, index[tap], texel, share, num, found, sums)
             for slot in range(num_found):
                 of_cluster = tables[index[tap], found[slot]]
@@ -222,7 +232,18 @@ def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receive
     local = np.stack([(t * wo).sum(axis=1), (np.cross(n, t) * wo).sum(axis=1), (n * wo).sum(axis=1)], axis=1)
     out = np.empty((stop - start, 3), np.float32)
     of_texels = found.levels, found.cluster, found.weight
-    _send(rings, texels.tables, of_texels, arriving, covered.axes, np.ascontiguousarray(local), covered.places, out)
+    relief = found.height, found.height.min(), found.height.max(), slants(rings)
+    _send(
+        rings,
+        texels.tables,
+        of_texels,
+        relief,
+        arriving,
+        covered.axes,
+        np.ascontiguousarray(local),
+        covered.places,
+        out,
+    )
     return out
 
 
@@ -244,13 +265,17 @@ def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place
     Returns:
         (3,) float64
     """
-    found, (height, width) = texels.btf, texels.btf.size
-    column, row = int(np.floor(place[0])), int(np.floor(place[1]))
-    value = np.zeros((found.rings.num_directions,) * 2 + (3,))
-    for down, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        near = abs(1 - across - (place[0] - column)) * abs(1 - down - (place[1] - row))
-        value += near * found.texel((row + down) % height * width + (column + across) % width)
+    found, size = texels.btf, np.array(texels.btf.size[::-1])
+    slant = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(found.rings.theta[-1]))
+    height = height_seen_numpy(found.height, (place + 0.5) / size, slant)
     light, of_light, left = taps_numpy(found.rings, directions)
     view, of_view, _ = taps_numpy(found.rings, wo[None])
-    seen = np.einsum("a,alc->lc", of_view[0], value[view[0]])
+    seen = np.zeros((found.rings.num_directions, 3))
+    for side, share in zip(view[0], of_view[0], strict=True):
+        at = place + height * (slant - slants(found.rings)[side]) * [1, -1] * size
+        first = np.floor(at).astype(int)
+        for beside in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            near = share * np.abs(1 - np.array(beside) - (at - first)).prod()
+            column, row = (first + beside) % size
+            seen += near * found.texel(row * size[0] + column)[side]
     return np.asarray(np.einsum("mk,m,mkc,mc->c", of_light, left, seen[light], irradiance).clip(0))

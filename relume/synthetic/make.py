@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,7 +89,8 @@ def make_btf(
         values.fill(small.seen_from, lambda share: progress(_OF_RENDERING * share), cancelled)
         rest = 1 - _OF_RENDERING
         begun = Begun(making / "compressed", {"bound": wanted.bound})
-        return compress(values, wanted.bound, lambda share: progress(_OF_RENDERING + rest * share), cancelled, begun)
+        kept = compress(values, wanted.bound, lambda share: progress(_OF_RENDERING + rest * share), cancelled, begun)
+        return replace(kept, height=small.height())
 
     record = keep(folder, recipe, name, wanted.geometry, make)
     shutil.rmtree(making)

@@ -2,10 +2,10 @@
 
     B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx
 
-where an eye far off towards v sees the geometry through the texel. Eyes and lamps have a size, as lenses and lamps of
-measurements have: both are spread over `_SPREAD` about their directions, so that shadows and outlines between these
-follow from them. Light that comes straight is traced from what is
-seen; E_l is the irradiance by light that other faces have sent on, which do so as matt surfaces of the same
+where an eye far off towards v sees the geometry through the texel. Lamps are spread over `_SPREAD` about their
+directions, so that shadows between these follow from them. Eyes are points, as far lenses are: between them relief is
+found by its height (`relume.btf.parallax`), which a blur would only hide. Light that comes straight is traced from what
+is seen; E_l is the irradiance by light that other faces have sent on, which do so as matt surfaces of the same
 reflectance ρ: found once for the middles of all faces, by rays to other faces, as often as it takes.
 """
 
@@ -36,7 +36,7 @@ _RAYS_A_FACE = 96  # to other faces
 _BOUNCES = 5
 _ABOVE = 4.0  # periods above the plane that eyes' rays begin
 _PAIRS_AT_ONCE = 1 << 19
-_SPREAD = np.radians(7.5)  # about a direction, half of what is between two
+_SPREAD = np.radians(7.5)  # of lamps about their direction, half of what is between two
 _GOLDEN = np.pi * (3 - 5**0.5)
 
 
@@ -52,7 +52,7 @@ class SmallGeometry:
 
     Args:
         tile: one period. rings: of directions to lights and to eyes. size: height and width of the texture, texels.
-        grid: places along each side of a texel that are looked at.
+        grid: places along each side of a texel that are looked at, each in light of another part of the lamps.
         seed: of the rays between faces.
     """
 
@@ -69,19 +69,32 @@ class SmallGeometry:
 
     def seen_from(self, view: int) -> F32:
         """Every texel's values from one direction. (lights, texels, 3) float32"""
+        grid, wo = self._grid, self._directions[view]
+        out = np.zeros((self.rings.num_directions, self.size[0] * self.size[1], 3))
+        for part in range(grid * grid):
+            # the same places of lamps for all texels: what they make is no noise
+            lights = _beside(self._directions, part * 3 + 1, grid * grid)
+            out += self._sent(self._seen(part, wo), wo, lights)
+        return (out / grid**2).astype(np.float32)
+
+    def height(self) -> F32:
+        """How far over the texture's plane the geometry reaches at each texel; in holes, as far as it reaches down.
+
+        Returns:
+            In sides of the texture. (height, width) float32
+        """
+        up, grid, deepest = np.array([0.0, 0.0, 1.0]), self._grid, self._positions[:, 2].min()
+        above = [_ABOVE - self._seen(part, up).distance for part in range(grid * grid)]
+        return np.asarray(np.maximum(above, deepest).mean(axis=0), np.float32).reshape(self.size)
+
+    def _seen(self, part: int, wo: F64) -> Hits:
+        """What is seen from afar at one place of each texel."""
         (height, width), grid = self.size, self._grid
         row, column = np.divmod(np.arange(height * width), width)
-        out = np.zeros((self.rings.num_directions, height * width, 3))
-        for part in range(grid * grid):
-            x = (column + (part % grid + 0.5) / grid) / width
-            y = 1 - (row + (part // grid + 0.5) / grid) / height
-            # the same places of lamps and of lenses for all texels: what they make is no noise
-            wo = _beside(self._directions[view : view + 1], part * 5 + 3, grid * grid)[0]
-            lights = _beside(self._directions, part * 3 + 1, grid * grid)
-            origin = np.stack([x, y, np.zeros_like(x)], axis=1) + _ABOVE * wo / wo[2]
-            hits = trace_from(self._embree, origin.astype(np.float32), np.tile(-wo.astype(np.float32), (len(x), 1)))
-            out += self._sent(hits, wo, lights)
-        return (out / grid**2).astype(np.float32)
+        x = (column + (part % grid + 0.5) / grid) / width
+        y = 1 - (row + (part // grid + 0.5) / grid) / height
+        origin = np.stack([x, y, np.zeros_like(x)], axis=1) + _ABOVE * wo / wo[2]
+        return trace_from(self._embree, origin.astype(np.float32), np.tile(-wo.astype(np.float32), (len(x), 1)))
 
     def _sent(self, hits: Hits, wo: F64, lights: F64) -> F64:
         """What is sent from hits towards wo, by light. (lights, hits, 3)"""
@@ -101,10 +114,13 @@ class SmallGeometry:
         n = places.normal.astype(np.float64)
         t = any_tangent(places.normal).astype(np.float64)
         frame = np.stack([t, np.cross(n, t), n], axis=1)
-        local = np.einsum("pij,lj->pli", frame, lights)
-        towards = np.einsum("pij,j->pi", frame, wo)[:, None]
-        value = sum(eval_brdf(term, local, towards) for term in self._terms)
-        return np.asarray(value * (np.maximum(local[..., 2], 0) * self._visible(places, lights))[..., None])
+        cosine = np.maximum(n @ lights.T, 0) * self._visible(places, lights)
+        place, light = np.nonzero(cosine)  # half of all pairs are dark
+        local = np.einsum("nij,nj->ni", frame[place], lights[light])
+        towards = np.einsum("pij,j->pi", frame, wo)[place]
+        out = np.zeros((*cosine.shape, 3))
+        out[place, light] = sum(eval_brdf(term, local, towards) for term in self._terms)
+        return np.asarray(out * cosine[..., None])
 
     def _visible(self, places: _Places, lights: F64) -> F64:
         seen = trace_visibility(self._embree, places.position, places.normal, lights.astype(np.float32)).visible

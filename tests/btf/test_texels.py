@@ -85,6 +85,8 @@ def test_a_picture_is_that_of_the_values_before_compression(bake, small_btf):
     lights, receivers = arriving(bake, look)
     uv = np.array(receivers.uv)
     (height, width), texels = small_btf.values.size, settled(small_btf.record, scale=1.0).texels
+    flat = replace(texels.btf, height=np.zeros((1, 1), np.float32))  # nothing is looked up beside its place
+    texels = replace(texels, btf=flat)
     # in the middles of texels, so that no mean over texels is in it
     uv[:, 0] = (np.floor(uv[:, 0] * width) + 0.5) / width
     uv[:, 1] = (np.floor(uv[:, 1] * height) + 0.5) / height
