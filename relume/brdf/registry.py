@@ -12,6 +12,7 @@ from relume.brdf.terms.blinn_phong import BLINN_PHONG
 from relume.brdf.terms.btf import MEASURED_BTF
 from relume.brdf.terms.cook_torrance import COOK_TORRANCE
 from relume.brdf.terms.ggx import GGX
+from relume.brdf.terms.ggx_multiple import GGX_MULTIPLE
 from relume.brdf.terms.lafortune import LAFORTUNE
 from relume.brdf.terms.lambert import LAMBERT
 from relume.brdf.terms.measured import MEASURED_HD, MEASURED_HF, MEASURED_LV
@@ -25,7 +26,7 @@ from relume.brdf.terms.ward_duer import WARD_DUER
 _ALL = (
     LAMBERT, OREN_NAYAR,
     PHONG, BLINN_PHONG, LAFORTUNE, WARD, WARD_DUER, WARD_ANISOTROPIC, ASHIKHMIN_SHIRLEY,
-    COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX,
+    COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX, GGX_MULTIPLE,
     MEASURED_LV, MEASURED_HD, MEASURED_HF, MEASURED_BTF,
 )  # fmt: skip
 

@@ -11,7 +11,7 @@ from relume.brdf.levels import PLAIN, Levels, at_ratio, follows_map, level_bands
 from relume.brdf.registry import TERMS
 from relume.errors import ParameterError
 
-WIDE = [term for term in TERMS.values() if term.width is not None]
+WIDE = [term for term in TERMS.values() if term.width is not None and term.model != "ggx_multiple"]  # no highlight
 LEVELS = Levels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8))
 
 

@@ -34,6 +34,7 @@ CASES = {
     "schlick": ({"roughness": 0.05, "f0": 0.4}, UNMASKED),
     "beard_maxwell": ({"sigma": 0.2, "tau": 20.0}, UNMASKED),
     "ggx": ({"roughness": 0.45, "f0": 0.4}, HIGHLIGHT),
+    "ggx_multiple": ({"roughness": 0.9, "f0": 0.9}, SHADOWS),
 }
 
 

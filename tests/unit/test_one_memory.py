@@ -146,6 +146,7 @@ BOUNDED = {
     "brdf/quadrature.py",
     "brdf/symmetry.py",
     "brdf/terms/btf.py",
+    "brdf/terms/ggx_multiple.py",
     "brdf/terms/measured.py",
     "btf/rings.py",
     "btf/shelf.py",
