@@ -28,7 +28,7 @@ SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadscope --no-load
 # Of NumPy's linear algebra: its threads spin where they wait for a core that another process of tests has.
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 
-.PHONY: help setup demo test test-slow bench lint lock clean client-check
+.PHONY: help setup demo test test-slow bench soak lint lock clean client-check
 
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
@@ -48,6 +48,10 @@ test-slow: setup  ## the long tests
 
 bench: setup  ## the project's own figures
 	$(BIN)/relume bench $(ARGS)
+
+MINUTES ?= 120
+soak: setup  ## sessions, bakes, deletes and killed processes for MINUTES; memory, handles and disk stay flat
+	$(BIN)/python -m bench.soak --minutes $(MINUTES)
 
 lint: $(PROJECT_STAMP)  ## style and types
 	$(BIN)/ruff check .

@@ -13,13 +13,14 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from concurrent.futures import CancelledError as FutureCancelledError
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from sqlalchemy.exc import IntegrityError
 
 from relume.bake import Task
-from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, is_no_room
+from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, StorageError, is_no_room
 from relume.folders import folder_bytes
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
@@ -29,9 +30,10 @@ from worker.ledger import Ledger
 from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
 from worker.progress import Expected, Progress
-from worker.runs import begin_run, forget_run, run_of
+from worker.runs import begin_run, forget_run, name_run, run_of
 from worker.status import Phase, TaskCost
 from worker.storage import push
+from worker.storage.parts import Parts, fetch_parts, forget_parts
 from worker.tasks import Job, idle_timer, run_task, scene_of
 
 SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
@@ -64,6 +66,7 @@ class BakeRunner:
     _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
     _entered: tuple[Phase | None, float] = (None, 0.0)
     _is_working: bool = False
+    _parts: Parts | None = None
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
@@ -79,6 +82,8 @@ class BakeRunner:
             num_bytes = self._bake()
             push(self._target)
             forget_run(self._staging)
+            with suppress(StorageError):  # the bake is there; what is left over is deleted with its scene
+                forget_parts(identity)
         except CancelledError:
             self._land()
             self._ask(self.ledger.release, identity, self.owner)
@@ -114,16 +119,23 @@ class BakeRunner:
     def _begin_or_go_on(self) -> None:
         """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
         identity, staging = self.job.bake_id, self._staging
-        has_begun = staging.exists()
-        is_here = has_begun and run_of(staging) == self._ask(self.ledger.run, identity)
+        has_begun, run = staging.exists(), self._ask(self.ledger.run, identity)
+        is_here = has_begun and run_of(staging) == run
+        finished = self._ask(self.ledger.finished_tasks, identity)
+        if not is_here and run is not None and fetch_parts(staging, identity, run, finished):
+            has_begun = is_here = True
+            name_run(staging, run)
         if is_here and code_of(staging) == self.job.code:
+            self._parts = Parts(staging, identity, run, finished) if run is not None else None
             return
-        is_of_others = bool(self._ask(self.ledger.finished_tasks, identity)) and not is_here
+        is_of_others = bool(finished) and not is_here
         why = TAKEN_OVER if is_of_others else UPGRADED if has_begun else None
         if why is not None:
             log.warning("bake %s: %s", identity, why, extra={"fields": {"bake": identity}})
         shutil.rmtree(staging, ignore_errors=True)
-        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, begin_run(staging), why)
+        run = begin_run(staging)
+        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, run, why)
+        self._parts = Parts(staging, identity, run, ())
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
         job = self.job
@@ -179,9 +191,15 @@ class BakeRunner:
             log.warning("a worker process died; task %s is given to another", task, extra=about)
             waiting.append((task, attempt + 1))
             return
-        self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
+        self._record(task, cost, attempt)
         self._is_working = True
         progress.add(task, cost, here=True)
+
+    def _record(self, task: Task, cost: TaskCost, attempt: int) -> None:
+        """A task is finished: its shards are stored, where others may go on with them, before it counts."""
+        if self._parts is not None:
+            self._parts.store((task.stage, task.index))
+        self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
 
     def _beat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError where somebody wants this run to end."""
@@ -203,7 +221,7 @@ class BakeRunner:
                 task, attempt = self._flying.pop(future)
                 if not future.cancelled() and future.exception() is None:
                     try:
-                        self._ask(self.ledger.finish_task, self.job.bake_id, task, future.result(), attempt)
+                        self._record(task, future.result(), attempt)
                     except IntegrityError:  # the bake was deleted
                         return
 

@@ -1,7 +1,7 @@
 """Which unfinished store the finished tasks of a bake are in: machines that share a ledger need not share a folder.
 
 Whoever begins a bake from nothing names that beginning, in the ledger and in a file beside the unfinished store. Where
-the two differ, the ledger's tasks are in another machine's folder.
+the two differ, the ledger's tasks are in another machine's folder, or in object storage (`worker.storage.parts`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,15 @@ from relume.replacing import replacing
 def begin_run(staging: Path) -> str:
     """Name a beginning, beside the unfinished store that it will be in."""
     run = uuid.uuid4().hex
+    name_run(staging, run)
+    return run
+
+
+def name_run(staging: Path, run: str) -> None:
+    """Say which beginning an unfinished store is of."""
     staging.parent.mkdir(parents=True, exist_ok=True)
     with replacing(_path(staging)) as unfinished:
         unfinished.write_text(run)
-    return run
 
 
 def run_of(staging: Path) -> str | None:

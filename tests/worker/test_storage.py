@@ -103,26 +103,45 @@ def test_one_machine_imports_another_bakes_and_the_first_opens_it(
         assert not list(server.data_dir.rglob(".unfinished-*"))
 
 
-def test_a_bake_that_another_machine_had_begun_starts_again_and_says_so(
+def half(tmp_path: Path, name: str, url: str) -> tuple[BakeStatus, int]:
+    """A machine that bakes some tasks and is stopped; how the bake is then, and how many tasks it began."""
+    log = tmp_path / f"{name}.log"
+    with BakeService(tmp_path / name, url, methods={"fake": FakeMethod(delay_s=0.2, log=str(log))}) as service:
+        register_scene(service.data_dir, service.ledger, SCENE)
+        identity = service.submit(SCENE.id, RECIPE)
+        wait_for(log, 4)
+        status = service.get(identity)
+    return status, len(log.read_text().splitlines())
+
+
+def is_as_expected(path: Path, tmp_path: Path) -> bool:
+    return tree_hash(path) == tree_hash(bake_here(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr"))
+
+
+def test_a_bake_that_another_machine_had_begun_goes_on_elsewhere(
     tmp_path: Path, storage: Remote, ledger_of_all: str
 ) -> None:
-    def half(name: str) -> BakeStatus:
-        log = tmp_path / f"{name}.log"
-        methods = {"fake": FakeMethod(delay_s=0.2, log=str(log))}
-        with BakeService(tmp_path / name, ledger_of_all, methods=methods) as service:
-            register_scene(service.data_dir, service.ledger, SCENE)
-            identity = service.submit(SCENE.id, RECIPE)
-            wait_for(log, 6)
-            return service.get(identity)
+    half(tmp_path, "first", ledger_of_all)
+    log = tmp_path / "second.log"
+    with BakeService(tmp_path / "second", ledger_of_all, methods={"fake": FakeMethod(log=str(log))}) as second:
+        done = len(second.ledger.finished_tasks(second.bakes()[0].id))
+        assert done >= 2
+        path = bake(second)
+        assert second.get(path.stem).problem is None
+        assert len(log.read_text().splitlines()) == len(second.ledger.finished_tasks(path.stem)) - done
+    assert is_as_expected(path, tmp_path)
+    assert not list((second.data_dir / "bakes" / "staging").iterdir())
+    assert not [item for page in obstore.list(storage._store, "parts/") for item in page]
 
-    half("first")
-    assert half("second").problem == TAKEN_OVER
+
+def test_where_the_storage_lacks_parts_the_bake_starts_again_and_says_so(
+    tmp_path: Path, storage: Remote, ledger_of_all: str
+) -> None:
+    status, _ = half(tmp_path, "first", ledger_of_all)
+    storage.delete(f"parts/{status.id}")
+    assert half(tmp_path, "second", ledger_of_all)[0].problem == TAKEN_OVER
     with machine(tmp_path, "first", ledger_of_all) as service:  # what it has of its own is not what the ledger counts
-        path = bake(service)
-        assert service.get(path.stem).problem is None
-    target = bake_here(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr")
-    assert tree_hash(path) == tree_hash(target)
-    assert not list((service.data_dir / "bakes" / "staging").iterdir())
+        assert is_as_expected(bake(service), tmp_path)
 
 
 def test_what_is_stored_is_a_zarr_store_that_others_can_open(

@@ -100,6 +100,8 @@ def forget(path: Path) -> None:
     """Delete a scene or a bake from the storage; here, whoever asks deletes it. Raises StorageError."""
     if (there := configured()) is not None:
         there.delete(_name(path))
+        if path.suffix == ".zarr":
+            there.delete(f"parts/{path.stem}")
 
 
 def _make_room(bakes: Path, there: Remote, num_bytes: int) -> None:

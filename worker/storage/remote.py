@@ -2,6 +2,7 @@
 
 scenes/<id>/…       files, as in the data directory
 bakes/<id>.zarr/…   a Zarr store that other programs can open
+parts/<id>/…        what unfinished bakes have, see `worker.storage.parts`
 whole/<name>.json   the files of one of these with size and SHA-256; written last, so its presence means "complete"
 """
 
@@ -97,6 +98,41 @@ class Remote:
             list(threads.map(lambda entry: self._fetch(name, folder, *entry), entries))
         return True
 
+    def put_files(self, name: str, folder: Path, files: Sequence[str]) -> None:
+        """Store some files of a folder under a name, without a list of them.
+
+        Args:
+            name: such as parts/<id>. folder: that holds the files. files: their paths in it.
+        Raises:
+            StorageError: the storage does not answer, or refuses.
+        """
+        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+            list(threads.map(lambda file: obstore.put(self._store, f"{name}/{file}", folder / file), files))
+
+    def fetch_files(self, name: str, folder: Path) -> None:
+        """Fetch all files under a name that has no list of them. Raises StorageError."""
+        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+            keys = [item["path"] for page in obstore.list(self._store, f"{name}/") for item in page]
+            files = [key.partition(f"{name}/")[2] for key in keys]
+            if any({"", ".", ".."} & set(file.split("/")) for file in files):
+                raise StorageError(f"{name} in the object storage names files outside of it")
+            list(threads.map(lambda file: self._stream(f"{name}/{file}", folder / file), files))
+
+    def put_document(self, name: str, document: Any) -> None:
+        """Store JSON under a name. Raises StorageError."""
+        with _named_faults():
+            obstore.put(self._store, f"{name}.json", json.dumps(document).encode())
+
+    def document(self, name: str) -> Any:
+        """JSON that is stored under a name; None where there is none. Raises StorageError."""
+        with _named_faults():
+            try:
+                return json.loads(bytes(obstore.get(self._store, f"{name}.json").bytes()))
+            except FileNotFoundError:
+                return None
+            except ValueError as error:
+                raise StorageError(f"{name} in the object storage is unreadable") from error
+
     def num_bytes(self, name: str) -> int:
         """Size of a folder; 0 where there is none. Raises StorageError."""
         with _named_faults():
@@ -132,15 +168,19 @@ class Remote:
         target = folder / file
         if target.exists() and target.stat().st_size == num_bytes:
             return
+        self._stream(f"{name}/{file}", target, sha256)
+
+    def _stream(self, key: str, target: Path, sha256: str | None = None) -> None:
+        """Fetch one file, which appears whole; it is checked where its hash is known."""
         target.parent.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256()
         with replacing(target) as unfinished:
             with unfinished.open("wb") as writing:
-                for piece in obstore.get(self._store, f"{name}/{file}").stream(min_chunk_size=PIECE_BYTES):
+                for piece in obstore.get(self._store, key).stream(min_chunk_size=PIECE_BYTES):
                     digest.update(piece)
                     writing.write(piece)
-            if digest.hexdigest() != sha256:
-                raise StorageError(f"{name}/{file} is damaged in the object storage; delete the bake and bake again")
+            if sha256 not in (None, digest.hexdigest()):
+                raise StorageError(f"{key} is damaged in the object storage; delete the bake and bake again")
 
 
 def _s3_options() -> dict[str, Any]:
