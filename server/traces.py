@@ -1,8 +1,8 @@
 """Traces of edits by OpenTelemetry: what happens between an edit's coming in and its frame's going out.
 
 Spans are made when a frame has been sent, of times that were taken anyhow: without an exporter nothing of this exists,
-and OpenTelemetry is not even imported. Where spans go, as what service and how many of them, its own variables say
-(`OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`, …).
+and OpenTelemetry's SDK is not even imported. Where spans go, as what service and how many of them, its own
+variables say (`OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`, …).
 """
 
 from __future__ import annotations

@@ -37,12 +37,8 @@ class FrameLoop:
 
     def __init__(self, state: SessionState, library: Library, threads: Threads) -> None:
         self._socket, self._pending, self._shown, self._window = state.socket, state.pending, state.shown, state.window
-        self._look, self._transfer, self._metrics, self._traces = (
-            state.look,
-            state.transfer,
-            state.metrics,
-            state.traces,
-        )
+        self._look, self._transfer = state.look, state.transfer
+        self._metrics, self._traces = state.metrics, state.traces
         self._guest, self._may_edit = state.guest, state.caller.may_edit
         self._library, self._work = library, OneAtATime(threads)
         self._freezer = Freezer(state.socket, threads, state.metrics, state.traces, state.pending.news)

@@ -1,0 +1,31 @@
+"""The soak's verdict: what grows is told from what goes up and down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from bench.soak.server import Sample
+from bench.soak.verdict import trends
+
+
+def samples(memory: Callable[[float], float], handles: Callable[[float], float], number: int = 60) -> list[Sample]:
+    return [Sample(5.0 * k, int(memory(5.0 * k)), 0, int(handles(5.0 * k)), 30, 10**7) for k in range(number)]
+
+
+def test_what_warms_up_and_goes_up_and_down_is_flat() -> None:
+    found = samples(lambda s: 2e8 * min(1.0, 0.2 + s / 60) + 1e7 * (s % 20 > 10), lambda s: 40 + s % 3)
+    assert [one.name for one in trends(found) if not one.is_flat] == []
+
+
+def test_what_leaks_is_told() -> None:
+    found = {one.name: one for one in trends(samples(lambda s: 2e8 + 5e5 * s, lambda s: 40 + s / 4))}
+    assert [name for name, one in found.items() if not one.is_flat] == ["memory MB", "handles"]
+    assert found["memory MB"].slope_per_hour == pytest.approx(0.5 * 3600)
+    assert "GROWS" in found["handles"].line()
+
+
+def test_a_look_is_too_short_to_tell() -> None:
+    with pytest.raises(ValueError, match="soak for longer"):
+        trends(samples(lambda s: 1e8, lambda s: 40, number=10))
