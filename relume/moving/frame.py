@@ -218,7 +218,7 @@ def _summed(
     out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
     sight = Sight(eye, pixel_angle, seen)
     arrived = Arrived(arriving.total, wanted.relief)
-    show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, emission, out)
+    show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, out)
     return Sums(glances, sent, (broad, along), towards, out)
 
 

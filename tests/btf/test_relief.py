@@ -19,10 +19,9 @@ from relume.moving.relief.show import Arrived, Sight, show_texels
 from relume.moving.relief.tables import covers_of, hat_factors, in_lanes
 from relume.render.image import render_image
 
-SCALE, ROTATION = 2.0, 40.0
+SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])
 CONSTANT = int(np.flatnonzero(FUNCTIONS == 0)[0])
-BLACK = np.zeros((1, 3), np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -59,13 +58,13 @@ def factors(numbers, axes):
 
 
 def oracle(cover, d, place):
-    """r of a ray on the floor, in plain NumPy: its texture's x to the right, y away from the eye."""
+    """What a ray on the floor shows more than the mean, in plain NumPy; its texture's x is to the right, y away."""
     turn, found = np.radians(ROTATION), cover.tables
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
     axes, (height, width) = np.array([across, up, [0, 1, 0]]), cover.texels.btf.size
     column, row = SCALE * np.array([width * across @ place, -height * up @ place]) - 0.5
-    numbers = np.zeros(found.mean.shape)
+    numbers = np.zeros(found.step.shape)
     for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
         share = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
@@ -73,23 +72,23 @@ def oracle(cover, d, place):
     light = in_lanes(in_basis(axes @ TO_LIGHT))
     view, of_view, _ = taps_numpy(cover.texels.btf.rings, -(axes @ d)[None])
 
-    def under(numbers):
-        return np.einsum("a,ack,k->c", of_view[0], factors(numbers, found.axes)[view[0]], light)
-
-    return np.maximum(under(found.mean + numbers), 0) / under(found.mean)
+    return np.einsum("a,ack,k->c", of_view[0], factors(numbers, found.axes)[view[0]], light)
 
 
 def test_the_kernel_is_the_oracle(moving, small_btf):
-    covers = covers_of(terms_of(covered(moving, small_btf.record, scale=SCALE, rotation=ROTATION)))
-    seen_by, surface = sight(moving), moving.surface
-    seen, out = seen_by.seen, np.ones((len(seen_by.seen.directions), 3), np.float32)
-    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), BLACK, out)
+    look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
+    covers, seen_by, surface = covers_of(terms_of(look_of)), sight(moving), moving.surface
+    seen, out = seen_by.seen, np.full((len(seen_by.seen.directions), 3), MEAN, np.float32)
+    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), out)
     rays = np.flatnonzero(seen.hits.face >= 0)
     for ray in rays[::61]:
         d = seen.directions[ray].astype(np.float64)
         place = (seen_by.eye + seen.hits.distance[ray] * d + [1, 0, 1]) / 2
-        np.testing.assert_allclose(out[ray], oracle(covers[0], d, place), rtol=5e-3, atol=2e-3)
-    assert (out[seen.hits.face < 0] == 1).all()
+        more = [0.5, 1.0, 2.0] * oracle(covers[0], d, place)
+        np.testing.assert_allclose(out[ray], np.maximum(MEAN + more, 0), rtol=5e-3, atol=2e-4)
+    assert (out[seen.hits.face < 0] == MEAN).all()
+    assert (out[rays] == 0).any()
+    assert out.max() > 2 * MEAN
 
 
 def test_light_about_a_vertex_is_the_oracles(moving):
@@ -120,10 +119,12 @@ def test_another_light_is_another(moving):
 def test_few_numbers_tell_out_factors(moving, small_btf):
     """Of each texel, from all sides, as its own values have them, but for rounding and colours of what is narrow."""
     cover = covers_of(terms_of(covered(moving, small_btf.record)))[0]
-    found, integrals, squares = cover.tables, hat_factors(cover.texels.btf.rings), np.zeros(2)
+    whole, found, squares = cover.texels.btf, cover.tables, np.zeros(2)
+    integrals = hat_factors(whole.rings)
+    mean = np.einsum("vlc,lk->vck", whole.average, integrals)
     for texel in range(0, found.weight.shape[1], 29):
-        expected = np.einsum("vlc,lk->vck", cover.texels.btf.texel(texel), integrals)
-        told = factors(found.mean + found.step * found.weight[:, texel], found.axes)
+        expected = np.einsum("vlc,lk->vck", whole.texel(texel), integrals)
+        told = mean + factors(found.step * found.weight[:, texel], found.axes)
         squares += np.sum((told - expected) ** 2), np.sum(expected**2)
     assert squares[0] < 0.05**2 * squares[1]
 
@@ -167,10 +168,12 @@ def test_beside_other_terms_a_btf_counts_for_its_share(moving, small_btf, tmp_pa
     assert np.linalg.norm(found - expected) < 0.04 * np.linalg.norm(expected)
 
 
-def test_emission_is_not_textured(moving, small_btf):
-    covers, surface = covers_of(terms_of(covered(moving, small_btf.record, scale=SCALE))), moving.surface
-    seen_by = sight(moving, 0.01)
-    out = np.full((len(seen_by.seen.directions), 3), 0.7, np.float32)
-    shining = np.full((1, 3), 0.7, np.float32)
-    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), shining, out)
-    np.testing.assert_allclose(out, 0.7, atol=1e-6)
+def test_two_textures_on_one_material_are_summed(moving, small_btf):
+    terms = terms_of(covered(moving, small_btf.record, scale=SCALE))
+    seen_by, surface = sight(moving), moving.surface
+    found = []
+    for times in (1, 2):
+        out = np.full((len(seen_by.seen.directions), 3), 10.0, np.float32)
+        show_texels(covers_of([terms[0] * times]), surface, moving.positions, seen_by, arrived(surface), out)
+        found.append(out - 10)
+    np.testing.assert_allclose(found[1], 2 * found[0], atol=1e-5)

@@ -1,10 +1,9 @@
-"""From the mean of all texels to each: what one sends over what all do on the mean, in the light that arrives there.
+"""From the mean of all texels to each: what one sends more than all do on the mean, in the light that arrives there.
 
-    B(pixel) = B̄ · r,   r = Σ_k p_k(ωo, x) t_k / Σ_k p̄_k(ωo) t_k
+    B(pixel) = B̄ + C Σ_k (p_k(ωo, x) − p̄_k(ωo)) t_k
 
-B̄ is what surfaces send by the mean of texels; shadows' edges and catchers are found for each pixel, and stay. Of
-a material with other terms, r counts for the share that the BTF has. At rest, each texel is summed over all light
-(`relume.project.texels`).
+B̄ is what surfaces send by the mean of texels, by all that is known of light; C the term's colour and gain. At rest,
+each texel is summed over all light (`relume.project.texels`).
 """
 
 from __future__ import annotations
@@ -31,9 +30,7 @@ from relume.project.texels import texels_about
 
 F32 = NDArray[np.float32]
 
-F = np.float32  # bytes are not floats by themselves: products would be doubles
-_MOST = np.float32(20)  # times the mean
-_LEAST = np.float32(1e-6)
+F = np.float32  # bytes by themselves would make doubles of products
 _SHARES = 4  # for each thread: rays that see fine texels cost more
 _ALIKE = np.float32(0.999)  # cosine of tangents that azimuths about a ray may be counted from together
 
@@ -63,50 +60,30 @@ class Arrived(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _list(face, face_material, cover_of, vertex, first, rows, is_asked):  # type: ignore[no-untyped-def]
-    """List rays that see covered materials, cover after cover. rows: (rays,). first: (covers + 1,). All written."""
+def _list(face, face_material, is_covered, vertex, first, rows, is_asked):  # type: ignore[no-untyped-def]
+    """List rays that see covered materials, material after material, and note the vertices about what they see.
+
+    Args:
+        is_covered: (materials,). first: place of each material's in `rows`, written. (materials + 1,). rows: (rays,)
+    """
     first[:] = 0
     for ray in range(face.shape[0]):
         if face[ray] >= 0:
-            cover = cover_of[face_material[face[ray]]]
-            if cover >= 0:
-                first[cover + 1] += 1
-    for cover in range(first.shape[0] - 1):
-        first[cover + 1] += first[cover]
+            first[face_material[face[ray]] + 1] += is_covered[face_material[face[ray]]]
+    for material in range(is_covered.shape[0]):
+        first[material + 1] += first[material]
     place = first.copy()
     for ray in range(face.shape[0]):
-        if face[ray] >= 0:
-            cover = cover_of[face_material[face[ray]]]
-            if cover >= 0:
-                rows[place[cover]] = ray
-                place[cover] += 1
-                for k in range(3):
-                    is_asked[vertex[ray, k]] = 1
+        if face[ray] >= 0 and is_covered[face_material[face[ray]]]:
+            material = face_material[face[ray]]
+            rows[place[material]] = ray
+            place[material] += 1
+            for k in range(3):
+                is_asked[vertex[ray, k]] = 1
 
 
 # Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
 # which threads share; that was three quarters of the kernel.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _light_in(tangents, vectors, about, shares, x, y, side, turn, blended, out):  # type: ignore[no-untyped-def]
-    """Interpolate the light vectors of three vertices, in a texture's frame. turn, blended: scratch. out: (3 F,)"""
-    for i in range(3 * WIDTH):
-        out[i] = 0
-    a, b, c = about
-    t = row(tangents, a)
-    if min(dot(t, row(tangents, b)), dot(t, row(tangents, c))) > _ALIKE:
-        for i in range(3 * WIDTH):
-            blended[i] = shares[0] * vectors[a, i] + shares[1] * vectors[b, i] + shares[2] * vectors[c, i]
-        turns(dot(t, x), dot(t, y), side, np.float32(1), turn)
-        add_turned(blended, turn, out)
-    else:
-        for q in range(3):
-            t = row(tangents, about[q])
-            turns(dot(t, x), dot(t, y), side, shares[q], turn)
-            for i in range(3 * WIDTH):
-                blended[i] = vectors[about[q], i]
-            add_turned(blended, turn, out)
-
-
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add_texels(weight, step, view, of_view, texel, share, first, out):  # type: ignore[no-untyped-def]
     """Add the numbers of four texels between four sides, in one line: sums stay in registers. out: (24,)"""
@@ -140,18 +117,17 @@ def _under(numbers, axes, light, channel):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _show(  # type: ignore[no-untyped-def]
-    rings, tables, scale, turned, color, is_alone, pixel_angle, surface, normals, hits, directions, vertex, weight,
-    light, emission, eye, rows, start, stop, out,
+    rings, tables, scale, turned, color, pixel_angle, surface, normals, hits, directions, vertex, weight, light, eye,
+    rows, start, stop, out,
 ):  # fmt: skip
     """Show what rays rows[start:stop] see. out: (rays, 3)"""
     face, uv, distance = hits
-    levels, weights, step, means, axes = tables
+    levels, weights, step, axes = tables
     tangents, vectors = light
     view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
     texel, share_of = np.empty(8, np.int32), np.empty(8, np.float32)
     turn, blended = np.empty((4, HALF), np.float32), np.empty(3 * WIDTH, np.float32)
-    arriving, mean = np.empty(3 * WIDTH, np.float32), np.empty(NUMBERS, np.float32)
-    numbers = np.empty(NUMBERS, np.float32)
+    arriving, numbers = np.empty(3 * WIDTH, np.float32), np.empty(NUMBERS, np.float32)
     for index in range(start, stop):
         ray = rows[index]
         about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
@@ -161,75 +137,67 @@ def _show(  # type: ignore[no-untyped-def]
         x, y, side, u, v, footprint = place_of(surface, face[ray], at, distance[ray], d, eye, n, pixel_angle, turned)
         num = texels_about(levels, scale * u, scale * v, scale * footprint, texel, share_of)
         taps(rings, -dot(d, x), -dot(d, y), -dot(d, n), view, of_view)
-        _light_in(tangents, vectors, about, shares, x, y, side, turn, blended, arriving)
-        p, q, r, s = view[0], view[1], view[2], view[3]
+        for i in range(3 * WIDTH):
+            arriving[i] = F(0)
+        a, b, c = about
+        t = row(tangents, a)
+        is_alike = min(dot(t, row(tangents, b)), dot(t, row(tangents, c))) > _ALIKE
+        for q in range(1 if is_alike else 3):  # each turned by itself where frames differ
+            t = row(tangents, about[q])
+            of_a = shares[0] if is_alike or q == 0 else F(0)
+            of_b = shares[1] if is_alike or q == 1 else F(0)
+            of_c = shares[2] if is_alike or q == 2 else F(0)
+            for i in range(3 * WIDTH):
+                blended[i] = of_a * vectors[a, i] + of_b * vectors[b, i] + of_c * vectors[c, i]
+            turns(dot(t, x), dot(t, y), side, F(1), turn)
+            add_turned(blended, turn, arriving)
         for i in range(NUMBERS):
-            numbers[i] = np.float32(0)
-            mean[i] = (
-                of_view[0] * means[p, i]
-                + of_view[1] * means[q, i]
-                + of_view[2] * means[r, i]
-                + of_view[3] * means[s, i]
-            )
+            numbers[i] = F(0)
         for first in range(0, num, 4):
             _add_texels(weights, step, view, of_view, texel, share_of, first, numbers)
         for channel in range(3):
-            of_mean = _under(mean, axes, arriving, channel)
-            ratio = (of_mean + _under(numbers, axes, arriving, channel)) / max(of_mean, _LEAST)
-            ratio = min(max(ratio, np.float32(0)), _MOST)
-            whole = max(out[ray, channel] - emission[channel], np.float32(0))
-            share = np.float32(1)
-            if not is_alone:
-                share = min(max(color[channel] * of_mean, np.float32(0)) / max(whole, _LEAST), np.float32(1))
-            out[ray, channel] += share * (ratio - np.float32(1)) * whole
+            more = color[channel] * _under(numbers, axes, arriving, channel)
+            out[ray, channel] = max(out[ray, channel] + more, F(0))
 
 
 def show_texels(
-    covers: Sequence[Cover],
-    surface: Surface,
-    positions: F32,
-    sight: Sight,
-    arriving: Arrived,
-    emission: F32,
-    out: F32,
+    covers: Sequence[Cover], surface: Surface, positions: F32, sight: Sight, arriving: Arrived, out: F32
 ) -> None:
     """Turn what rays see of the mean of texels into what each texel shows.
 
     Args:
         covers: what covers materials. surface: that is seen. positions: of its corners, metres. (corners, 3) float32
         sight: of the eye. arriving: at its points.
-        emission: radiance of each material's own. (materials, 3) float32
         out: radiance along the rays, written. (rays, 3) float32
     """
     if not covers:
         return
     seen, face = sight.seen, sight.seen.hits.face
-    cover_of = np.full(len(emission), -1, np.int32)
-    cover_of[[cover.material for cover in covers]] = np.arange(len(covers))
-    first, rows = np.empty(len(covers) + 1, np.int64), np.empty(len(face), np.int32)
+    is_covered = np.zeros(1 + max(int(surface.face_material.max()), *(cover.material for cover in covers)), np.uint8)
+    is_covered[[cover.material for cover in covers]] = 1
+    first, rows = np.empty(len(is_covered) + 1, np.int64), np.empty(len(face), np.int32)
     is_asked = np.zeros(len(seen.is_seen), np.uint8)
-    _list(face, surface.face_material, cover_of, seen.vertex, first, rows, is_asked)
+    _list(face, surface.face_material, is_covered, seen.vertex, first, rows, is_asked)
     light = arriving.light.about(surface, arriving.vectors, is_asked)
-    args = [_args_of(cover, surface, positions, sight, light, emission[cover.material]) for cover in covers]
+    spans = [
+        (int(first[cover.material]), int(first[cover.material + 1]), _args_of(cover, surface, positions, sight, light))
+        for cover in covers
+    ]
 
     def show(start: int, stop: int) -> None:
-        for k, of_cover in enumerate(args):
-            begin, end = max(start, int(first[k])), min(stop, int(first[k + 1]))
-            if begin < end:
-                _show(*of_cover, rows, begin, end, out)  # type: ignore[call-arg]
+        for begin, end, args in spans:
+            if max(start, begin) < min(stop, end):
+                _show(*args, rows, max(start, begin), min(stop, end), out)  # type: ignore[call-arg]
 
     for_shares(show, int(first[-1]), _SHARES)
 
 
-def _args_of(
-    cover: Cover, surface: Surface, positions: F32, sight: Sight, light: VertexLight, emission: F32
-) -> tuple[Any, ...]:
+def _args_of(cover: Cover, surface: Surface, positions: F32, sight: Sight, light: VertexLight) -> tuple[Any, ...]:
     texels, seen = cover.texels, sight.seen
     of_surface = (positions, surface.uvs, surface.faces, surface.face_normal, surface.uv_scale)
     turned = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
     return (
-        texels.btf.rings, cover.tables, np.float32(texels.scale), turned, cover.color, cover.is_alone,
-        np.float32(sight.pixel_angle), of_surface, surface.vertices.normal,
-        (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions, seen.vertex, seen.weight, light,
-        emission, sight.eye,
+        texels.btf.rings, cover.tables, np.float32(texels.scale), turned, cover.color, np.float32(sight.pixel_angle),
+        of_surface, surface.vertices.normal, (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions,
+        seen.vertex, seen.weight, light, sight.eye,
     )  # fmt: skip

@@ -40,14 +40,12 @@ class ReliefTables(NamedTuple):
     Attributes:
         levels: of the texels that are here, see `EigenBtf`. (levels, 3) int32
         weight: numbers of each, less the mean's, in steps. (V, texels, 24) int8. step: (V, 24) float32
-        mean: numbers of all texels on the mean. (V, 24) float32
         axes: of colours; orthonormal columns. (3, 3) float32
     """
 
     levels: NDArray[np.int32]
     weight: NDArray[np.int8]
     step: F32
-    mean: F32
     axes: F32
 
 
@@ -56,14 +54,13 @@ class Cover(NamedTuple):
 
     Attributes:
         material: its number. texels: how they lie on it. tables: of it.
-        color: that it is tinted with. (3,) float32. is_alone: whether the material has no other terms.
+        color: that it is tinted with. (3,) float32
     """
 
     material: int
     texels: Texels
     tables: ReliefTables
     color: F32
-    is_alone: bool
 
 
 def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
@@ -78,7 +75,7 @@ def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
             texels = TERMS[term["model"]].settled(term).texels
             if texels is not None:
                 color = np.asarray(term["color"], np.float32)
-                found.append(Cover(index, texels, _tables_of(texels.btf), color, len(terms) == 1))
+                found.append(Cover(index, texels, _tables_of(texels.btf), color))
     return found
 
 
@@ -117,9 +114,7 @@ def _tables_of(whole: EigenBtf) -> ReliefTables:
     axes, levels = _axes_of(whole, mean, integrals), _levels_of(whole)
     texels = int((levels[:, 1] * levels[:, 2]).sum())
     first, weights = int(whole.levels[len(whole.levels) - len(levels), 0]), (num_views, texels, NUMBERS)
-    found = ReliefTables(
-        levels, np.empty(weights, np.int8), np.empty((num_views, NUMBERS), np.float32), in_numbers(mean, axes), axes
-    )
+    found = ReliefTables(levels, np.empty(weights, np.int8), np.empty((num_views, NUMBERS), np.float32), axes)
     cluster, weight = whole.cluster[:, first:], whole.weight[:, first:]
 
     def weigh(start: int, stop: int) -> None:
