@@ -149,7 +149,7 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     args = (surface.lattice, surface.face_normal, hits.face, hits.uv, directions)
     for_shares(lambda start, stop: _find(*args, start, stop, vertex, weight, is_seen), num_rays)
     is_needed = np.zeros(surface.points.num_points, np.uint8)
-    _need(surface.vertices, is_seen, is_needed)
+    need_points(surface.vertices, is_seen, is_needed)
     return Seen(hits, directions, owner, vertex, weight, panes, is_seen, is_needed)
 
 
@@ -165,8 +165,12 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
 
 
 @nb.njit(nogil=True, cache=True)
-def _need(vertices, is_seen, is_needed):  # type: ignore[no-untyped-def]
-    """Note the points that vertices follow from."""
+def need_points(vertices, is_seen, is_needed):  # type: ignore[no-untyped-def]
+    """Note the points that vertices follow from.
+
+    Args:
+        vertices: all. is_seen: those that are asked about. (vertices,) uint8. is_needed: written. (points,) uint8
+    """
     for v in range(is_seen.shape[0]):
         if is_seen[v]:
             for k in range(vertices.point.shape[1]):

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import ladder
+from relume.moving.look_up import need_points
 from relume.moving.points.surface import Surface
 from relume.moving.points.vertices import Vertices
-from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, WIDTH
+from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, OF_ORDER, WIDTH
 from relume.moving.relief.place import cross, dot, row
 from relume.parallel import for_shares
 
@@ -41,56 +42,58 @@ class VertexLight(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def turns(x, y, side, weight, turn):  # type: ignore[no-untyped-def]
-    """Find what turns light vectors.
-
-    Args:
-        x, y: δ as a vector of any length; (0, 0) turns nothing.
-        side: −1 where azimuths run the other way round, else 1. weight: that light counts with.
-        turn: written: what the lanes of cosines and of sines give to those of cosines, then to those of sines.
-            (4, F / 2) float32
-    """
+def turn_by(x, y):  # type: ignore[no-untyped-def]
+    """Find cos mδ and sin mδ for m of 1 to 4, of δ as a vector of any length; (0, 0) turns nothing."""
     square = x * x + y * y
     c1, s1 = np.float32(1), np.float32(0)
     if square > _LEAST:
         scale = np.float32(1) / math.sqrt(square)
         c1, s1 = np.float32(x * scale), np.float32(y * scale)
     c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
-    c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
-    c4, s4 = c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
-    # as `ORDERS` has them
-    turn[0, 0], turn[0, 1], turn[0, 2], turn[0, 3] = c1, c2, np.float32(1), np.float32(1)
-    turn[0, 4], turn[0, 5], turn[0, 6], turn[0, 7] = c1, c3, c2, c4
-    turn[2, 0], turn[2, 1], turn[2, 2], turn[2, 3] = s1, s2, np.float32(0), np.float32(0)
-    turn[2, 4], turn[2, 5], turn[2, 6], turn[2, 7] = s1, s3, s2, s4
-    for i in range(HALF):
-        turn[0, i] *= weight
-        turn[2, i] *= weight
-        turn[1, i], turn[3, i] = -side * turn[2, i], side * turn[0, i]
-    turn[3, 2] = turn[3, 3] = weight  # what no order turns is not mirrored either
+    return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def add_turned(lanes, turn, out):  # type: ignore[no-untyped-def]
+def add_turned(lanes, turn, side, weight, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 
     Args:
-        lanes: of it. (3 F,) float32. turn: from `turns`. out: added to. (3 F,) float32
+        lanes: of it. (3 F,) float32. turn: from `turn_by`. side: −1 where azimuths run the other way round, else 1.
+        weight: that it counts with. out: added to. (3 F,) float32
     """
-    for channel in range(3):
-        low = channel * WIDTH
-        for i in range(HALF):
-            along, across = lanes[low + i], lanes[low + HALF + i]
-            out[low + i] += turn[0, i] * along + turn[1, i] * across
-            out[low + HALF + i] += turn[2, i] * along + turn[3, i] * across
+    c1, s1, c2, s2, c3, s3, c4, s4 = turn
+    for i in range(HALF):
+        # sums over orders, of which each lane has one: what is looked up in arrays that were just written stalls
+        is0, is1, is2, is3, is4 = OF_ORDER[0, i], OF_ORDER[1, i], OF_ORDER[2, i], OF_ORDER[3, i], OF_ORDER[4, i]
+        cosine = weight * (is0 + c1 * is1 + c2 * is2 + c3 * is3 + c4 * is4)
+        sine = weight * (s1 * is1 + s2 * is2 + s3 * is3 + s4 * is4)
+        mirror = is0 + side * (np.float32(1) - is0)  # what no order turns is not mirrored either
+        a, b = lanes[i], mirror * lanes[HALF + i]
+        c, d = lanes[WIDTH + i], mirror * lanes[WIDTH + HALF + i]
+        e, f = lanes[2 * WIDTH + i], mirror * lanes[2 * WIDTH + HALF + i]
+        out[i] += cosine * a - sine * b
+        out[HALF + i] += sine * a + cosine * b
+        out[WIDTH + i] += cosine * c - sine * d
+        out[WIDTH + HALF + i] += sine * c + cosine * d
+        out[2 * WIDTH + i] += cosine * e - sine * f
+        out[2 * WIDTH + HALF + i] += sine * e + cosine * f
+
+
+@nb.njit(nogil=True, cache=True)
+def _lay(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Lay the light vectors of the points that are [start, stop) of rows into lanes. out: (points, 3 F)"""
+    for p in rows[start:stop]:
+        for channel in range(3):
+            for i in range(WIDTH):
+                if i != EMPTY:  # what that lane had at first, nothing, stays
+                    out[p, channel * WIDTH + i] = vectors[p, channel, FUNCTIONS[i]]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spread(vertices, tangents, vectors, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
+def _spread(vertices, tangents, lanes, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
     """Find what arrives about the vertices that are [start, stop) of rows."""
     normal, points, weights = vertices
-    turn, lanes = np.empty((4, HALF), np.float32), np.zeros(3 * WIDTH, np.float32)
-    sums = np.empty(3 * WIDTH, np.float32)
+    of_one, sums = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
     for v in rows[start:stop]:
         heaviest = 0
         for k in range(1, weights.shape[1]):
@@ -104,13 +107,11 @@ def _spread(vertices, tangents, vectors, rows, start, stop, tangent, out):  # ty
         for k in range(weights.shape[1]):
             weight, point = weights[v, k], points[v, k]
             if weight > 0:
-                for channel in range(3):
-                    for i in range(WIDTH):
-                        if i != EMPTY:  # what that lane had at first, nothing, stays
-                            lanes[channel * WIDTH + i] = vectors[point, channel, FUNCTIONS[i]]
                 of_point = row(tangents, point)
-                turns(dot(of_point, t), dot(of_point, b), np.float32(1), weight, turn)
-                add_turned(lanes, turn, sums)
+                turn = turn_by(dot(of_point, t), dot(of_point, b))
+                for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
+                    of_one[i] = lanes[point, i]
+                add_turned(of_one, turn, np.float32(1), weight, sums)
         for i in range(3 * WIDTH):
             out[v, i] = sums[i]
 
@@ -120,7 +121,7 @@ class ReliefLight:
 
     def __init__(self) -> None:
         self._vectors: F32 | None = None
-        self._found, self._is_found = VertexLight(_NOTHING, _NOTHING), np.empty(0, np.uint8)
+        self._lanes, self._found, self._is_found = _NOTHING, VertexLight(_NOTHING, _NOTHING), np.empty(0, np.uint8)
 
     def about(self, surface: Surface, vectors: F32, is_asked: U8) -> VertexLight:
         """Find what arrives about vertices, which is kept as long as the light is.
@@ -132,11 +133,16 @@ class ReliefLight:
         if vectors is not self._vectors:
             if len(self._is_found) != len(is_asked):
                 num = len(is_asked)
+                self._lanes = np.zeros((len(vectors), 3 * WIDTH), np.float32)
                 self._found = VertexLight(np.zeros((num, 3), np.float32), np.zeros((num, 3 * WIDTH), np.float32))
             self._vectors, self._is_found = vectors, np.zeros_like(is_asked)
         rows = np.flatnonzero(is_asked & ~self._is_found)
         if len(rows):
-            args = (surface.vertices, surface.points.tangent, vectors, rows)
+            is_needed = np.zeros(len(vectors), np.uint8)
+            need_points(surface.vertices, is_asked, is_needed)
+            points = np.flatnonzero(is_needed)
+            for_shares(lambda start, stop: _lay(vectors, points, start, stop, self._lanes), len(points))
+            args = (surface.vertices, surface.points.tangent, self._lanes, rows)
             for_shares(lambda start, stop: _spread(*args, start, stop, *self._found), len(rows))
             self._is_found[rows] = 1
         return self._found

@@ -21,8 +21,8 @@ from relume.moving.bumps import unit
 from relume.moving.look_up import Seen
 from relume.moving.pixels import blend
 from relume.moving.points.surface import Surface
-from relume.moving.relief.light import ReliefLight, VertexLight, add_turned, turns
-from relume.moving.relief.numbers import EMPTY, HALF, NUMBERS, WIDTH
+from relume.moving.relief.light import ReliefLight, VertexLight, add_turned, turn_by
+from relume.moving.relief.numbers import EMPTY, NUMBERS, WIDTH
 from relume.moving.relief.place import dot, place_of, row
 from relume.moving.relief.tables import Cover
 from relume.parallel import for_shares
@@ -126,8 +126,8 @@ def _show(  # type: ignore[no-untyped-def]
     tangents, vectors = light
     view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
     texel, share_of = np.empty(8, np.int32), np.empty(8, np.float32)
-    turn, blended = np.empty((4, HALF), np.float32), np.empty(3 * WIDTH, np.float32)
-    arriving, numbers = np.empty(3 * WIDTH, np.float32), np.empty(NUMBERS, np.float32)
+    blended, arriving = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
+    numbers = np.empty(NUMBERS, np.float32)
     for index in range(start, stop):
         ray = rows[index]
         about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
@@ -149,8 +149,7 @@ def _show(  # type: ignore[no-untyped-def]
             of_c = shares[2] if is_alike or q == 2 else F(0)
             for i in range(3 * WIDTH):
                 blended[i] = of_a * vectors[a, i] + of_b * vectors[b, i] + of_c * vectors[c, i]
-            turns(dot(t, x), dot(t, y), side, F(1), turn)
-            add_turned(blended, turn, arriving)
+            add_turned(blended, turn_by(dot(t, x), dot(t, y)), side, F(1), arriving)
         for i in range(NUMBERS):
             numbers[i] = F(0)
         for first in range(0, num, 4):
