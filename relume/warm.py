@@ -1,8 +1,8 @@
 """Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.warm`.
 
 Bakes a thumbnail of the built-in scene, shows each term with each of its curves, and along each parameter that moves
-several, moves local lights and eyes, compares with the truth, looks measured materials up. The compiled kernels lie in
-the cache that `relume.kernel_cache` has chosen; every later process loads them from there.
+several, moves local lights and eyes, covers surfaces with a BTF, compares with the truth, looks measured materials up.
+The compiled kernels lie in the cache that `relume.kernel_cache` has chosen; every later process loads them from there.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from relume.bake import Recipe
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves
+from relume.btf.eigen import EigenBtf
+from relume.btf.rings import rings_of
+from relume.btf.shelf import STORE, keep
 from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
 from relume.measured.lookup import NUM_KNOTS, Part, quotients
@@ -84,7 +87,9 @@ def _try(method: TransferMethod, scene: Scene, folder: Path) -> None:
     transfer: Any = open_bake(bake_here(method, scene, recipe, folder / f"{method.name}.zarr"), Memory(CACHE_BYTES))
     if isinstance(transfer, MovingViews):
         _move_eyes(transfer, MovingPicture(transfer, recipe.views[0], is_watched=True))
+        _cover(transfer, MovingPicture(transfer, recipe.views[0]), folder)
         return
+    _cover(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)), folder)
     _edit_everything(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
     _move_lights(transfer, Picture(transfer, recipe.views[0], Memory(CACHE_BYTES)))
 
@@ -131,6 +136,26 @@ def _move_eyes(transfer: MovingViews, picture: MovingPicture) -> None:
     towards_light(transfer.surface, nothing, all_points)
     for form in ("rgb9e5", "f32"):
         picture.encode(picture.all_tiles(), form)
+
+
+def _cover(transfer: Any, picture: Picture | MovingPicture, folder: Path) -> None:
+    """Show all surfaces covered with a BTF of two texels by two."""
+    source, rings = folder / "btf.txt", rings_of([(0.0, 1), (45.0, 4)])
+    source.write_text("grey")
+    grey = EigenBtf(
+        rings, np.array([[0, 2, 2], [4, 1, 1]], np.int32), np.zeros((5, 5), np.uint8), np.zeros((5, 5, 1), np.int8),
+        np.array([2], np.uint8), np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1, 1, 5, 3), np.int8),
+        np.ones((5, 1, 1), np.float32), np.full((5, 5, 3), 0.1, np.float32),
+        np.zeros((1, 1), np.float32), (0.0, 0.0),
+    )  # fmt: skip
+    with STORE.at(folder / "btfs"):
+        terms = keep(folder / "btfs", source, "Grey", None, lambda: grey).terms()
+        partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
+        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        if isinstance(picture, Picture):
+            _show(picture)
+        else:
+            picture.advance(None)
 
 
 def _compare(scene: Scene) -> None:
