@@ -26,6 +26,7 @@ from server.library.disk import free_bytes
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
+from server.live.rooms.comment_news import CommentNews
 from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.session import SessionServices
@@ -127,7 +128,8 @@ async def open_services(
         queue.start()
     rounds = asyncio.create_task(caretaker.run())
     traces = open_traces() if settings.traces else None
-    rooms = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds)
+    rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
+    news = asyncio.create_task(CommentNews(rooms, comments.marks).run())
     try:
         yield Services(
             settings=settings,
@@ -137,7 +139,7 @@ async def open_services(
             bakes=service,
             looks=LookStore(sessions),
             shares=ShareStore(sessions),
-            comments=CommentStore(sessions),
+            comments=comments,
             **queues._asdict(),
             threads=threads,
             transfers=transfers,
@@ -149,6 +151,7 @@ async def open_services(
         )
     finally:
         rounds.cancel()
+        news.cancel()
         rooms.close()
         ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
         for end in (*ends, *([] if traces is None else [traces.close])):

@@ -6,7 +6,7 @@ import json
 import secrets
 import time
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,6 +53,19 @@ class CommentStore:
         with self._sessions() as session:
             of_scene = select(CommentRow).where(CommentRow.scene == scene)
             return [_comment(row) for row in session.scalars(of_scene.order_by(CommentRow.created, CommentRow.id))]
+
+    def marks(self, scenes: Collection[str]) -> dict[str, tuple[object, ...]]:
+        """Of each of these scenes, what is another one whenever its comments are."""
+        row = CommentRow
+        query = (
+            select(row.scene, func.count(), func.count(row.resolved), func.max(row.created), func.max(row.resolved))
+            .where(row.scene.in_(scenes))
+            .group_by(row.scene)
+        )
+        found: dict[str, tuple[object, ...]] = dict.fromkeys(scenes, ())
+        with self._sessions() as session:
+            found.update({scene: tuple(mark) for scene, *mark in session.execute(query)})
+        return found
 
     def add(self, scene: str, pin: Mapping[str, Any], text: str, author: str, picture: bytes | None) -> Comment:
         """Keep one.

@@ -14,6 +14,7 @@ from problems import problem_of
 from server_fakes import SIZE
 from session_client import Baked, open_session
 
+from server.live.rooms.comment_news import CommentNews
 from server.records import comments
 
 
@@ -115,3 +116,33 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
         assert ann.text("comments") == {"type": "comments"}
         client.delete(f"{path}/{made['id']}")
         ann.text("comments")
+
+
+def test_rooms_are_told_of_what_another_server_took(
+    client: TestClient, baked: Baked, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    services = client.app.state.services  # type: ignore[attr-defined]
+    news = CommentNews(services.live.rooms, services.comments.marks)
+
+    def look() -> None:
+        client.portal.call(news.look)  # type: ignore[union-attr]
+
+    monkeypatch.setattr("server.live.rooms.comment_news.EVERY_S", 1e9)  # the server's own looks once at most
+    told: list[str] = []
+    monkeypatch.setattr(services.live.rooms, "commented", told.append)
+    with open_session(client, baked.bake, query="?room=a") as ann:
+        ann.text("hello")
+        look()
+        other = comments.CommentStore(services.comments._sessions)
+        made = other.add(baked.scene, pin, "There", "Bob", None)
+        look()
+        look()
+        assert told == [baked.scene]
+        other.settle(baked.scene, made.id, "Bob")
+        look()
+        other.settle(baked.scene, made.id, None)
+        look()
+        other.delete(baked.scene, made.id)
+        look()
+        look()
+        assert told == [baked.scene] * 4

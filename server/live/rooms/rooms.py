@@ -44,6 +44,10 @@ class Rooms:
         self._rooms[key] = room
         return Place(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new)
 
+    def scenes(self) -> set[str]:
+        """Ids of the scenes that people work on together."""
+        return {scene for scene, _ in self._rooms}
+
     def commented(self, scene: str) -> None:
         """Tell everybody who works on a scene together that its comments have changed."""
         for (of, _), room in self._rooms.items():

@@ -1,0 +1,47 @@
+"""Comments that other servers took: rooms are told of those, too, a moment later."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Collection, Mapping
+
+from server.live.rooms.rooms import Rooms
+from worker.database.faults import Complaint
+
+log = logging.getLogger(__name__)
+
+EVERY_S = 2.0
+Marks = Mapping[str, object]
+"""By scene, what is another one whenever its comments are."""
+
+
+class CommentNews:
+    """Looks again and again, for as long as the server runs; the database is asked only while there are rooms.
+
+    Args:
+        marks: of some scenes.
+    """
+
+    def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks]) -> None:
+        self._rooms, self._marks = rooms, marks
+        self._known: Marks = {}
+        self._complaint = Complaint(log, "whether there are new comments cannot be told")
+
+    async def run(self) -> None:
+        """Look for ever."""
+        while True:
+            await asyncio.sleep(EVERY_S)
+            try:
+                await self.look()
+                self._complaint.well()
+            except Exception as error:  # the database may be away for a while; the next look must come
+                self._complaint.meet(error)
+
+    async def look(self) -> None:
+        """Tell the rooms of those scenes whose comments have changed since the last look."""
+        scenes = self._rooms.scenes()
+        before, self._known = self._known, await asyncio.to_thread(self._marks, scenes) if scenes else {}
+        for scene, mark in self._known.items():
+            if scene in before and before[scene] != mark:
+                self._rooms.commented(scene)
