@@ -94,9 +94,6 @@ def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
 @pytest.mark.parametrize(
     "nodes",
     [
-        [{"children": [0], "mesh": 0}],
-        [{"children": [1]}, {"children": [0], "mesh": 0}],
-        [{"children": [1, 1]}, {"mesh": 0}],
         [{"children": [7], "mesh": 0}],
         [{"mesh": 0, "matrix": [1e30] * 16}],
         [{"mesh": 3}],
@@ -105,8 +102,23 @@ def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
         [{"mesh": 0}] * 100_001,
     ],
 )
-def test_import_refuses_nodes_that_are_no_tree(nodes: list[dict[str, Any]]) -> None:
+def test_import_refuses_nodes_that_are_nowhere(nodes: list[dict[str, Any]]) -> None:
     refused(changed(nodes=nodes))
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        [{"children": [0], "mesh": 0}],
+        [{"children": [1]}, {"children": [0], "mesh": 0}],
+        [{"children": [1, 1]}, {"mesh": 0}],
+        [{"children": [0] * 50_000, "mesh": 0}],
+    ],
+)
+def test_nodes_that_are_no_tree_appear_once_with_one_warning(nodes: list[dict[str, Any]]) -> None:
+    scene = imported(changed(nodes=nodes))
+    assert len(scene.meshes) == 1
+    assert len([warning for warning in scene.warnings if "reached twice" in warning]) == 1
 
 
 def test_import_refuses_instances_without_end(monkeypatch: pytest.MonkeyPatch) -> None:

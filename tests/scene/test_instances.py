@@ -11,6 +11,7 @@ from glb_builder import QUAD, Glb
 from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.gltf import import_gltf, importer
+from relume.scene.gltf.flattened import cofactors, dimensions
 from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -68,6 +69,43 @@ def test_instances_of_no_size_and_out_of_range_are_left_out_and_said() -> None:
     assert len(scene.meshes) == 1
     assert any("2 of the instances" in str(warning) for warning in scene.warnings)
     assert any("scaled to nothing" in str(warning) for warning in scene.warnings)
+
+
+def test_instances_that_are_flattened_are_what_is_left_of_them() -> None:
+    """By a scale of nothing along what has no extent; and the sides of a box, which fall onto its plane."""
+    scene = imported(instanced(SCALE=[[1, 1, 0], [2, -3, 0]]))
+    assert len(scene.meshes) == 2
+    for mesh, scale in zip(scene.meshes, ([1, 1, 0], [2, -3, 0]), strict=True):
+        np.testing.assert_allclose(mesh.positions, QUAD * scale, atol=1e-6)
+        np.testing.assert_allclose(np.abs(mesh.normals), np.tile([0.0, 0.0, 1.0], (len(QUAD), 1)), atol=1e-6)
+        assert len(mesh.faces) == 2
+    assert [str(warning) for warning in scene.warnings] == ["2 meshes are flattened by their nodes, 'tree' among them"]
+
+
+def test_a_matrix_of_any_rank_sends_normals_across_what_it_makes_of_planes() -> None:
+    rng = np.random.default_rng(3)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    for scales in ([1.0, 2.0, 3.0], [1.0, 2.0, 0.0], [1e-6, 2e-6, 3e-6]):
+        linear = turn * scales
+        assert dimensions(linear) == np.count_nonzero(scales)
+        normal, edges = cofactors(linear) @ [0.2, 0.3, 0.9], linear @ [[0.9, 0], [0, 0.3], [-0.2, -0.1]]
+        assert np.linalg.norm(normal) > 0
+        np.testing.assert_allclose(normal / np.linalg.norm(normal) @ (edges / np.linalg.norm(edges)), 0, atol=1e-9)
+    for scales in ([1.0, 1e-12, 0.0], [0.0, 0.0, 0.0], [1e-20, 1e-20, 1e-20]):
+        assert dimensions(turn * scales) < 2
+
+
+def test_nodes_that_go_round_are_shown_once_and_said() -> None:
+    glb = Glb().quad()
+    glb.document["nodes"][0] |= {"name": "tree", "children": [1], "translation": [1, 0, 0]}
+    glb.document["nodes"].append({"children": [0, 2], "translation": [0, 1, 0]})
+    glb.document["nodes"].append({"children": [2, 1], "mesh": 0})
+    scene = imported(glb)
+    assert len(scene.meshes) == 2
+    np.testing.assert_allclose(scene.meshes[1].positions, QUAD + np.array([1, 1, 0]), atol=1e-6)
+    told = sorted(str(warning) for warning in scene.warnings)
+    assert [warning.split(" is ")[0] for warning in told] == ["node 0 ('tree')", "node 1 ('')", "node 2 ('')"]
+    assert all("reached twice" in warning for warning in told)
 
 
 @pytest.mark.parametrize("extension", [[], {"attributes": 3}, {"attributes": {"TRANSLATION": -1}}, {}])

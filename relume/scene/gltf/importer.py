@@ -20,6 +20,7 @@ from relume.scene.gltf.cameras import framing_camera, rigid, slug
 from relume.scene.gltf.container import READ_EXTENSIONS, Container, read_container
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import Node, Primitive
+from relume.scene.gltf.flattened import cofactors, dimensions, plane_normal, with_area
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.instances import instances_of
@@ -76,6 +77,7 @@ class _Reading:
         self._geometry: dict[tuple[int, int], Geometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
         self._mesh_names: dict[str, int] = {}
+        self._flattened: list[str] = []
         self._camera_names: dict[str, int] = {}
         self._places_left, self._corners_left = MAX_PLACED, MAX_CORNERS
         self._triangles_left, self._vertices_left = MAX_TRIANGLES, MAX_VERTICES
@@ -83,8 +85,11 @@ class _Reading:
         self.meshes: list[Mesh] = []
         self.cameras: list[Camera] = []
         self._warn_of_the_rest()
-        for node, to_world in placed_nodes(self._document):
+        for node, to_world in placed_nodes(self._document, self.warnings):
             self._place(node, to_world)
+        if self._flattened:
+            num, first = len(self._flattened), self._flattened[0]
+            self.warnings.append(simplified(f"{num:,} meshes are flattened by their nodes, {first!r} among them"))
         if len(self.meshes) > _MANY:
             self.meshes = joined(self.meshes)
         if not self.meshes:
@@ -133,7 +138,10 @@ class _Reading:
         if min(self._triangles_left, self._vertices_left) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
         material = self._material(primitive)
+        is_flat = dimensions(to_world[:3, :3]) == 2
         placed = _placed(geometry, self.materials[material], to_world, name, material)
+        if placed is not None and is_flat:
+            self._flattened.append(name)
         if placed is None:
             self.warnings.append(wrong(f"mesh {name!r} is scaled to nothing or out of range; it is left out"))
         else:
@@ -190,12 +198,18 @@ class _Reading:
 def _placed(geometry: Geometry, understood: Understood, to_world: F64, name: str, material: int) -> Mesh | None:
     """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
     linear = to_world[:3, :3]
-    determinant = float(np.linalg.det(linear))
     positions = geometry.positions @ linear.T + to_world[:3, 3]
-    if abs(determinant) < 1e-30 or np.abs(positions).max() > MAX_COORDINATE:
+    num_dimensions = dimensions(linear)
+    if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
         return None
+    determinant = float(np.linalg.det(linear)) if num_dimensions == 3 else 1.0
     faces = geometry.faces if determinant > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
-    normals = _unit(geometry.normals @ np.linalg.inv(linear))
+    normals = _unit(geometry.normals @ (np.sign(determinant) * cofactors(linear)).T)
+    if num_dimensions == 2:
+        faces = with_area(positions, faces)
+        normals = np.where(normals.any(axis=1, keepdims=True), normals, plane_normal(linear))
+        if not len(faces):
+            return None
     tangents = np.zeros((len(positions), 4))
     tangents[:, :3] = _unit(geometry.tangents[:, :3] @ linear.T)
     tangents[:, 3] = geometry.tangents[:, 3] * np.sign(determinant)

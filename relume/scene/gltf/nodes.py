@@ -11,27 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
+from relume.remarks import Remark, wrong
 from relume.scene.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]
 MAX_DEPTH = 64
 MAX_NODES = 100_000
+_MOST_TOLD = 20  # nodes that a warning is given for
 
 
-def placed_nodes(document: Document) -> Iterator[tuple[Node, F64]]:
+def placed_nodes(document: Document, warnings: list[Remark]) -> Iterator[tuple[Node, F64]]:
     """Every node of the default scene (of all root nodes where no scene is given) with its transform to world (4, 4).
 
+    A node that is reached again, by another parent or as its own ancestor, is shown at the first place alone.
+
+    Args:
+        document: of the file. warnings: gets a sentence for each such node.
+
     Raises:
-        SceneError: a node is its own ancestor, has two parents, does not exist, or lies too deep.
+        SceneError: a node does not exist, lies too deep, or is out of range.
     """
-    seen: set[int] = set()
+    seen, told = set[int](), set[int]()
     stack = [(index, np.eye(4), 1) for index in reversed(_roots(document))]
     while stack:
         index, parent, depth = stack.pop()
         if index >= len(document.nodes):
             raise SceneError(f"node {index} does not exist, there are {len(document.nodes)}; export the scene again")
         if index in seen:
-            raise SceneError(f"node {index} is reached twice; nodes must form a tree, export the scene again")
+            if index not in told and len(told) < _MOST_TOLD:
+                name = document.nodes[index].name[:60]
+                warnings.append(wrong(f"node {index} ({name!r}) is reached twice, which no tree has; it appears once"))
+            told.add(index)
+            continue
         if depth > MAX_DEPTH:
             raise SceneError(f"nodes are nested more than {MAX_DEPTH} deep; flatten the scene")
         seen.add(index)

@@ -1,0 +1,37 @@
+"""Meshes whose transform flattens them: shown as what is left of them, a piece of a plane with two sides."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+U32 = NDArray[np.uint32]
+
+_FLAT = 1e-9  # of the largest of a transform's three scales, below which another is none
+_NOTHING = 1e-15  # of the largest, metres a metre
+
+
+def dimensions(linear: F64) -> int:
+    """How many dimensions a transform leaves of three. linear: (3, 3)"""
+    scales = np.linalg.svd(linear, compute_uv=False)
+    return int(np.count_nonzero(scales > max(_FLAT * float(scales[0]), _NOTHING)))
+
+
+def cofactors(linear: F64) -> F64:
+    """What normals are multiplied by: the inverse transposed times the determinant, which flat ones have too. (3, 3)"""
+    rows = linear
+    return np.stack([np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])])
+
+
+def with_area(positions: F64, faces: U32) -> U32:
+    """The faces that have an area left. positions: (n, 3) faces: (f, 3)"""
+    a, b, c = positions[faces].transpose(1, 0, 2)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.square(np.stack([b - a, c - b, a - c])).sum(axis=2).max(axis=0)
+    return np.ascontiguousarray(faces[doubled > _FLAT * np.maximum(longest, 1e-300)])
+
+
+def plane_normal(linear: F64) -> F64:
+    """The unit normal of the plane that a transform of two dimensions leaves. linear: (3, 3) Returns: (3,)"""
+    return np.asarray(np.linalg.svd(linear)[0][:, 2])
