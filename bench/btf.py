@@ -1,45 +1,31 @@
-"""btf.*: how well BTFs are kept, how near they are to what they stand for, how quickly they are shown.
+"""btf.compression_*: how well BTFs are kept.
 
 `btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is a fiftieth of a byte
-for each channel of each image; the worst of the three synthetic BTFs. `points` of the context is the curve: ratio and
-error of what was kept for three bounds, with fewer and fewer of its components; between the best of them, logarithms
-are linear. The norm: √Σ(kept − made)² ÷ √Σ made²; `of_range` divides by √mean square of the brightest thousandth
-instead, as errors of 8-bit images are often told; `delta_e` is the mean colour difference (CIE 1976) of texels in full
-light at that ratio.
+for each channel of each image; the worst of the three synthetic BTFs. `curve` of the context: ratio and error of what
+was kept for three bounds, with fewer and fewer of its components; between the best of them, logarithms are linear. In
+brackets is what the ideal coder of as many bytes misses, whose tables cost nothing. The norm:
+√Σ(kept − made)² ÷ √Σ made²; `of_range` divides by √mean square of the brightest thousandth instead, as errors of 8-bit
+images are often told; `delta_e` is the mean colour difference (CIE 1976) of texels in full light at that ratio.
 `btf.compression_ratio`: at an error of 5 %. `btf.compression_s`: what the slowest of the three takes to 5 %.
-
-`btf.geometry_rmse`: a plane that is covered with the woven BTF, under a sky, against Mitsuba's paths through the real
-small geometry on the same place, seen from between the directions that the BTF was made for. Its noise is taken off.
-`btf.table_rmse`: the same plane's view samples against sums over all values before compression.
-
-`btf.view_fps`, `btf.light_ms`: the still life at 400×400, every surface covered with the weave: frames while the eye
-moves, and from a turned environment to the frame, all bounces, followed roughly.
 """
 
 from __future__ import annotations
 
-import tempfile
 import time
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.btf_pictures import against_geometry, against_table
+from bench.btf_made import Made, kept_folder
 from bench.figure import Figure
-from bench.moving_scene import MovingScene, rotated
-from relume.btf.compress import compress
 from relume.btf.eigen import EigenBtf
-from relume.btf.rings import ubo_rings
-from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.values import Values
 from relume.synthetic.make import GEOMETRIES
-from relume.synthetic.render import SmallGeometry
 
 _BOUNDS = (0.05, 0.1, 0.2)
-_FINE = 0.02  # of what is compared with all values
 _AT_RATIO, _AT_ERROR = 50.0, 0.05
+_RATIOS = (12.5, 25.0, _AT_RATIO, 100.0, 150.0)  # that the curve is told at, beside the ideal coder's
 _SOME_TEXELS = 200
 _TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])  # ITU-R BT.709-6
 
@@ -51,6 +37,7 @@ class _Curve(NamedTuple):
     seconds: float
     of_range: float
     delta_e: float
+    least: list[float]
 
     @property
     def _best(self) -> NDArray[np.float64]:
@@ -62,9 +49,14 @@ class _Curve(NamedTuple):
         return np.asarray(np.log(best[::-1]).T)
 
     @property
-    def error(self) -> float:
+    def errors(self) -> list[float]:
+        """At each of `_RATIOS`; beyond what was tried the last of it."""
         ratio, error = self._best
-        return float(np.exp(np.interp(np.log(_AT_RATIO), ratio, error)))
+        return [float(one) for one in np.exp(np.interp(np.log(_RATIOS), ratio, error))]
+
+    @property
+    def error(self) -> float:
+        return self.errors[_RATIOS.index(_AT_RATIO)]
 
     @property
     def ratio(self) -> float:
@@ -73,47 +65,28 @@ class _Curve(NamedTuple):
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make the three, compress each for some bounds, and compare and show the first."""
-    size, grid = (8, 1) if tiny else (128, 2)
-    with tempfile.TemporaryDirectory() as folder:
-        at = Path(folder)
-        made = {name: _made(name, at / name, size, grid) for name in GEOMETRIES}
-        curves = {name: _curve(values) for name, values in made.items()}
-        context = {"texels": f"{size}×{size}", "places_a_texel": grid**2, "curves": _told(curves)}
-        with STORE.at(at / "btfs"):
-            record = _kept(at, made["weave"], _BOUNDS[0])
-            return [
-                Figure("btf.compression_error", 100 * max(one.error for one in curves.values()), "%", context),
-                Figure("btf.compression_ratio", min(one.ratio for one in curves.values()), "× smaller", context),
-                Figure("btf.compression_s", max(one.seconds for one in curves.values()), "s", context),
-                against_geometry(record, at, tiny),
-                against_table(_kept(at, made["weave"], _FINE), made["weave"], at, tiny),
-                *_shown(record, at, tiny),
-            ]
+    """Make the three, and compress each for some bounds."""
+    with kept_folder(tiny) as kept:
+        made = {name: Made(name, kept, tiny) for name in GEOMETRIES}
+        curves = {name: _curve(one) for name, one in made.items()}
+    first = made["weave"]
+    context = {
+        "texels": "×".join(map(str, first.values.size)),
+        "places_a_texel": first.grid**2,
+        "curves": _told(curves),
+    }
+    return [
+        Figure("btf.compression_error", 100 * max(one.error for one in curves.values()), "%", context),
+        Figure("btf.compression_ratio", min(one.ratio for one in curves.values()), "× smaller", context),
+        Figure("btf.compression_s", max(one.seconds for one in curves.values()), "s", context),
+    ]
 
 
-def _made(name: str, folder: Path, size: int, grid: int) -> Values:
-    values = Values(folder, ubo_rings(), (size, size))
-    small = SmallGeometry(GEOMETRIES[name](), ubo_rings(), (size, size), grid, 1)
-    values.fill(small.seen_from, lambda share: None, lambda: False)
-    return values
-
-
-def _compressed(values: Values, bound: float) -> EigenBtf:
-    return compress(values, bound, lambda share: None, lambda: False)
-
-
-def _kept(folder: Path, values: Values, bound: float) -> BtfRecord:
-    source = folder / "weave.json"
-    source.write_text(str(bound))
-    return keep(folder / "btfs", source, "Weave", "weave", lambda: _compressed(values, bound))
-
-
-def _curve(values: Values) -> _Curve:
-    points, began, seconds = [], time.perf_counter(), 0.0
+def _curve(made: Made) -> _Curve:
+    points, began, seconds, values = [], time.perf_counter(), 0.0, made.values
     smallest: tuple[float, EigenBtf] | None = None
     for bound in _BOUNDS:
-        whole = _compressed(values, bound)
+        whole = made.compressed(bound)
         seconds = seconds or time.perf_counter() - began
         for num in range(whole.num_components + 1):
             fewer = whole.with_components(num)
@@ -124,7 +97,28 @@ def _curve(values: Values) -> _Curve:
     sample = np.concatenate([values.seen_from(view).ravel()[::7] for view in range(0, 81, 8)]).astype(np.float64)
     brightest = np.sort(sample)[-max(1, len(sample) // 1000) :]
     to_range = float(np.sqrt(np.mean(sample**2)) / np.sqrt(np.mean(brightest**2)))
-    return _Curve(points, seconds, to_range, float("nan") if smallest is None else _delta_e(values, smallest[1]))
+    delta_e = float("nan") if smallest is None else _delta_e(values, smallest[1])
+    return _Curve(points, seconds, to_range, delta_e, _least(values))
+
+
+def _least(values: Values) -> list[float]:
+    """What the ideal coder of as many bits misses, relative RMS, at each of `_RATIOS`: reverse water-filling.
+
+    Of independent Gaussian components of variances λ, R bits a texel leave Σ min(λ, θ) with R = Σ max(0, ½ log₂ λ/θ).
+    Components are the best of each view, bits go to whichever view they tell most of, tables cost nothing.
+    """
+    energy, found = 0.0, []
+    for view in range(values.rings.num_directions):
+        rows = values.seen_from(view).transpose(1, 0, 2).reshape(values.size[0] * values.size[1], -1)
+        energy += float(np.einsum("ij,ij->", rows, rows, dtype=np.float64))
+        away = rows - rows.mean(axis=0)
+        found.append(np.linalg.eigvalsh((away.T @ away).astype(np.float64)))
+    variance = np.maximum(np.concatenate(found), 1e-12 * energy)
+    level = np.geomspace(variance.min(), variance.max(), 4000)
+    bits = np.array([0.5 * np.log2(np.maximum(variance / one, 1)).sum() for one in level])
+    missed = np.array([np.minimum(variance, one).sum() for one in level])
+    wanted = 8 * 3 * values.rings.num_directions**2 / np.array(_RATIOS)  # bits of all views of a texel
+    return [float(one) for one in np.sqrt(np.interp(wanted, bits[::-1], missed[::-1]) / energy)]
 
 
 def _delta_e(values: Values, kept: EigenBtf) -> float:
@@ -145,29 +139,12 @@ def _lab(values: NDArray[Any]) -> NDArray[np.float64]:
 def _told(curves: dict[str, _Curve]) -> dict[str, Any]:
     return {
         name: {
-            "points": [f"1:{ratio:.0f} {error:.1%}" for ratio, error in sorted(one.points)],
+            "curve": [
+                f"1:{ratio:g} {error:.1%} ({least:.1%})"
+                for ratio, error, least in zip(_RATIOS, one.errors, one.least, strict=True)
+            ],
             "of_range": one.error * one.of_range,
             "delta_e": one.delta_e,
         }
         for name, one in curves.items()
     }
-
-
-def _shown(record: BtfRecord, folder: Path, tiny: bool) -> list[Figure]:
-    still = MovingScene("interior" if tiny else "still_life", folder, (40, 40) if tiny else (400, 400), tiny)
-
-    def covered(document: dict[str, Any]) -> None:
-        for material in document["materials"].values():
-            material["terms"] = [{**record.terms()[0], "params": {"scale": 4.0}}]
-
-    def turned(document: dict[str, Any], share: float) -> None:
-        covered(document)
-        rotated(document, share)
-
-    frames = 3 if tiny else 40
-    eye, light = still.eye_s(frames, covered), still.edits(frames, turned, is_watched=True)
-    context = {"size": "400×400", "points": still.num_points, "every_surface": "woven"}
-    return [
-        Figure("btf.view_fps", 1 / float(np.median(eye)), "frames/s", context),
-        Figure("btf.light_ms", 1e3 * light.median_s, "ms", {**context, **light.said(), "bounces": "all"}),
-    ]

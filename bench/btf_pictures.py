@@ -52,12 +52,11 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     errors = []
     for k, (theta, phi) in enumerate(_EYE):
         plane, real = _scenes(tile, theta, phi)
-        opened, look = _covered(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
+        opened, look = covered(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
         ours = render_image(opened, "eye", look)[..., :3]
         to = folder / f"peer{k}"
         to.mkdir()
-        integrator = {"type": "path", "max_depth": 8, "rr_depth": 8}
-        job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(tile.terms)], "integrator": integrator}
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(tile.terms)], "integrator": depth_of_paths()}
         render(real, size, job, to)
         theirs = passes_of(to)
         errors.append(over_passes(ours.astype(np.float64), theirs))
@@ -70,8 +69,17 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     return Figure(name, 100 * worst.error.value, "%", context, 100 * worst.error.standard_error)
 
 
-def _covered(plane: Scene, record: BtfRecord, size: tuple[int, int], path: Path, lights: int) -> tuple[Any, Look]:
-    """A fixed view of a plane, opened, and the look that covers it."""
+def depth_of_paths() -> dict[str, Any]:
+    """The peer's integrator: paths of up to seven bounces."""
+    return {"type": "path", "max_depth": 8, "rr_depth": 8}
+
+
+def covered(plane: Scene, record: BtfRecord, size: tuple[int, int], path: Path, lights: int) -> tuple[Any, Look]:
+    """A fixed view of one material's surface, opened, and the look that covers it.
+
+    Args:
+        plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: triangles of the sky.
+    """
     opened = open_bake(
         bake_here(METHODS["direct"], plane, Recipe("direct", ("eye",), size, lights), path), Memory(2 << 30)
     )
@@ -89,7 +97,7 @@ def against_table(record: BtfRecord, values: Values, folder: Path, tiny: bool) -
     """
     plane, _ = _scenes(GEOMETRIES["weave"](), *_EYE[0])
     size = (12, 12) if tiny else (96, 96)
-    opened, look = _covered(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
+    opened, look = covered(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
     view = opened.views["eye"]
     light = light_of(look, opened.material_names, has_bounces=False)
     lights, receivers = opened.arriving(view, 0, light, opened.memory)

@@ -108,6 +108,7 @@ def document_of(name: str) -> str:
                 "btf.compression_error",
                 "btf.compression_ratio",
                 "btf.geometry",
+                "btf.sphere",
                 "btf.table",
             )
         )

@@ -30,8 +30,8 @@ LONG = [
     "bench.gather_error", "bench.gather_full", "bench.gather_scenes", "bench.peer_gather", "bench.lights",
     "bench.memory", "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather",
     "bench.gather_follow", "bench.glass", "bench.rough", "bench.mirror", "bench.surface", "bench.surface_edits",
-    "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.load", "bench.refusal",
-    "bench.surface_live", "bench.surface_points",
+    "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.btf_true", "bench.btf_shown", "bench.load",
+    "bench.refusal", "bench.surface_live", "bench.surface_points",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = (
@@ -48,6 +48,8 @@ ESTIMATES = (
     "peer.",
     "surface.rmse_",
     "surface.points_rmse",
+    "btf.geometry_rmse",
+    "btf.sphere_rmse",
 )
 
 
