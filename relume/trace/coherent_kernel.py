@@ -31,6 +31,8 @@ _ENOUGH = LANES * 3 // 4  # rays to one light from which on they do not wait for
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 # of the predicted bits, one in this many is traced all the same; a power of two from the size of a quarter up
 _CHECK_EVERY = 128
+# times eight bytes of one bit each: those bits in the highest byte, the first lowest; and the sum of eight bytes there
+_GATHERED, _EACH_BYTE = np.uint64(0x0102040810204080), np.uint64(0x0101010101010101)
 _HASH = 2_654_435_761  # Knuth's multiplicative hash: 2^32 divided by the golden ratio
 
 
@@ -118,17 +120,24 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
 @nb.njit(nogil=True, cache=True)
 def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     """Find the lights above each sample's horizon. Returns the number of pairs."""
-    count = 0
+    by_axis = np.zeros((3, BLOCK), np.float32)  # samples that are not there face nothing
+    by_axis[:, : normals.shape[0]] = normals.T
+    nx, ny, nz = by_axis[0], by_axis[1], by_axis[2]
+    is_above = np.empty(BLOCK, np.uint8)
+    eights = is_above.view(np.uint64)
+    count = np.uint64(0)
     for light in range(directions.shape[0]):
         x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
-        facing = np.uint64(0)
-        for k in range(normals.shape[0]):
-            if normals[k, 0] * x + normals[k, 1] * y + normals[k, 2] * z > 0:
-                facing |= np.uint64(1) << np.uint64(k)
-                count += 1
+        for k in range(BLOCK):
+            is_above[k] = nx[k] * x + ny[k] * y + nz[k] * z > 0
+        facing, in_bytes = np.uint64(0), np.uint64(0)
+        for eight in range(BLOCK // 8):
+            in_bytes += eights[eight]
+            facing |= (eights[eight] * _GATHERED >> np.uint64(56)) << np.uint64(8 * eight)
+        count += in_bytes * _EACH_BYTE >> np.uint64(56)
         block.facing[light] = facing
         block.known[light] = block.seen[light] = 0
-    return count
+    return np.int64(count)
 
 
 @nb.njit(nogil=True, cache=True)
@@ -283,14 +292,34 @@ def _keep(block, region, level):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
+def _turn_over(words):  # type: ignore[no-untyped-def]
+    """Let bit j of word k become bit k of word j: halves of the square change places, then halves of those. (64,)"""
+    size, low = 32, np.uint64(0xFFFFFFFF)
+    while size:
+        for k in range(64):
+            if not k & size:
+                changed = (words[k] >> np.uint64(size) ^ words[k + size]) & low
+                words[k] ^= changed << np.uint64(size)
+                words[k + size] ^= changed
+        size >>= 1
+        low ^= low << np.uint64(size)
+
+
+@nb.njit(nogil=True, cache=True)
 def _write(block, bits):  # type: ignore[no-untyped-def]
     """Turn words of samples, one for each light, into bytes of lights, one row for each sample."""
+    words = np.empty(64, np.uint64)
+    in_bytes = words.view(np.uint8)
     num_lights = block.seen.shape[0]
-    for byte in range(bits.shape[1]):
-        for light in range(8 * byte, min(8 * byte + 8, num_lights)):
-            seen = block.seen[light]
-            for k in range(bits.shape[0]):
-                bits[k, byte] |= np.uint8((seen >> np.uint64(k)) & np.uint64(1)) << np.uint8(light & 7)
+    for first in range(0, num_lights, 64):
+        num = min(64, num_lights - first)
+        words[:num] = block.seen[first : first + num]
+        words[num:] = 0
+        _turn_over(words)
+        begin, num_bytes = first >> 3, (num + 7) >> 3
+        for k in range(bits.shape[0]):
+            for byte in range(num_bytes):
+                bits[k, begin + byte] = in_bytes[8 * k + byte]
 
 
 @nb.njit(nogil=True, cache=True)
