@@ -16,6 +16,7 @@ from relume.project.eight_bands import NUM as EIGHT
 F32 = NDArray[np.float32]
 
 _NOTHING = 1e-9
+_LEAST_STEP = 1e-30  # of a curve; with numbers near the smallest float32 a processor is several times slower
 _FLAT = 1e-12  # band averages of a constant differ by rounding
 
 
@@ -78,6 +79,7 @@ class Contraction:
             values = bands[:, :num][:, ::-1]
             varies = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
             of_curve[:, :num] = np.stack([values, values.cumsum(axis=1), varies.cumsum(axis=1)], axis=2)[:, ::-1]
+        steps[np.abs(steps) < _LEAST_STEP] = 0
         return WholeCurves(self.kinds, steps, self.num_rows, self.num_bands)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.angles import ALPHA, BETA, THETA_H, TILT_X, TILT_Y
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
@@ -14,6 +15,28 @@ from relume.project.receivers import Receivers
 F32 = NDArray[np.float32]
 
 POINTS_A_BLOCK = 48  # directions of a block stay in a core's second-level cache
+
+_HALF_PI = np.float32(np.pi / 2)
+
+
+def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.int64], F32]:
+    """Bound the half angle where only two other angles of the half vector are bounded: `nearest_into` knows it alone.
+
+    cos θh = cos α cos β, and tan² θh = tan² x + tan² y of the two tilts.
+
+    Args:
+        kinds: angles of the curves. support: radians beyond which each is nothing. (C,) float32
+    Returns:
+        Both, with one more angle where there is such a bound. (C or C + 1,)
+    """
+    limit = {int(kind): float(angle) for kind, angle in zip(kinds, support, strict=True) if angle < _HALF_PI}
+    if ALPHA in limit and BETA in limit:
+        bound = np.arccos(np.cos(limit[ALPHA]) * np.cos(limit[BETA]))
+    elif TILT_X in limit and TILT_Y in limit:
+        bound = np.arctan(np.hypot(np.tan(limit[TILT_X]), np.tan(limit[TILT_Y])))
+    else:
+        return kinds, support
+    return np.append(kinds, THETA_H), np.append(support, np.float32(bound))
 
 
 class ListedLights:
@@ -30,10 +53,10 @@ class ListedLights:
     """
 
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
-        self._term, self._contraction, self._lights, self._receivers = term, contraction, lights, receivers
+        self._term, self._lights, self._receivers = term, lights, receivers
         self.irradiance = lights.irradiance * contraction.constant
-        # radians
-        self._support = contraction.support * np.float32(np.pi / 2) / contraction.num_bands.astype(np.float32)
+        radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
+        self._kinds, self._support = with_half_angle(contraction.kinds, radians)
         capacity = POINTS_A_BLOCK * lights.num_lights
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
         self.light = np.empty(capacity + 1, np.int32)
@@ -47,7 +70,7 @@ class ListedLights:
         """
         r, lights = self._receivers, self._lights
         num = list_lights(
-            r.normal, r.tangent, r.wo, r.visible, lights.direction, lights.radius, self._contraction.kinds,
+            r.normal, r.tangent, r.wo, r.visible, lights.direction, lights.radius, self._kinds,
             self._support, start, stop, self.first, self.light, self._wi, self._wo,
         )  # fmt: skip
         wi, wo = self._wi[:, :num], self._wo[:, :num]

@@ -11,6 +11,7 @@ from relume.brdf.evaluate import angles_numpy
 from relume.brdf.term import Angle
 from relume.light.triangles import subdivide
 from relume.project.light_culling import list_lights, nearest_into
+from relume.project.listed_lights import with_half_angle
 
 RNG = np.random.default_rng(9)
 
@@ -77,3 +78,17 @@ def test_list_holds_the_seen_lights_in_order(support):
         nearest = angles_numpy(Angle.THETA_H, corners @ frame.T, local_wo).min(axis=1)
         assert set(np.nonzero(seen[row] & (nearest <= support))[0]) <= set(listed)
     assert (num == seen.sum()) == np.isinf(support)
+
+
+@pytest.mark.parametrize("pair", [(Angle.ALPHA, Angle.BETA), (Angle.TILT_X, Angle.TILT_Y)])
+def test_two_angles_of_the_half_vector_bound_the_third(pair):
+    wi, wo = twins.unit(RNG.normal((0, 0, 1), 1, size=(20_000, 3))), twins.unit(np.array([0.3, -0.4, 0.8]))
+    one, other, half = (angles_numpy(angle, wi, wo) for angle in (*pair, Angle.THETA_H))
+    given = np.array([Angle.THETA_D, *pair], np.int64)
+    kinds, support = with_half_angle(given, np.array([1.6, 0.5, 0.2], np.float32))
+    assert list(kinds) == [*given, Angle.THETA_H]
+    reached = half[(one <= 0.5) & (other <= 0.2)]
+    assert reached.max() <= support[-1] + 1e-3
+    assert reached.max() > 0.9 * support[-1]  # no closer bound is wanted
+    kinds, _ = with_half_angle(given, np.array([1.6, np.inf, 0.2], np.float32))
+    assert list(kinds) == list(given)  # the free curve may become anything
