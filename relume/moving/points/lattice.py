@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.errors import PlanError
-from relume.moving.points.vertices import Nodes, Vertices, find_vertices, shared_points
+from relume.moving.points.vertices import Nodes, Vertices, find_vertices, num_shared, shared_points
 from relume.points import Points
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
@@ -120,17 +120,22 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
     while is_too_fine(spacing) and spacing < longest.max():
         spacing *= _COARSER
     normals, piece = geometry.face_normals, pieces_of(geometry)
+    rows, alike = _rows(longest, spacing), _ALIKE
+    lattice, nodes = _grids(geometry, normals, piece, is_open, rows, spacing * coarse)
     for trial in range(_MOST_TRIALS):
-        lattice, nodes = _grids(geometry, normals, piece, is_open, _rows(longest, spacing), spacing * coarse)
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
-        chosen = shared_points(nodes, alike)
-        ratio = len(chosen) / num_points
+        ratio = num_shared(nodes, alike) / num_points
         if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
             break
         finer = spacing * math.sqrt(ratio) * (1 if trial < _TRIALS else _COARSER)
         if ratio < 1 and is_too_fine(finer):
             break
-        spacing = min(finer, _WIDEST * float(longest.max()))
+        before, spacing = spacing, min(finer, _WIDEST * float(longest.max()))
+        if np.array_equal(rows, wanted := _rows(longest, spacing)):  # finer than points are dense: corners alone
+            nodes = nodes._replace(spacing=nodes.spacing * (spacing / before))
+        else:
+            rows, (lattice, nodes) = wanted, _grids(geometry, normals, piece, is_open, wanted, spacing * coarse)
+    chosen = shared_points(nodes, alike)
     vertices, vertex = find_vertices(nodes, chosen)
     kept = nodes.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)

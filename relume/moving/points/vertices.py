@@ -7,12 +7,15 @@ corner that is a point itself takes its own.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from relume.parallel import for_shares
 from relume.points import Points
 
 F32 = NDArray[np.float32]
@@ -25,6 +28,7 @@ _SAME_WAY = 50  # steps of a unit normal's components, within which vertices loo
 _TURN = 1.5  # spacings that a turn of the normal by a radian is worth
 _PLACE_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
 _U64 = np.uint64
+_MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F], np.uint64)  # odd
 _APART = 1e3  # spacings between materials, and between sides
 _ELSEWHERE = 4.0  # that a surface which does not hang together with another is farther away than it is
 
@@ -68,6 +72,19 @@ def shared_points(nodes: Nodes, alike: int) -> NDArray[np.intp]:
     return chosen
 
 
+def num_shared(nodes: Nodes, alike: int) -> int:
+    """How many `shared_points` finds, for whoever tries several spacings.
+
+    Args:
+        nodes: of all grids; their keys are mixed to one number each, which few that differ share by chance.
+        alike: as of `shared_points`.
+    """
+    where, what = _keys(nodes, _TOGETHER, alike)
+    mixed = (where ^ where >> _U64(31)) * _MIX[0] ^ (what ^ what >> _U64(29)) * _MIX[1]
+    mixed.sort()
+    return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
+
+
 def find_vertices(nodes: Nodes, chosen: NDArray[np.intp]) -> tuple[Vertices, NDArray[np.uint32]]:
     """Find the vertices that nodes are, and how they follow from points.
 
@@ -105,18 +122,62 @@ def _features(nodes: Nodes) -> F64:
     return np.column_stack([place, _TURN * nodes.points.normal, apart, elsewhere[nodes.piece]])
 
 
-def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
-    points = nodes.points
-    corner, extent = points.position.min(axis=0), max(float(np.ptp(points.position, axis=0).max()), 1e-30)
+def _extent(points: Points) -> tuple[F32, float]:
+    """The least corner of what holds all nodes, (3,), and its longest side."""
+    position = points.position
+    return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
+
+
+@nb.njit(nogil=True, cache=True)
+def _key(points, material, side, level, size, corner, alike, start, stop, where, what):  # type: ignore[no-untyped-def]
+    """Find the keys of nodes [start, stop). size: of the boxes in which they lie together. (n,) float64"""
+    position, normal = points
+    base = 2 * alike + 1
+    for i in range(start, stop):
+        place, way = np.uint64(0), np.int64(0)
+        for axis in range(3):
+            box = np.uint64(math.floor(np.float64(position[i, axis] - corner[axis]) / size[i]))
+            place = (place << np.uint64(_PLACE_BITS)) | box
+            way = way * base + np.int64(np.rint(normal[i, axis] * np.float32(alike))) + alike
+        where[i] = place
+        what[i] = (np.uint64(2 * way + side[i]) << np.uint64(24)) | (level[i] << np.uint64(16)) | np.uint64(material[i])
+
+
+def _keys(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Two numbers that nodes have alike which lie together. (n,) uint64 each"""
+    points, (corner, extent) = nodes.points, _extent(nodes.points)
+    level = np.rint(np.log2(nodes.spacing / nodes.spacing.min())).astype(np.uint64)
+    size = np.maximum(together * nodes.spacing, extent / ((1 << _PLACE_BITS) - 1))
+    where, what = np.empty(len(size), np.uint64), np.empty(len(size), np.uint64)
+    args = (points.position, points.normal), nodes.material, nodes.side, level, size, corner, alike
+    for_shares(lambda start, stop: _key(*args, start, stop, where, what), len(size))
+    return where, what
+
+
+def keys_numpy(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Find the keys in plain NumPy: the oracle.
+
+    Args:
+        nodes: of all grids. together: of the spacing, within which they are one.
+        alike: steps of a unit normal's components, within which they look the same way.
+    Returns:
+        Two numbers that nodes have alike which lie together. (n,) uint64 each
+    """
+    points, (corner, extent) = nodes.points, _extent(nodes.points)
     level = np.rint(np.log2(nodes.spacing / nodes.spacing.min())).astype(np.uint64)
     size = np.maximum(together * nodes.spacing, extent / ((1 << _PLACE_BITS) - 1))
     place = np.floor((points.position - corner) / size[:, None]).astype(np.uint64)
-    way = np.rint(points.normal * alike).astype(np.int64) + alike
+    way = np.rint(points.normal * np.float32(alike)).astype(np.int64) + alike
     base = 2 * alike + 1
     kind = (((way[:, 0] * base + way[:, 1]) * base + way[:, 2]) * 2 + nodes.side).astype(np.uint64)
     where = (place[:, 0] << _U64(2 * _PLACE_BITS)) | (place[:, 1] << _U64(_PLACE_BITS)) | place[:, 2]
-    what = (kind << _U64(24)) | (level << _U64(16)) | nodes.material.astype(np.uint64)
+    return where, (kind << _U64(24)) | (level << _U64(16)) | nodes.material.astype(np.uint64)
+
+
+def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
+    points, (corner, extent) = nodes.points, _extent(nodes.points)
+    where, what = _keys(nodes, together, alike)
     order = np.lexsort((what, where))  # stable: the first of equals is the one with the lowest number
     is_new = np.concatenate([[True], (where[order[1:]] != where[order[:-1]]) | (what[order[1:]] != what[order[:-1]])])
     first, group = order[is_new], np.cumsum(is_new) - 1
