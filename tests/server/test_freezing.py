@@ -129,3 +129,20 @@ def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -
 
     assert run(scenario)[1] == []
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("relume-long")]
+
+
+def test_end_that_is_cut_off_leaves_no_complaint() -> None:
+    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        running = freezer._running
+        assert running is not None
+        assert await asyncio.to_thread(control.freezing.wait, 60)
+        ending = asyncio.create_task(freezer.end())
+        await asyncio.sleep(0)
+        ending.cancel()
+        await asyncio.wait({ending, running.future})
+        assert ending.cancelled()
+        del ending, running
+
+    assert run(scenario)[1] == []

@@ -60,6 +60,7 @@ class Freezer:
         future = asyncio.wrap_future(
             self._threads.long.submit(job.make, lambda share: progress.__setitem__(0, share), cancel.is_set)
         )
+        future.add_done_callback(_note_error)
         telling = asyncio.create_task(self._tell(future, viewport.name, job, progress))
         telling.add_done_callback(lambda _: self._news.set())
         self._running = _Running(viewport, job, future, telling, time.perf_counter())
@@ -101,9 +102,7 @@ class Freezer:
         running, self._running = self._running, None
         running.telling.cancel()
         await asyncio.wait({running.telling, running.future})
-        for part in (running.telling, running.future):
-            if not part.cancelled():
-                part.exception()
+        _note_error(running.telling)
 
     async def _tell(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
         """Say how far it is, each per cent once; what follows a hand is not worth a word."""
@@ -117,3 +116,10 @@ class Freezer:
                 told = shown
                 await self._socket.send(StatusMessage(state=job.state, view=view, what=job.what, progress=shown))
             await asyncio.wait({future}, timeout=STATUS_S)
+
+
+def _note_error(done: asyncio.Future[Any]) -> None:
+    """Look at how it ended: sessions that are cut off take nothing any more, and their cancelled work is no error that a
+    log should have."""
+    if not done.cancelled():
+        done.exception()
