@@ -119,7 +119,6 @@ class Freezer:
 
 
 def _note_error(done: asyncio.Future[Any]) -> None:
-    """Look at how it ended: sessions that are cut off take nothing any more, and their cancelled work is no error that a
-    log should have."""
+    """Look at how it ended: sessions that are cut off take nothing any more, and cancelled work is no line of a log."""
     if not done.cancelled():
         done.exception()
