@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from relume.exr.layers import Layering
 from relume.look.morph import Way
@@ -32,6 +32,18 @@ class EyePath(Body):
     """From camera to camera, at even shares of the frames; one frame each where no number of frames is given."""
 
     eyes: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
+
+
+def _way_of(path: Any) -> str:
+    """Which way is meant, so that nobody is told what the other lacks."""
+    is_round = isinstance(path, Turntable) or (isinstance(path, dict) and "turntable" in path)
+    return "turntable" if is_round else "eyes"
+
+
+Path = Annotated[
+    Annotated[Turntable, Tag("turntable")] | Annotated[EyePath, Tag("eyes")],
+    Discriminator(_way_of),
+]
 
 
 class Keyframes(Body):
@@ -76,7 +88,7 @@ class RenderRequest(Keyframes):
     name: Name | None = None
     layers: Layering = False
     precision: Literal["half", "float"] = "half"
-    path: Turntable | EyePath | None = None
+    path: Path | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25
     exact: bool = True
 
