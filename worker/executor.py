@@ -1,7 +1,7 @@
 """Where tasks run: this process for tiny bakes, a Dask cluster for all others.
 
 A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes about one. So a bake of at
-most `TINY_BAKE_RAYS` runs in this process, one task at a time on the kernels' own threads, and the cluster starts with
+most `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES` runs in this process, one task at a time on the kernels' own threads, and the cluster starts with
 the first larger one.
 """
 
@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 
 # As planned: about four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
 TINY_BAKE_RAYS = 400_000_000
+TINY_BAKE_BYTES = 512 << 20  # on disk: points on millions of triangles take longer to place than rays to trace
 CONNECT_S = 10
 
 # One Python thread per process, so one thread for every library below it.
@@ -46,7 +47,7 @@ DASK_CONFIG: dict[str, Any] = {
 
 def is_tiny(plan: Plan) -> bool:
     """Whether a bake is done before a cluster would have started."""
-    return plan.num_rays <= TINY_BAKE_RAYS
+    return plan.num_rays <= TINY_BAKE_RAYS and plan.store_bytes <= TINY_BAKE_BYTES
 
 
 def num_cores() -> int:

@@ -4,10 +4,16 @@ import pytest
 
 from relume.bake import Plan
 from worker.estimate import Finished, crowding, seconds_for
-from worker.executor import TINY_BAKE_RAYS
+from worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
 
 LARGE = Plan(1000, 20 * TINY_BAKE_RAYS, 1, 1)
 SMALL = Plan(1000, TINY_BAKE_RAYS // 2, 1, 1)
+
+
+def test_few_rays_of_millions_of_triangles_are_no_tiny_bake():
+    assert is_tiny(SMALL)
+    assert not is_tiny(LARGE)
+    assert not is_tiny(Plan(1000, 1000, TINY_BAKE_BYTES + 1, 1))
 
 
 def test_nothing_is_said_before_anything_was_measured():
