@@ -1,8 +1,8 @@
 """Where tasks run: this process for tiny bakes, a Dask cluster for all others.
 
 A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes about one. So a bake of at
-most `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES` runs in this process, one task at a time on the kernels' own threads, and the cluster starts with
-the first larger one.
+most `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES` runs in this process, one task at a time on the kernels' own threads, and
+the cluster starts with the first larger one.
 """
 
 from __future__ import annotations
