@@ -23,8 +23,11 @@ from relume.store.publish import array_paths
 
 
 def tree_hash(folder: Path) -> str:
+    """Of what was baked; images that pictures of other tests have kept beside it, and edited ones, are left out."""
     digest = hashlib.sha256()
     for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+        if file.relative_to(folder).parts[0] in ("derived", "edited"):
+            continue
         digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
 
