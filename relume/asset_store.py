@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from relume.errors import NotFoundError, ParameterError, RelumeError
 from relume.replacing import replacing
 
@@ -164,6 +166,20 @@ class AssetStore:
         if not isinstance(document.get("name"), str) or not isinstance(document.get("created"), float):
             raise self.damaged(path)
         return document
+
+    def array(self, path: Path, file: str) -> np.ndarray[Any, Any]:
+        """An array of a thing by its folder, which stays on the disk and is read where it is needed.
+
+        Args:
+            path: the folder. file: name of the .npy file in it.
+        Raises:
+            self.problem: it is damaged.
+        """
+        try:
+            found: np.ndarray[Any, Any] = np.load(path / file, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise self.damaged(path) from error
+        return found.view(np.ndarray)
 
     def remove(self, folder: Path, identity: str) -> None:
         """Delete a thing; looks that name it are refused from now on. Raises NotFoundError."""

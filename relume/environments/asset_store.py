@@ -99,10 +99,7 @@ def imported(name: str) -> Environment:
 
 @lru_cache(maxsize=32)
 def _load(path: Path) -> Environment:
-    try:
-        radiance = np.load(path / _RADIANCE, mmap_mode="r", allow_pickle=False).view(np.ndarray)
-    except (OSError, ValueError, EOFError) as error:
-        raise STORE.damaged(path) from error
+    radiance = STORE.array(path, _RADIANCE)
     height = len(radiance) if radiance.ndim else 0
     if height == 0 or radiance.shape != (height, 2 * height, 3) or radiance.dtype != np.float32:
         raise STORE.damaged(path)

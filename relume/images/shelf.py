@@ -99,10 +99,7 @@ def texture_of(name: str) -> Texture:
 
 @lru_cache(maxsize=16)
 def _load(path: Path) -> Texture:
-    try:
-        texels = np.load(path / _TEXELS, mmap_mode="r", allow_pickle=False).view(np.ndarray)
-    except (OSError, ValueError, EOFError) as error:
-        raise IMAGES.damaged(path) from error
+    texels = IMAGES.array(path, _TEXELS)
     is_image = texels.ndim == 3 and texels.shape[2] == 3 and min(texels.shape[:2]) >= 1
     if not is_image or max(texels.shape[:2]) > MAX_SIDE or texels.dtype not in (np.uint8, np.float16):
         raise IMAGES.damaged(path)

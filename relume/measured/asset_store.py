@@ -116,11 +116,10 @@ def material(data: str) -> Measured:
 
 @lru_cache(maxsize=32)
 def _load(path: Path) -> Measured:
-    document = STORE.read(path)
+    document, table = STORE.read(path), STORE.array(path, _TABLE)
     try:
-        table = np.load(path / _TABLE, mmap_mode="r", allow_pickle=False).view(np.ndarray)
         curves = [np.array(document[part], np.float64) for part in ("lobes", "homomorphic")]
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise STORE.damaged(path) from error
     if table.shape != (*SHAPE, 3) or table.dtype != np.float32:
         raise STORE.damaged(path)

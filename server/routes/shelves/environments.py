@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import tempfile
-from functools import lru_cache
-from pathlib import Path
+from functools import lru_cache, partial
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi import Path as PathPart
 from fastapi.concurrency import run_in_threadpool
 
-from relume.asset_store import check_name
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
-from relume.folders import folder_bytes
 from server.access.roles import Who
-from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.png import A_DAY, PngResponse
-from server.files.uploads import keep_upload, plain_stem, upload_bytes
-from server.services import Services, Shared
+from server.routes.shelves.sending import import_apart, take_in
+from server.services import Shared
 from server.wire.bodies import EnvironmentBody, moment
 from server.wire.body import Id
 from worker.paths import environments_path
@@ -36,23 +31,11 @@ async def import_environment(
     environment: MapFile, services: Shared, caller: Who, response: Response, name: MapName = ""
 ) -> EnvironmentBody:
     """Import an environment, in a process of its own; the body says how look documents name it."""
-    quotas = services.access.quotas
-    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(environment))
-    async with services.import_slots:
-        identity = await run_in_threadpool(_import, environment, name, services)
-    num_bytes = await run_in_threadpool(folder_bytes, environments_path(services.settings.data) / identity)
-    await run_in_threadpool(quotas.own, caller.name, "environment", identity, num_bytes)
+    shelf = environments_path(services.settings.data)
+    read = partial(import_apart, environment, name, "environment", services)
+    identity = await take_in(environment, caller, services, "environment", shelf, read)
     response.headers["Location"] = f"/api/environments/{identity}"
     return await run_in_threadpool(get_environment, identity, services)
-
-
-def _import(environment: UploadFile, name: str, services: Services) -> str:
-    settings = services.settings
-    name = check_name(name or plain_stem(environment.filename) or "Environment")
-    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        return services.importers.run(
-            ImportRequest.of(settings, "environment", keep_upload(environment, Path(folder) / "environment"), name)
-        )
 
 
 @router.get("")

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.asset_store import check_name
 from relume.brdf.channels import IMAGES
-from relume.folders import folder_bytes
 from relume.images.shelf import ImageRecord, get_record, records, thumbnail_path
 from server.access.roles import Who
 from server.errors import InUseError
-from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.png import FOREVER, PngResponse
-from server.files.uploads import keep_upload, plain_stem, upload_bytes
-from server.services import Services, Shared
+from server.routes.shelves.sending import import_apart, take_in
+from server.services import Shared
 from server.wire.bodies import ImageBody, moment
 from server.wire.body import Id
 from worker.paths import images_path
@@ -34,23 +30,10 @@ async def send_image(
     image: ImageFile, services: Shared, caller: Who, response: Response, name: ImageName = ""
 ) -> ImageBody:
     """Keep an image, read in a process of its own; the body says how terms of looks name it."""
-    quotas = services.access.quotas
-    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(image))
-    async with services.import_slots:
-        identity = await run_in_threadpool(_import, image, name, services)
-    num_bytes = await run_in_threadpool(folder_bytes, images_path(services.settings.data) / identity)
-    await run_in_threadpool(quotas.own, caller.name, "image", identity, num_bytes)
+    shelf, read = images_path(services.settings.data), partial(import_apart, image, name, "image", services)
+    identity = await take_in(image, caller, services, "image", shelf, read)
     response.headers["Location"] = f"/api/images/{identity}"
     return await run_in_threadpool(get_image, identity, services)
-
-
-def _import(image: UploadFile, name: str, services: Services) -> str:
-    settings = services.settings
-    name = check_name(name or plain_stem(image.filename) or "Image")
-    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        return services.importers.run(
-            ImportRequest.of(settings, "image", keep_upload(image, Path(folder) / "image"), name)
-        )
 
 
 @router.get("")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +13,12 @@ from fastapi.concurrency import run_in_threadpool
 from relume.asset_store import check_name
 from relume.brdf.document import complete_term
 from relume.btf.shelf import BtfRecord
-from relume.folders import folder_bytes
 from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
 from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
-from server.files.uploads import keep_upload, plain_stem, upload_bytes
+from server.files.uploads import keep_upload, plain_stem
+from server.routes.shelves.sending import take_in
 from server.services import Services, Shared
 from server.wire.bodies import MeasuredBody, moment
 from server.wire.body import Id
@@ -34,21 +34,17 @@ async def import_measured(
     material: MaterialFile, services: Shared, caller: Who, response: Response, name: MaterialName = ""
 ) -> MeasuredBody:
     """Import a MERL file; the body says how look documents name it."""
-    quotas = services.access.quotas
-    await run_in_threadpool(quotas.check_bytes, caller.name, upload_bytes(material))
-    async with services.import_slots:
-        record = await run_in_threadpool(_import, material, name, services)
-    num_bytes = await run_in_threadpool(folder_bytes, materials_path(services.settings.data) / record.id)
-    await run_in_threadpool(quotas.own, caller.name, "material", record.id, num_bytes)
-    response.headers["Location"] = f"/api/materials/measured/{record.id}"
-    return _body(record)
+    shelf, read = materials_path(services.settings.data), partial(_import, material, name, services)
+    identity = await take_in(material, caller, services, "material", shelf, read)
+    response.headers["Location"] = f"/api/materials/measured/{identity}"
+    return await run_in_threadpool(get_measured, identity, services)
 
 
-def _import(material: UploadFile, name: str, services: Services) -> MaterialRecord:
+def _import(material: UploadFile, name: str, services: Services) -> str:
     name = check_name(name or plain_stem(material.filename) or "Material")
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(material, Path(folder) / "material.binary")
-        return keep(materials_path(services.settings.data), path, name)
+        return keep(materials_path(services.settings.data), path, name).id
 
 
 @router.get("")
