@@ -24,13 +24,9 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     """
     from pydantic import ValidationError
 
-    from relume.brdf.channels import IMAGES
-    from relume.btf.shelf import STORE as BTFS
-    from relume.environments.asset_store import STORE as ENVIRONMENTS
     from relume.errors import ParameterError
-    from relume.measured.asset_store import STORE as MATERIALS
     from server.settings import Settings
-    from worker.paths import btfs_path, environments_path, images_path, materials_path
+    from worker.shelves import shelves
 
     given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
     try:
@@ -40,10 +36,8 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         name = ".".join(map(str, first["loc"]))
         raise ParameterError(name, first["input"], first["msg"].lower()) from None
     settings.data.mkdir(parents=True, exist_ok=True)
-    MATERIALS.use(materials_path(settings.data))
-    BTFS.use(btfs_path(settings.data))
-    ENVIRONMENTS.use(environments_path(settings.data))
-    IMAGES.use(images_path(settings.data))
+    for store, folder in shelves(settings.data):
+        store.use(folder)
     return settings
 
 

@@ -10,10 +10,6 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
-from relume.brdf.channels import IMAGES
-from relume.btf.shelf import STORE as BTFS
-from relume.environments.asset_store import STORE as ENVIRONMENTS
-from relume.measured.asset_store import STORE as MATERIALS
 from server import errors
 from server.access.gate import Gate
 from server.guard import Guard
@@ -45,7 +41,7 @@ from server.running.process import Process
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
-from worker.paths import btfs_path, environments_path, images_path, materials_path
+from worker.shelves import shelves_at
 
 ROUTE_GROUPS = (
     scenes,
@@ -92,12 +88,7 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with (
-            MATERIALS.at(materials_path(settings.data)),
-            BTFS.at(btfs_path(settings.data)),
-            ENVIRONMENTS.at(environments_path(settings.data)),
-            IMAGES.at(images_path(settings.data)),
-        ):
+        with shelves_at(settings.data):
             opening = open_services(settings, metrics, leave, open_library, open_bakes, open_batches, clock)
             async with opening as services:
                 app.state.services = services

@@ -14,7 +14,6 @@ import queue
 import sys
 import threading
 import time
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -34,24 +33,12 @@ def main() -> None:
     threading.Thread(target=_listen, args=(asked, stop), daemon=True).start()
 
     # after the above, which is to hold for all threads that they start
-    from relume.brdf.channels import IMAGES
-    from relume.btf.shelf import STORE as BTFS
-    from relume.environments.asset_store import STORE as ENVIRONMENTS
-    from relume.measured.asset_store import STORE as MATERIALS
     from relume.resident import give_back
     from server.apart.workshop import Workshop
     from server.library.opening import open_library
-    from worker.paths import btfs_path, environments_path, images_path, materials_path
+    from worker.shelves import shelves_at
 
-    with ExitStack() as stack:
-        shelves = (
-            (MATERIALS, materials_path),
-            (BTFS, btfs_path),
-            (ENVIRONMENTS, environments_path),
-            (IMAGES, images_path),
-        )
-        for store, path in shelves:
-            stack.enter_context(store.at(path(data)))
+    with shelves_at(data):
         shop = Workshop(data, open_library(num_bytes, 0))
         while True:
             message = asked.get()

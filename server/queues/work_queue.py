@@ -267,9 +267,10 @@ class WorkQueue(ABC, Generic[Request]):
     def _next(self) -> str | None:
         """Take the lease of the row whose turn it is, of those that nobody works on; None where there is none."""
         row = self.row
-        query = select(row, epoch_s()).where(row.state.in_(_ACTIVE))
+        columns = row.id, row.client, row.is_first, row.created, row.owner, row.heartbeat  # requests may be large
+        query = select(*columns, epoch_s().label("now")).where(row.state.in_(_ACTIVE))
         with self._sessions() as session:
-            found = [one for one, now in session.execute(query) if not self._is_others(one, now)]
+            found = [one for one in session.execute(query) if not self._is_others(one.owner, one.heartbeat, one.now)]
         owners = {one.id: one.owner for one in found}
         waiting = [Waiting(one.id, one.client or "", bool(one.is_first), one.created) for one in found]
         self._timers = {one.id: self._timers[one.id] for one in waiting if one.id in self._timers}
@@ -310,5 +311,5 @@ class WorkQueue(ABC, Generic[Request]):
         with self._sessions() as session:
             return session.get(self.row, identity) is not None
 
-    def _is_others(self, row: WorkRow, now: float) -> bool:
-        return row.owner not in (None, self._owner) and is_alive(str(row.owner), row.heartbeat or 0.0, now)
+    def _is_others(self, owner: str | None, heartbeat: float | None, now: float) -> bool:
+        return owner not in (None, self._owner) and is_alive(str(owner), heartbeat or 0.0, now)

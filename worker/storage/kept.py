@@ -19,6 +19,7 @@ from relume.folders import folder_bytes
 from relume.replacing import UNFINISHED
 from relume.store.publish import manifest_digests
 from relume.store.schema import MANIFEST_NAME
+from worker.storage.parts import forget_parts
 from worker.storage.remote import Remote, configured
 
 DEFAULT_CACHE_BYTES = 20 << 30
@@ -101,7 +102,7 @@ def forget(path: Path) -> None:
     if (there := configured()) is not None:
         there.delete(_name(path))
         if path.suffix == ".zarr":
-            there.delete(f"parts/{path.stem}")
+            forget_parts(path.stem)
 
 
 def _make_room(bakes: Path, there: Remote, num_bytes: int) -> None:
