@@ -25,8 +25,8 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     from pydantic import ValidationError
 
     from relume.errors import ParameterError
+    from server.library.shelves import shelves
     from server.settings import Settings
-    from worker.shelves import shelves
 
     given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
     try:

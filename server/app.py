@@ -14,6 +14,7 @@ from server import errors
 from server.access.gate import Gate
 from server.guard import Guard
 from server.library.opening import open_library
+from server.library.shelves import shelves_at
 from server.logs.requests import RequestIds
 from server.logs.setting_up import set_up
 from server.metrics import Metrics
@@ -41,7 +42,6 @@ from server.running.process import Process
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
-from worker.shelves import shelves_at
 
 ROUTE_GROUPS = (
     scenes,

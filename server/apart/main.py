@@ -36,7 +36,7 @@ def main() -> None:
     from relume.resident import give_back
     from server.apart.workshop import Workshop
     from server.library.opening import open_library
-    from worker.shelves import shelves_at
+    from server.library.shelves import shelves_at
 
     with shelves_at(data):
         shop = Workshop(data, open_library(num_bytes, 0))
