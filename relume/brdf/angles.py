@@ -11,6 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
+from relume.basis.arcs import acos_clamped
 from relume.brdf.term import Angle
 
 _HALF_PI = np.float32(math.pi / 2)
@@ -28,21 +29,6 @@ THETA_O = int(Angle.THETA_O)
 LOBE = int(Angle.LOBE)
 TILT_X = int(Angle.TILT_X)
 TILT_Y = int(Angle.TILT_Y)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def acos_clamped(x):  # type: ignore[no-untyped-def]
-    """Arc cosine of x clamped to [0, 1], in [0, π/2]; absolute error below 3e-7 (Abramowitz and Stegun 4.4.46)."""
-    x = min(max(x, _ZERO), _ONE)
-    p = np.float32(-0.0012624911)
-    p = p * x + np.float32(0.0066700901)
-    p = p * x - np.float32(0.0170881256)
-    p = p * x + np.float32(0.0308918810)
-    p = p * x - np.float32(0.0501743046)
-    p = p * x + np.float32(0.0889789874)
-    p = p * x - np.float32(0.2145988016)
-    p = p * x + np.float32(1.5707963050)
-    return p * math.sqrt(_ONE - x)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

@@ -16,6 +16,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.arcs import acos_clamped, azimuth_turns
 from relume.errors import MaterialError
 
 F32 = NDArray[np.float32]
@@ -25,21 +26,6 @@ UBO_81 = ((0.0, 1), (15.0, 6), (30.0, 12), (45.0, 18), (60.0, 20), (75.0, 24))
 """Degrees of θ and directions of each ring of the Bonn measurements, φ from 0 on (Sattler 2003)."""
 MOST_DIRECTIONS = 400
 _NO_LESS = 4  # directions of rings but the first: fewer leave no room for a mean
-_LEAST, _TURNS = np.float32(1e-30), np.float32(1 / (2 * math.pi))
-_ARC_COSINE = tuple(
-    np.float32(one)
-    for one in (
-        1.5707963050, -0.2145988016, 0.0889789874, -0.0501743046,
-        0.0308918810, -0.0170881256, 0.0066700901, -0.0012624911,
-    )
-)  # fmt: skip
-_ARC_TANGENT = tuple(
-    np.float32(one)
-    for one in (
-        -0.3333314528, 0.1999355085, -0.1420889944, 0.1065626393,
-        -0.0752896400, 0.0429096138, -0.0161657367, 0.0028662257,
-    )
-)  # fmt: skip
 
 
 class Rings(NamedTuple):
@@ -103,34 +89,6 @@ def polar(theta: F64, phi: F64) -> F64:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _polynomial(x, factors):  # type: ignore[no-untyped-def]
-    """Evaluate one of degree seven. factors: from the constant on, a tuple."""
-    a, b, c, d, e, f, g, h = factors
-    return ((((((h * x + g) * x + f) * x + e) * x + d) * x + c) * x + b) * x + a
-
-
-# the library's functions of angles took half of the time of `taps`
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _arc_cosine(z):  # type: ignore[no-untyped-def]
-    """Find the angle of a cosine within [0, 1]. Abramowitz and Stegun 4.4.46: off by 2e-8, and what float32 rounds."""
-    return math.sqrt(np.float32(1) - z) * _polynomial(z, _ARC_COSINE)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _turn_of(x, y):  # type: ignore[no-untyped-def]
-    """Find what share of a turn it is from the x axis to a direction, [0, 1). Abramowitz and Stegun 4.4.49."""
-    across, along = abs(y), abs(x)
-    tangent = min(across, along) / max(max(across, along), _LEAST)
-    square = tangent * tangent
-    turn: Any = tangent * (np.float32(1) + square * _polynomial(square, _ARC_TANGENT)) * _TURNS
-    if across > along:
-        turn = np.float32(0.25) - turn
-    if x < 0:
-        turn = np.float32(0.5) - turn
-    return np.float32(1) - turn if y < 0 and turn > 0 else turn
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four directions about one, and their weights.
 
@@ -141,13 +99,13 @@ def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
         What is left of the cosine beyond the last ring: z over the last ring's, at most one.
     """
     theta_last = rings.theta[rings.theta.shape[0] - 1]
-    theta = _arc_cosine(min(max(z, np.float32(0)), np.float32(1)))
+    theta = acos_clamped(z)
     lower = 0
     while lower < rings.theta.shape[0] - 2 and theta >= rings.theta[lower + 1]:
         lower += 1
     share: Any = (theta - rings.theta[lower]) / (rings.theta[lower + 1] - rings.theta[lower])
     share = np.float32(min(max(share, 0.0), 1.0))
-    turn = _turn_of(x, y)
+    turn = azimuth_turns(x, y)
     for k in range(2):
         first, count = rings.first[lower + k], rings.first[lower + k + 1] - rings.first[lower + k]
         place = np.float32(turn * count - rings.shift[lower + k])

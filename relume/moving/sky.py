@@ -10,7 +10,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.angles import acos_clamped
+from relume.basis.arcs import acos_clamped, azimuth_turns
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -46,26 +46,9 @@ def sky_of(sharp: F32, map_of: Callable[[float], F32]) -> Sky:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _turn_of(x, z):  # type: ignore[no-untyped-def]
-    """Approximate atan2(z, x) / 2π within 3e-7, by a minimax polynomial: libm's is a call for every pixel."""
-    across, along = abs(x), abs(z)
-    t = min(across, along) / max(max(across, along), np.float32(1e-30))
-    t2 = t * t
-    p = np.float32(-0.01172120)
-    p = p * t2 + np.float32(0.05265332)
-    p = p * t2 - np.float32(0.11643287)
-    p = p * t2 + np.float32(0.19354346)
-    p = p * t2 - np.float32(0.33262347)
-    angle = np.float32(0.5 / math.pi) * t * (p * t2 + np.float32(0.99997726))
-    angle = np.float32(0.25) - angle if along > across else angle
-    angle = np.float32(0.5) - angle if x < 0 else angle
-    return -angle if z < 0 else angle
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Find u and v of a direction, both in [0, 1]."""
-    u = _turn_of(dx, dz) + turn
+    u = azimuth_turns(dx, dz) + turn
     whole = np.int64(u)
     from_pole = np.float32(1 / math.pi) * acos_clamped(abs(dy))
     v = from_pole if dy > 0 else np.float32(1) - from_pole

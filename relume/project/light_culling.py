@@ -7,7 +7,8 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import THETA_D, THETA_H, THETA_I, THETA_R, acos_clamped
+from relume.basis.arcs import acos_clamped
+from relume.brdf.angles import THETA_D, THETA_H, THETA_I, THETA_R
 
 _HALF = np.float32(0.5)
 _ZERO = np.float32(0)
