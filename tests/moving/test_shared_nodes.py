@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from relume.moving.points.vertices import Nodes, _keys, keys_numpy, num_shared, shared_points
+from relume.moving.points.vertices import Nodes, _keys, extent_of, keys_numpy, num_shared, shared_points
 from relume.points import Points
 
 
@@ -13,7 +13,8 @@ def nodes(num, seed=3):
     position = rng.integers(-9, 9, (num, 3)).astype(np.float32) + rng.normal(scale=0.02, size=(num, 3))
     points = Points(position.astype(np.float32), normal, normal[:, [1, 2, 0]], np.zeros(num, np.uint32))
     material, side = rng.integers(0, 2, num).astype(np.uint16), rng.integers(0, 2, num).astype(np.uint8)
-    return Nodes(points, material, side, np.zeros(num, np.int32), 0.3 * 2.0 ** rng.integers(0, 3, num))
+    spacing, piece = 0.3 * 2.0 ** rng.integers(0, 3, num), np.zeros(num, np.int32)
+    return Nodes(points, material, side, piece, spacing, *extent_of(points))
 
 
 def test_keys_are_those_of_numpy():

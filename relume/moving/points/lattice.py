@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.errors import PlanError
-from relume.moving.points.vertices import Nodes, Vertices, find_vertices, num_shared, shared_points
+from relume.moving.points.vertices import Nodes, Vertices, extent_of, find_vertices, num_shared, shared_points
 from relume.points import Points
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
@@ -190,7 +190,7 @@ def _grids(
     points = surface_at(geometry, Hits(at.face, at.uv, np.ones(len(at.face), np.float32)), -normal).points
     material = geometry.face_material[at.face].astype(np.uint16)
     lattice = Lattice(num_rows, first.astype(np.uint32), np.empty(0, np.uint32))
-    return lattice, Nodes(points, material, at.side, piece[at.face], spacing[at.face])
+    return lattice, Nodes(points, material, at.side, piece[at.face], spacing[at.face], *extent_of(points))
 
 
 def _placement(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Placement:

@@ -53,6 +53,7 @@ class Nodes(NamedTuple):
     Attributes:
         points: where they are. material, side: of each. (n,)
         spacing: of the points about each, metres; powers of two of one another. (n,)
+        corner, extent: of what holds all of them, from `extent_of`.
     """
 
     points: Points
@@ -60,6 +61,8 @@ class Nodes(NamedTuple):
     side: NDArray[np.uint8]
     piece: NDArray[np.int32]
     spacing: F64
+    corner: F32
+    extent: float
 
 
 def shared_points(nodes: Nodes, alike: int) -> NDArray[np.intp]:
@@ -122,8 +125,8 @@ def _features(nodes: Nodes) -> F64:
     return np.column_stack([place, _TURN * nodes.points.normal, apart, elsewhere[nodes.piece]])
 
 
-def _extent(points: Points) -> tuple[F32, float]:
-    """The least corner of what holds all nodes, (3,), and its longest side."""
+def extent_of(points: Points) -> tuple[F32, float]:
+    """Find the least corner of what holds all points, (3,), and its longest side, metres. points: at least one"""
     position = points.position
     return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
 
@@ -145,7 +148,7 @@ def _key(points, material, side, level, size, corner, alike, start, stop, where,
 
 def _keys(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
     """Two numbers that nodes have alike which lie together. (n,) uint64 each"""
-    points, (corner, extent) = nodes.points, _extent(nodes.points)
+    points, corner, extent = nodes.points, nodes.corner, nodes.extent
     level = np.rint(np.log2(nodes.spacing / nodes.spacing.min())).astype(np.uint64)
     size = np.maximum(together * nodes.spacing, extent / ((1 << _PLACE_BITS) - 1))
     where, what = np.empty(len(size), np.uint64), np.empty(len(size), np.uint64)
@@ -163,7 +166,7 @@ def keys_numpy(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.ui
     Returns:
         Two numbers that nodes have alike which lie together. (n,) uint64 each
     """
-    points, (corner, extent) = nodes.points, _extent(nodes.points)
+    points, corner, extent = nodes.points, nodes.corner, nodes.extent
     level = np.rint(np.log2(nodes.spacing / nodes.spacing.min())).astype(np.uint64)
     size = np.maximum(together * nodes.spacing, extent / ((1 << _PLACE_BITS) - 1))
     place = np.floor((points.position - corner) / size[:, None]).astype(np.uint64)
@@ -176,7 +179,7 @@ def keys_numpy(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.ui
 
 def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
-    points, (corner, extent) = nodes.points, _extent(nodes.points)
+    points, corner, extent = nodes.points, nodes.corner, nodes.extent
     where, what = _keys(nodes, together, alike)
     order = np.lexsort((what, where))  # stable: the first of equals is the one with the lowest number
     is_new = np.concatenate([[True], (where[order[1:]] != where[order[:-1]]) | (what[order[1:]] != what[order[:-1]])])
