@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def _check_size(what: str, width: int, height: int) -> None:
 
 
 def _of_exr(data: bytes, what: str) -> tuple[Texture, tuple[Remark, ...]]:
-    pixels = read_pixels(data, ".exr", what, lambda width, height: _check_size(what, width, height))
+    pixels = read_pixels(data, ".exr", what, partial(_check_size, what))
     said = []
     broken = ~np.isfinite(pixels).all(axis=-1, keepdims=True)
     if broken.any():

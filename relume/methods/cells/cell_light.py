@@ -24,7 +24,7 @@ from relume.project.squares import Squares, coming_squares, leaving_squares
 from relume.scene.coding import mean_of
 from relume.scene.model import Texture
 from relume.trace.surface import any_tangent
-from relume.trace.texture import MipMap
+from relume.trace.texture import sample_image
 from relume.trace.visibility import visible_of
 
 F32 = NDArray[np.float32]
@@ -102,8 +102,7 @@ class CellLight:
         """What some cells show of a texture: its own mean where nobody knows where they lie in it. (rows or 1, 3)"""
         if self.uv is None:
             return mean_of(texture)[None].astype(np.float32)
-        u, v, side = self.uv[rows].reshape(-1, 3).T
-        of_points = MipMap.of(texture).sample(np.stack([u, v], axis=1), side)
+        of_points = sample_image(texture, self.uv[rows].reshape(-1, 3))
         return np.asarray(of_points.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
     def irradiance(self, lights: TriangleLights, among: NDArray[np.intp] | None = None) -> F32:

@@ -138,9 +138,9 @@ class _Reading:
         if min(self._triangles_left, self._vertices_left) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
         material = self._material(primitive)
-        is_flat = dimensions(to_world[:3, :3]) == 2
-        placed = _placed(geometry, self.materials[material], to_world, name, material)
-        if placed is not None and is_flat:
+        num_dimensions = dimensions(to_world[:3, :3])
+        placed = _placed(geometry, self.materials[material], to_world, num_dimensions, name, material)
+        if placed is not None and num_dimensions == 2:
             self._flattened.append(name)
         if placed is None:
             self.warnings.append(wrong(f"mesh {name!r} is scaled to nothing or out of range; it is left out"))
@@ -195,11 +195,12 @@ class _Reading:
                 )
 
 
-def _placed(geometry: Geometry, understood: Understood, to_world: F64, name: str, material: int) -> Mesh | None:
+def _placed(
+    geometry: Geometry, understood: Understood, to_world: F64, num_dimensions: int, name: str, material: int
+) -> Mesh | None:
     """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
     linear = to_world[:3, :3]
     positions = geometry.positions @ linear.T + to_world[:3, 3]
-    num_dimensions = dimensions(linear)
     if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
         return None
     determinant = float(np.linalg.det(linear)) if num_dimensions == 3 else 1.0
