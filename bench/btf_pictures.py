@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,11 +55,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
         plane, real = _scenes(tile, theta, phi)
         opened, look = covered(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
         ours = render_image(opened, "eye", look)[..., :3]
-        to = folder / f"peer{k}"
-        to.mkdir()
-        job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(tile.terms)], "integrator": depth_of_paths()}
-        render(real, size, job, to)
-        theirs = passes_of(to)
+        theirs = traced_by_peer(real, size, spp, [tile.terms], folder / f"peer{k}")
         errors.append(over_passes(ours.astype(np.float64), theirs))
     worst = max(errors, key=lambda one: one.error.value)
     context: dict[str, Any] = {
@@ -69,9 +66,20 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     return Figure(name, 100 * worst.error.value, "%", context, 100 * worst.error.standard_error)
 
 
-def depth_of_paths() -> dict[str, Any]:
-    """The peer's integrator: paths of up to seven bounces."""
-    return {"type": "path", "max_depth": 8, "rr_depth": 8}
+def traced_by_peer(
+    real: Scene, size: tuple[int, int], spp: int, terms: Sequence[Sequence[Mapping[str, Any]]], to: Path
+) -> NDArray[np.float32]:
+    """The peer's passes of the real geometry, by paths of up to seven bounces.
+
+    Args:
+        real: the scene. size: of the view. spp: of a pass. terms: of each mesh. to: a folder that is made.
+    Returns:
+        (passes, height, width, 3) float32
+    """
+    to.mkdir()
+    integrator = {"type": "path", "max_depth": 8, "rr_depth": 8}
+    render(real, size, {"spp": [spp], "passes": PASSES, "bsdfs": [*map(bsdf, terms)], "integrator": integrator}, to)
+    return passes_of(to)
 
 
 def covered(plane: Scene, record: BtfRecord, size: tuple[int, int], path: Path, lights: int) -> tuple[Any, Look]:

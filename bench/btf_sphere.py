@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.btf_pictures import covered, depth_of_paths
+from bench.btf_pictures import covered, traced_by_peer
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, passes_of, render
+from bench.mitsuba import missing
 from bench.standard_error import over_passes
 from relume.btf.shelf import BtfRecord
 from relume.environments.model import Environment
@@ -54,12 +54,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     smooth, real = _scenes()
     opened, look = covered(smooth, record, size, folder / "sphere.zarr", 60 if tiny else 2000)
     ours = render_image(opened, "eye", look)[..., :3].astype(np.float64)
-    to = folder / "sphere"
-    to.mkdir()
-    terms = GEOMETRIES["weave"]().terms
-    job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(terms), bsdf(_BLACK)], "integrator": depth_of_paths()}
-    render(real, size, job, to)
-    theirs = passes_of(to)
+    theirs = traced_by_peer(real, size, spp, [GEOMETRIES["weave"]().terms, _BLACK], folder / "sphere")
     cosine = _cosines(real.cameras[0], size)
     parts = {"all": cosine > 0, "near": cosine > _NEAR, "rim": (cosine > 0) & (cosine <= _NEAR)}
     errors = {part: over_passes(ours[rows][None], theirs[:, rows][:, None]) for part, rows in parts.items()}

@@ -1,5 +1,6 @@
 /** The look as the user wants it, and the scene's own. */
 import { computed, signal } from "@preact/signals";
+import { isImage } from "../images/colour";
 import type { Look, Term } from "../protocol";
 import { materialOf } from "./scene";
 
@@ -15,7 +16,7 @@ export const bakedLight = computed(() => (look.value?.environment.map ?? null) =
 export const isTexels = (term: Term): boolean => term.model === "measured_btf";
 /** Whether a material shows an image that is projected, for it has no places in textures: this browser knows no others. */
 const showsProjected = (name: string, terms: readonly Term[]) =>
-  materialOf(name)?.is_projected === true && terms.some(({ texture }) => texture?.startsWith("image:") === true);
+  materialOf(name)?.is_projected === true && terms.some(({ texture }) => isImage(texture));
 /** Whether any material shows either. */
 export const hasTexels = computed(() =>
   Object.entries(look.value?.materials ?? {}).some(([name, { terms }]) => terms.some(isTexels) || showsProjected(name, terms)),
