@@ -16,7 +16,6 @@ from relume.brdf.term import Angle
 
 _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)
-_ZERO = np.float32(0)
 _LN2, _PER_LN2 = np.float32(math.log(2)), np.float32(1 / math.log(2))
 
 THETA_I = int(Angle.THETA_I)
