@@ -1,8 +1,9 @@
 /** The image in the place of a material's base colour: choose one, send one, take it off. */
 import { useEffect, useRef } from "preact/hooks";
+import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
 import { IconButton } from "../ui/Button";
-import { baseTexture, isImage } from "./colour";
+import { baseTexture } from "./colour";
 import { imageOf, images, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
 
 const TYPES = ".png,.jpg,.jpeg,.webp,.exr";

@@ -1,11 +1,7 @@
 /** Which terms of a material its base colour is in, and what they become with an image in its place. */
+import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
 import { modelOf } from "../state/scene";
-
-const PREFIX = "image:";
-
-/** Whether a term's texture is an image that a look names, none of the material's own. */
-export const isImage = (texture: string | null | undefined): texture is string => texture?.startsWith(PREFIX) === true;
 
 /** The channel of a term's texture, as `relume.brdf.channels` has it. */
 export function channelOf(term: Term): string | null {

@@ -1,5 +1,5 @@
 /** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
-import { isImage } from "../images/colour";
+import { isImage } from "../document/texture";
 import type { ModelBody, Term } from "../protocol";
 import { materialOf, modelOf } from "../state/scene";
 

@@ -1,6 +1,6 @@
 /** The look as the user wants it, and the scene's own. */
 import { computed, signal } from "@preact/signals";
-import { isImage } from "../images/colour";
+import { isImage } from "../document/texture";
 import type { Look, Term } from "../protocol";
 import { materialOf } from "./scene";
 
