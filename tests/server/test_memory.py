@@ -28,7 +28,7 @@ from server.settings import Settings
 from worker.scenes import register_scene
 
 SIGMA = "/materials/Ball/terms/1/params/sigma"
-IDLE_S, FLOOR_BYTES = 60.0, 200_000  # room for one operator: whichever entry was used last stays
+IDLE_S, FLOOR_BYTES = 60.0, 2_000_000  # room for one operator: whichever entry was used last stays
 NUM_SCENES = 3
 CURVE = "/materials/Ball/terms/1/curves/theta_h"
 
@@ -77,6 +77,7 @@ def look_at(client: TestClient, bake: str) -> bytes:
     with open_session(client, bake) as session:
         session.exact(0)
         session.send(type="touch", curve=CURVE)
+        session.ready("Ball, half angle θh")  # shading adds in another order: the last bits of a picture would tell
         session.edit(1, SIGMA, 0.3, hand=SIGMA)
         return session.exact(1).payload
 
