@@ -45,7 +45,10 @@ def error(found, expected):
     return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
 
 
-@pytest.mark.parametrize(("terms", "at_most"), [(LAMBERT, 0.02), (METAL, 0.04)], ids=["broad", "narrow"])
+@pytest.mark.parametrize(
+    ("terms", "at_most"),
+    [pytest.param(LAMBERT, 0.02, id="broad"), pytest.param(METAL, 0.04, id="narrow", marks=pytest.mark.slow)],
+)
 def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
     """And not as flat ones are: what the map does to the picture is several times what is left."""
     bumpy, flat = floor(terms, waves()), floor(terms, None)

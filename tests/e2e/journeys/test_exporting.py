@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO
+import pytest
 from editor_page import WAIT_MS, Editor
 from editor_server import SIZE
 from playwright.sync_api import expect
 
 
+@pytest.mark.slow
 def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor, tmp_path: Path) -> None:
     page = editor.page
     page.get_by_role("button", name="Add a light", exact=True).first.click()
