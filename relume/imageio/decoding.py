@@ -40,7 +40,7 @@ class Decoder:
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
             raise SceneError(f"{what} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
         except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
-            raise SceneError(f"{what} is damaged or neither PNG, JPEG nor WebP; save it again") from None
+            raise SceneError(f"{what} is damaged, or of a format that is not read here; save it as PNG") from None
 
     def _check_size(self, width: int, height: int, what: str) -> None:
         if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):

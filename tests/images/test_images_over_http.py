@@ -58,10 +58,10 @@ def png(width, height):
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"", "damaged or neither"),
-        (b"\x89PNG\r\n\x1a\n" + 40 * b"x", "damaged or neither"),
+        (b"", "save it as PNG"),
+        (b"\x89PNG\r\n\x1a\n" + 40 * b"x", "save it as PNG"),
         (b"\x76\x2f\x31\x01" + 40 * b"x", "damaged"),
-        (b"GIF89a" + 40 * b"\0", "damaged or neither"),
+        (b"GIF89a" + 40 * b"\0", "save it as PNG"),
         (png(MAX_SIDE + 1, 1), f"at most {MAX_SIDE}×{MAX_SIDE}"),
     ],
 )
