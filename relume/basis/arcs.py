@@ -28,7 +28,7 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def azimuth_turns(x, y):  # type: ignore[no-untyped-def]
-    """Share of a turn from the x axis to a direction, [0, 1); error below 1e-7 (Abramowitz and Stegun 4.4.49)."""
+    """Share of a turn from the x axis, in [0, 1] where 1 is 0; error below 1e-7 (Abramowitz and Stegun 4.4.49)."""
     across, along = abs(y), abs(x)
     t = min(across, along) / max(max(across, along), _LEAST)
     t2 = t * t

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracle import KEPT
 
 from relume.bake import Recipe, Task
 from relume.errors import PlanError
@@ -26,7 +27,7 @@ def tree_hash(folder: Path) -> str:
     """Of what was baked; images that pictures of other tests have kept beside it, and edited ones, are left out."""
     digest = hashlib.sha256()
     for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-        if file.relative_to(folder).parts[0] in ("derived", "edited"):
+        if file.relative_to(folder).parts[0] in KEPT:
             continue
         digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()

@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+from oracle import KEPT
 from pictures import opened, sigma
 from sessions import BUDGET, look_of
 
@@ -67,7 +68,7 @@ def test_what_other_code_made_is_never_found_and_goes_when_this_code_keeps_its_f
 
 
 def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
-    store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns("derived", "edited"))
+    store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*KEPT))
     made, shade = [], need.shade
 
     def counted(*args):
