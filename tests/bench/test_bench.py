@@ -19,10 +19,10 @@ FIXED_NAMES = {
     "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "bake.ray_saving", "store.bytes_per_view_sample",
 }  # fmt: skip
 IN_PROCESS = [
-    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.rotation", "bench.swap",
+    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.swap",
     "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
-    "bench.slider_drag", "bench.glimpse", "bench.curve_switch_terms", "bench.shade",
-    "bench.estimators", "bench.sharp_slider", "bench.mesh_files", "bench.resting",
+    "bench.glimpse", "bench.curve_switch_terms", "bench.shade",
+    "bench.estimators", "bench.sharp_slider", "bench.mesh_files",
     "bench.in_out",
 ]  # fmt: skip
 LONG = [
@@ -31,7 +31,8 @@ LONG = [
     "bench.memory", "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather",
     "bench.gather_follow", "bench.glass", "bench.rough", "bench.mirror", "bench.surface", "bench.surface_edits",
     "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.btf_true", "bench.btf_shown", "bench.load",
-    "bench.refusal", "bench.surface_live", "bench.surface_points",
+    "bench.refusal", "bench.slider_drag", "bench.resting", "bench.rotation",
+    "bench.surface_live", "bench.surface_points",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = (

@@ -293,6 +293,7 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     assert only_bake(data).state == "ready"
 
 
+@pytest.mark.slow
 def test_interrupt_at_a_terminal_asks_and_can_leave_the_bake_running(data: Path) -> None:
     controller, terminal = pty.openpty()
     process = subprocess.Popen(

@@ -62,7 +62,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         names = MOVING
     elif "transfer" in metafunc.fixturenames:
         names = fixed
-    metafunc.parametrize("method", sorted(names), indirect=True, scope="session")
+    # what a hand does is the same for the tests' own method: it goes through all of it with the long tests
+    long = {FurnaceMethod.name} if "edit" in metafunc.fixturenames else set()
+    marked = [pytest.param(name, marks=[pytest.mark.slow] * (name in long)) for name in sorted(names)]
+    metafunc.parametrize("method", marked, indirect=True, scope="session")
 
 
 @pytest.fixture(scope="session")

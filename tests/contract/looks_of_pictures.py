@@ -1,5 +1,7 @@
 """Looks that pictures are held to: two lamps beside the environment, and what a hand does to them."""
 
+import pytest
+
 LAMP = {"kind": "point", "position": [0.6, 0.8, 0.9], "emission": [2.0, 1.5, 1.0]}
 PANEL = {
     "kind": "rectangle", "position": [-0.8, 1.2, 0.8], "direction": [1, -1, -1], "size": [0.5, 0.4],
@@ -76,3 +78,6 @@ EDITS = {  # what a hand has touched before, and what it then does
     "fewer paths": (None, transport(bounces=1)),
     "all at once": (LOBE, everything),
 }
+# of every kind one: a curve, a model, a light, light that turns, and all
+OFTEN = ("a curve drawn", "another model", "a lamp moved", "the environment turned", "all at once")
+EDITS_OFTEN = [pytest.param(edit, marks=[pytest.mark.slow] * (edit not in OFTEN)) for edit in EDITS]

@@ -94,7 +94,10 @@ def test_tasks_tile_every_announced_array_once(
             assert ends[-1] == spec.shape[0]
 
 
-@pytest.mark.parametrize(("backwards", "twice"), [(True, False), (False, True)], ids=["backwards", "twice"])
+@pytest.mark.parametrize(
+    ("backwards", "twice"),
+    [pytest.param(True, False, id="backwards", marks=pytest.mark.slow), pytest.param(False, True, id="twice")],
+)
 def test_neither_order_nor_repetition_changes_a_byte(
     method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path, backwards: bool, twice: bool
 ) -> None:

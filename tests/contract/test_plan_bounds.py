@@ -74,7 +74,8 @@ def test_many_gather_samples_and_rays_stay_below_their_plan(name: str, blades: S
 
 
 @linux
-@pytest.mark.parametrize("make", [large_environment, pytest.param(large_textures, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [large_environment, large_textures])
 def test_what_a_scene_brings_is_planned(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
 

@@ -53,7 +53,10 @@ def rested(picture):
     return step
 
 
-@pytest.mark.parametrize("edit", [None, "a curve drawn", "a lamp moved", "the environment turned", "all at once"])
+OFTEN, LONG = (None, "all at once"), ("a curve drawn", "a lamp moved", "the environment turned")
+
+
+@pytest.mark.parametrize("edit", [*OFTEN, *(pytest.param(edit, marks=pytest.mark.slow) for edit in LONG)])
 def test_straight_light_is_that_of_a_fixed_bake_to_the_bit(moving, fixed, picture, edit):
     changes = [EDITS[edit][1]] if edit else []
     look = look_of(moving, lit(*changes, transport(show="direct")))

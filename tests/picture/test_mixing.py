@@ -54,7 +54,7 @@ OTHERS = {"color": [1.0, 0.2, 0.0]}, {"emission": [1, 7, 1]}
 SLOW = (pytest.param(fields, marks=pytest.mark.slow) for fields in OTHERS)
 
 
-@pytest.mark.parametrize("fields", [{"scale": 3.0}, {"on": False}, *SLOW])
+@pytest.mark.parametrize("fields", [{"scale": 3.0}, pytest.param({"on": False}, marks=pytest.mark.slow), *SLOW])
 def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fields):
     lit.set_look(look_with(transfer, changed("Panel", **fields)))
     assert num_made(lit) <= num_terms(lit)
@@ -103,6 +103,7 @@ def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer,
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look_with(transfer, ALL)), rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
     """A curve's operator belongs to one light; after another gain it is made anew, never used on."""
 

@@ -108,7 +108,7 @@ def test_samples_are_of_the_levels_that_the_map_says(direct) -> None:
     assert direct.views["front"].levels(1).ratios == ()
 
 
-@pytest.mark.parametrize("name", ["direct", "gather"])
+@pytest.mark.parametrize("name", ["direct", pytest.param("gather", marks=pytest.mark.slow)])
 def test_picture_is_what_the_projector_gives_level_by_level(name, request) -> None:
     transfer = request.getfixturevalue(name)
     found = shown(transfer).image()
@@ -186,6 +186,7 @@ def test_turned_light_is_previewed_and_exact_at_rest(direct) -> None:
     assert relative_rmse(settle(picture).image(), exact) < 1e-5
 
 
+@pytest.mark.slow
 def test_moved_lamp_is_followed(gather) -> None:
     picture = shown(gather, changed(gather, lamp=[0.3, 0.9, 0.3]))
     picture.touch("/lights/lamp")

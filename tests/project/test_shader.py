@@ -21,6 +21,9 @@ from relume.project.shader import Shader
 NUM_POINTS = 24
 SHARP = [("ggx", {"roughness": 0.2}), ("ggx", {"roughness": 0.4, "f0": [0.9, 0.5, 0.1]}), ("ward", {"alpha": 0.08})]
 CASES = [(model, {}) for model in ANALYTIC] + SHARP
+# all are held to their operators; these, and with the long tests the others, to finely divided light
+OFTEN = ("lambert", "cook_torrance", "ward_anisotropic", "ggx")
+DIVIDED = [pytest.param(*case, marks=[pytest.mark.slow] * (case[0] not in OFTEN)) for case in CASES]
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +50,7 @@ def error(found, expected):
     return np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())
 
 
-@pytest.mark.parametrize(("model", "params"), CASES)
+@pytest.mark.parametrize(("model", "params"), DIVIDED)
 def test_pictures_are_those_of_finely_divided_light(model, params, lights, receivers):
     term, bands = curves_of(model, params)
     expected = twins.project(term, bands, None, lights, receivers, depth=4)[:, 0]

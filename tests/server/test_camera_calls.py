@@ -56,6 +56,7 @@ def test_a_camera_is_kept_listed_baked_and_deleted(real: TestClient, scene: str)
     assert real.get(f"/api/bakes/{bake}").json()["recipe"]["views"] == ["Close up"]
 
 
+@pytest.mark.slow
 def test_a_view_of_a_placed_camera_is_compared_with_truth_from_there(real: TestClient, scene: str) -> None:
     (front, *_) = real.get(f"/api/scenes/{scene}/cameras").json()
     moved = [*front["to_world"][:3], front["to_world"][3] + 0.3, *front["to_world"][4:]]

@@ -160,6 +160,7 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
     assert real.app.state.services.transfers.opened == [transfer]
 
 
+@pytest.mark.slow
 def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClient, clock: Clock) -> None:
     bake = bake_scenes(real)[0]
     truth = real.post("/api/truths", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]

@@ -86,7 +86,7 @@ def test_task_that_kills_every_worker_fails_the_bake_clearly(tmp_path: Path) -> 
     [
         pytest.param("sqlite", 1000, id="in the service's process", marks=pytest.mark.slow),
         pytest.param("postgresql", 1000, id="its ledger on PostgreSQL"),
-        pytest.param("sqlite", LARGE, id="on a cluster"),
+        pytest.param("sqlite", LARGE, id="on a cluster", marks=pytest.mark.slow),
     ],
     indirect=["ledger_url"],
 )

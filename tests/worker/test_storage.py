@@ -48,7 +48,7 @@ def s3() -> Iterator[str]:
     server.stop()
 
 
-@pytest.fixture(params=["s3", "a shared folder"])
+@pytest.fixture(params=["s3", pytest.param("a shared folder", marks=pytest.mark.slow)])
 def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Remote:
     """The storage that `RELUME_STORAGE` names, empty."""
     url = f"file://{tmp_path / 'shared'}"

@@ -1,12 +1,13 @@
 /** Files and folders dropped anywhere on the page; whether some are held over it. */
-import { useEffect, useState } from "preact/hooks";
+import { useLayoutEffect, useState } from "preact/hooks";
 import type { Dropped } from "../files/dropped";
 import { droppedFiles } from "../files/folders";
 import { attempt } from "../ui/toasts";
 
 export function useFileDrop(take: (files: Dropped[]) => void): boolean {
   const [over, setOver] = useState(false);
-  useEffect(() => {
+  // with the page itself: what is dropped as soon as it is seen is taken
+  useLayoutEffect(() => {
     const drag = (event: DragEvent) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault(); // else the browser would open the file in place of the page

@@ -147,7 +147,10 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
     it.clear(editor)
 
 
-@pytest.mark.parametrize("name", DRAGGABLES)
+LONG = {"brightness", "drawing", "stretch", "material map", "handle of a light"}  # ways of the same kinds of controls
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in DRAGGABLES])
 def test_it_follows_the_hand_every_time(open_editor: Editor, name: str) -> None:
     editor, it = open_editor, DRAGGABLES[name]
     it.prepare(editor)

@@ -137,6 +137,7 @@ def test_an_eye_costs_no_pictures_on_the_network_twice(moving: tuple[Editor, lis
         before = after
 
 
+@pytest.mark.slow
 def test_a_context_that_is_lost_in_a_drag_is_made_anew_twice(moving: tuple[Editor, list[int]]) -> None:
     editor, _ = moving
     page, box = editor.page, editor.canvas.bounding_box()
@@ -180,7 +181,9 @@ def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> 
     assert np.abs(here - there).mean() < 1
 
 
-@pytest.mark.parametrize("model", ["blinn_phong", "ggx"])  # one that the in-basis tells, and one that is a lobe alone
+@pytest.mark.parametrize(
+    "model", [pytest.param("blinn_phong", marks=pytest.mark.slow), "ggx"]
+)  # one that the in-basis tells, and one that is a lobe alone
 def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int]], model: str) -> None:
     editor, _ = moving
     page = editor.page
@@ -200,6 +203,7 @@ def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int
     assert (np.abs(there - here).max(axis=2)[inside] > 2).mean() < 2e-3
 
 
+@pytest.mark.slow
 def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
     server: Server, browser: Browser, moving_scene: str
 ) -> None:

@@ -46,6 +46,7 @@ def start(server: Server, browser: Browser) -> Iterator[Page]:
     known = {scene["id"] for scene in server.call("/api/scenes")}
     with opened_page(browser) as page:
         page.goto(server.url)
+        expect(page.get_by_text("choose files")).to_be_visible()  # before it stands, a drop is the browser's own
         yield page
     for scene in server.call("/api/scenes"):
         if scene["id"] not in known:

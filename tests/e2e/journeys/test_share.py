@@ -91,6 +91,7 @@ def wait_until_cancelled(server: Server, bake: str) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_a_bake_says_what_it_is_at_and_ends_where_it_is_cancelled(editor: Editor, server: Server) -> None:
     (scene,) = server.call("/api/scenes")
     recipe = {"scene": scene["id"], "views": ["front", "left"], "size": SIZE, "lights": 2000}
