@@ -55,7 +55,7 @@ def edited(picture, transfer, pointer, *changes):
     return settle(picture)
 
 
-@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize("edit", EDITS_OFTEN)
 def test_any_way_to_rest_is_shading_from_nothing(transfer, edit):
     pointer, change = EDITS[edit]
     picture = edited(live(transfer), transfer, pointer, change)

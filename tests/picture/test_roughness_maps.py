@@ -128,9 +128,8 @@ def test_roughness_slider_scales_the_map(direct) -> None:
     assert relative_rmse(settle(picture).image(), exact) < 1e-5
 
 
-@pytest.mark.parametrize(
-    "curve", ["theta_h", *(pytest.param(c, marks=pytest.mark.slow) for c in ("theta_i", "theta_d"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("curve", ["theta_h", "theta_i", "theta_d"])
 def test_a_curve_edited_a_few_coefficients_at_a_time_ends_exact(direct, curve) -> None:
     picture = shown(direct)
     picture.touch(f"{FLOOR}curves/{curve}")

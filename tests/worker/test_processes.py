@@ -120,6 +120,7 @@ def test_two_processes_bake_one_recipe_once(tmp_path: Path, ledger_url: str, exp
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
 
 
+@pytest.mark.slow
 def test_workers_that_have_nothing_to_do_end_and_others_start_for_the_next_bake(
     tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

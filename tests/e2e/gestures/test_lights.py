@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pytest
 from editor_page import NAMELESS, Editor, changed
 from playwright.sync_api import Locator, expect
 
@@ -121,6 +122,7 @@ def test_keys_move_and_aim_a_light(editor: Editor) -> None:
     expect(editor.page.locator(".light")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
     page = editor.page
     dark = editor.pixels()
