@@ -42,7 +42,7 @@ from relume.trace.coherent import trace_coherent
 from relume.trace.links import trace_links
 
 ROWS_A_SHARD = 4096
-RAYS_A_POINT = 256
+RAYS_A_POINT = 377  # a point alone then errs by less than 1 % of its radiance (`surface.points_rmse`)
 RAYS_A_CELL_POINT = 55
 _FEWEST_CELLS, _MOST_CELLS, _POINTS_A_CELL = 512, 8192, 6
 _MOST_ASKED_CELLS = 4 * _MOST_CELLS
