@@ -38,9 +38,11 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
         and one where it was reduced.
 
     Raises:
-        SceneError: no such file, neither format, damaged, too large, not 2:1, or without any light.
+        SceneError: no such file, neither format, empty, damaged, too large, not 2:1, or without any light.
     """
     data, what = _read_bytes(source, name), f"environment {name!r}"
+    if not data:
+        raise SceneError(f"environment {name!r} is empty: 0 bytes; export or download it again")
     if data.startswith(b"#?"):
         suffix, (width, height) = ".hdr", _hdr_size(data, name)
         _check_size(name, width, height)
@@ -93,6 +95,8 @@ def _check_size(name: str, width: int, height: int) -> None:
 def _repaired(pixels: F32, name: str) -> Environment:
     warnings = []
     broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
+    if broken.all():
+        raise SceneError(f"no texel of environment {name!r} is a finite number; render or export it again")
     if broken.any():
         warnings.append(
             wrong(f"{int(broken.sum()):,} texels of environment {name!r} are not finite; they are black now")

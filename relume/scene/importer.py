@@ -35,6 +35,8 @@ def import_scene(
         SceneError: the file cannot be used; the message says why and what to do.
     """
     data = read_file(source)
+    if not data:
+        raise SceneError("the scene file is empty: 0 bytes; export or download it again")
     if companions is None:
         companions = Alone() if isinstance(source, bytes) else Folder(Path(source).parent)
     if data.startswith(b"PK"):

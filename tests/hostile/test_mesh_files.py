@@ -198,6 +198,10 @@ def test_bombs_are_refused_before_they_are_unpacked() -> None:
     assert "entries" in refused(bytes(many))
 
 
+def test_an_empty_file_is_called_empty() -> None:
+    assert "empty: 0 bytes" in refused(b"")
+
+
 def test_an_archive_in_an_archive_is_not_opened() -> None:
     assert "none of" in refused(packed({"a.obj": packed({"a.obj": OBJ})}))
 

@@ -102,6 +102,11 @@ def test_darkness_is_refused(tmp_path: Path) -> None:
         read_environment(written(tmp_path / "black.exr", np.zeros((2, 4, 3))), "black")
 
 
+def test_a_map_without_any_finite_number_is_not_called_black(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="no texel of environment 'lost' is a finite number"):
+        read_environment(written(tmp_path / "lost.exr", np.full((2, 4, 3), np.nan)), "lost")
+
+
 def test_truncated_pixels_are_refused(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).random((64, 128, 3))
     for suffix in (".hdr", ".exr"):

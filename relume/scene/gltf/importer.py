@@ -185,9 +185,9 @@ class _Reading:
     def _warn_of_the_rest(self) -> None:
         document = self._document
         if document.animations:
-            self.warnings.append(
-                unused(f"{len(document.animations)} animations are not used; everything has its rest pose")
-            )
+            many = len(document.animations)
+            animations = "1 animation is" if many == 1 else f"{many} animations are"
+            self.warnings.append(unused(f"{animations} not used; everything has its rest pose"))
         for extension in document.extensionsRequired:
             if extension not in READ_EXTENSIONS:
                 self.warnings.append(
