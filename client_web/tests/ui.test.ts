@@ -9,6 +9,7 @@ import { chord } from "../src/ui/chord";
 import {
   formatBytes,
   formatNumber,
+  formatForeseen,
   formatSeconds,
   fromFraction,
   keyStep,
@@ -62,6 +63,7 @@ describe("numbers", () => {
     ]);
     expect(formatBytes(104_448_000)).toBe("104 MB");
     expect([0.2, 14, 200, 9000].map(formatSeconds)).toEqual(["under a second", "14 s", "3 min", "2.5 h"]);
+    expect([0.2, 14].map(formatForeseen)).toEqual(["under a second", "about 14 s"]);
   });
 
   test("are short on an axis and keep their noughts", () => {

@@ -95,6 +95,7 @@ export function LightsPanel() {
   return (
     <Section title={TITLE} count={all.length} actions={<Actions />}>
       {adding.value && <Kinds />}
+      {all.length === 0 && !adding.value && <p class="environment-words">None yet; + adds one.</p>}
       <ul class="lights">
         {all.map(([name, light]) => (
           <Row key={name} name={name} light={light} />

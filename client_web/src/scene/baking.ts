@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { BakeBody } from "../protocol";
 import type { Baking } from "../state/bakes";
-import { formatSeconds } from "../ui/scale";
+import { formatForeseen } from "../ui/scale";
 
 const PREPARING = {
   starting: "starting worker processes",
@@ -38,7 +38,7 @@ export function bakingWords(bake: Baking, elapsed: number): string {
   const words = phaseWords(bake);
   if (bake.state !== "running") return words;
   if (isPreparing(bake.phase)) return `${words}, ${Math.floor(elapsed)} s`;
-  const left = bake.seconds_left === null ? "estimating the time…" : `about ${formatSeconds(bake.seconds_left)} left`;
+  const left = bake.seconds_left === null ? "estimating the time…" : `${formatForeseen(bake.seconds_left)} left`;
   return `${words}, ${Math.round(100 * bake.progress)} %, ${left}`;
 }
 

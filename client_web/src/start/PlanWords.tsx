@@ -1,6 +1,6 @@
 /** What a bake will cost, in words; or why it cannot be. */
 import type { DryRunBody } from "../protocol";
-import { formatBytes, formatCount, formatSeconds } from "../ui/scale";
+import { formatBytes, formatCount, formatForeseen } from "../ui/scale";
 
 export type Planned = DryRunBody | Error | undefined;
 
@@ -8,7 +8,7 @@ export function PlanWords({ plan }: { plan: Planned }) {
   if (plan === undefined) return <span class="plan quiet">Planning…</span>;
   if (plan instanceof Error) return <span class="plan wrong">{plan.message}</span>;
   const [width, height] = plan.recipe.size;
-  const time = plan.plan.seconds === null ? "time not known yet" : `about ${formatSeconds(plan.plan.seconds)}`;
+  const time = plan.plan.seconds === null ? "time not known yet" : formatForeseen(plan.plan.seconds);
   return (
     <span class="plan">
       {width}×{height}, {formatCount(plan.recipe.lights)} light triangles

@@ -1,6 +1,6 @@
 /** What a comparison with brute force says, in sentences. */
 import type { TruthBody } from "../protocol";
-import { formatSeconds } from "../ui/scale";
+import { formatForeseen, formatSeconds } from "../ui/scale";
 
 /** A share in per cent, with no more digits than its standard error lets it have. */
 export function percent(share: number, error?: number): string {
@@ -14,7 +14,7 @@ export function percent(share: number, error?: number): string {
 export function planWords(plan: { passes: number; seconds: number } | "unknown" | null): string {
   if (plan === null) return "Finding out how long it takes…";
   if (plan === "unknown") return "How long it takes is not known now; it is said while it runs.";
-  return `${plan.passes} passes of brute force: about ${formatSeconds(plan.seconds)}.`;
+  return `${plan.passes} passes of brute force: ${formatForeseen(plan.seconds)}.`;
 }
 
 type Progress = Pick<TruthBody, "state" | "passes" | "total" | "problem" | "seconds_left">;

@@ -89,6 +89,11 @@ export function formatSeconds(seconds: number): string {
   return `${(seconds / 3600).toFixed(1)} h`;
 }
 
+/** The same of what is foreseen: "under a second", "about 12 s". */
+export function formatForeseen(seconds: number): string {
+  return seconds < 1 ? formatSeconds(seconds) : `about ${formatSeconds(seconds)}`;
+}
+
 export function formatCount(count: number): string {
   if (count >= 1e9) return `${(count / 1e9).toFixed(1)} billion`;
   if (count >= 1e6) return `${(count / 1e6).toFixed(count >= 1e8 ? 0 : 1)} million`;

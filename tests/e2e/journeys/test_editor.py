@@ -84,6 +84,13 @@ def test_keys_are_the_pages_again_after_a_number_and_after_a_list(editor: Editor
     assert editor.page.evaluate(focused) == "SELECT"
 
 
+def test_what_is_probed_is_read_whole(editor: Editor) -> None:
+    editor.canvas.hover()
+    editor.page.wait_for_function("() => document.querySelector('.probe .material')")
+    fits = "(all) => all.every((each) => each.scrollWidth <= each.clientWidth)"
+    assert editor.page.locator(".probe, .probe .material").evaluate_all(fits)
+
+
 def test_panels_do_not_scroll_sideways(editor: Editor) -> None:
     editor.choose("Ball", 1)
     for panel in (".inspector", ".outline"):
