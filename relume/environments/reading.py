@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from pathlib import Path
 
@@ -10,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.model import Environment
+from relume.environments.radiance_header import read_header
 from relume.errors import SceneError
 from relume.imageio.linear import EXR_MAGIC, check_claim, read_pixels
+from relume.imageio.primaries import convert
 from relume.imageio.shrink import shrink
-from relume.remarks import simplified, wrong
+from relume.remarks import Remark, simplified, wrong
 
 F32 = NDArray[np.float32]
 
@@ -21,7 +22,6 @@ MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
 OF_SCENES = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
-HDR_RESOLUTION = re.compile(rb"-Y\s+(\d{1,9})\s+\+X\s+(\d{1,9})\s*\Z")
 
 
 def read_environment(source: str | Path | bytes, name: str, most_width: int = OF_SCENES) -> Environment:
@@ -33,7 +33,7 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
         most_width: it is kept at most so many texels wide, each the mean of those that it stands for.
 
     Returns:
-        The environment, in linear Rec. 709 whatever the primaries that an .exr tells, with one warning for each thing
+        The environment, in linear Rec. 709 whatever the primaries that it tells, with one warning for each thing
         that was repaired: texels that are not finite become black, negative values 0, and radiance is held below 1e6;
         and one where it was reduced.
 
@@ -44,14 +44,24 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
     if not data:
         raise SceneError(f"environment {name!r} is empty: 0 bytes; export or download it again")
     if data.startswith(b"#?"):
-        suffix, (width, height) = ".hdr", _hdr_size(data, name)
-        _check_size(name, width, height)
-        check_claim(width * height * 12, data, what)
+        pixels, said = _read_radiance(data, name, what)
     elif data.startswith(EXR_MAGIC):
-        suffix = ".exr"
+        pixels, said = read_pixels(data, ".exr", what, partial(_check_size, name)), ()
     else:
         raise SceneError(f"environment {name!r} is neither Radiance .hdr nor OpenEXR; convert it to one of them")
-    return _reduced(_repaired(read_pixels(data, suffix, what, partial(_check_size, name)), name), most_width)
+    return _reduced(_repaired(pixels, name, said), most_width)
+
+
+def _read_radiance(data: bytes, name: str, what: str) -> tuple[F32, tuple[Remark, ...]]:
+    """Texels in linear Rec. 709, and what is to be said of them."""
+    header = read_header(data, name)
+    _check_size(name, header.width, header.height)
+    check_claim(header.width * header.height * 12, data, what)
+    pixels = read_pixels(data, ".hdr", what, partial(_check_size, name))
+    if header.to_rec_709 is not None:
+        convert(pixels, header.to_rec_709)
+    odd = simplified(f"environment {name!r} tells primaries that are no colours; it is read as linear Rec. 709")
+    return pixels, (odd,) * header.has_odd_primaries
 
 
 def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
@@ -70,19 +80,6 @@ def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
         raise SceneError(f"environment {name!r} cannot be read ({problem.strerror}); check the file") from None
 
 
-def _hdr_size(data: bytes, name: str) -> tuple[int, int]:
-    """Read width and height from a Radiance header: lines of at most 2 kB, an empty one, then `-Y height +X width`."""
-    lines = data[:65_536].split(b"\n")
-    try:
-        resolution = lines[lines.index(b"") + 1]
-    except (ValueError, IndexError):
-        raise SceneError(f"environment {name!r} has no Radiance header; export it again") from None
-    found = HDR_RESOLUTION.match(resolution)
-    if found is None or max(len(line) for line in lines[: lines.index(b"")]) > 2_048:
-        raise SceneError(f"environment {name!r} has an odd Radiance header; save it top row first")
-    return int(found[2]), int(found[1])
-
-
 def _check_size(name: str, width: int, height: int) -> None:
     if not (1 <= width <= MAX_WIDTH and 1 <= height <= MAX_HEIGHT):
         raise SceneError(
@@ -92,8 +89,8 @@ def _check_size(name: str, width: int, height: int) -> None:
         raise SceneError(f"environment {name!r} is {width}×{height}; an equirectangular map is twice as wide as high")
 
 
-def _repaired(pixels: F32, name: str) -> Environment:
-    warnings = []
+def _repaired(pixels: F32, name: str, said: tuple[Remark, ...]) -> Environment:
+    warnings = [*said]
     broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
     if broken.all():
         raise SceneError(f"no texel of environment {name!r} is a finite number; render or export it again")

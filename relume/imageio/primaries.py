@@ -1,4 +1,4 @@
-"""Light in other primaries than ours: an OpenEXR file's `chromaticities`, converted to linear Rec. 709.
+"""Light in other primaries than ours: OpenEXR's `chromaticities`, Radiance's `PRIMARIES`, converted to linear Rec. 709.
 
 With the columns of P the primaries (x, y, 1 − x − y), and s so that they add up to the white, P s = w / y_w, colours go
 to XYZ by P diag(s), from the file's white to ours by von Kries's rule in Bradford's cone space (ICC.1, annex E), and
@@ -16,7 +16,7 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""x and y of red, green, blue and white (ITU-R BT.709-6), in the order of the attribute."""
+"""x and y of red, green, blue and white (ITU-R BT.709-6), in the order of both formats."""
 
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _FURTHEST = 2.0  # of a coordinate from 0; primaries that enclose all colours are within 1.1

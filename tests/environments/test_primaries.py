@@ -84,3 +84,33 @@ def test_an_attribute_that_is_no_eight_numbers_is_refused(tmp_path):
     words = data.replace(b"chromaticities\0chromaticities\0\x20\0\0\0", b"chromaticities\0string\0\x20\0\0\0")
     with pytest.raises(SceneError):
         read_environment(words, "dusk")
+
+
+def with_primaries(path, words):
+    """The dusk as an .hdr whose header has one more line."""
+    write_map(path, dusk())
+    head, rest = path.read_bytes().split(b"\n", 1)
+    path.write_bytes(head + b"\nPRIMARIES=" + words + b"\n" + rest)
+    return path
+
+
+def test_a_radiance_header_tells_primaries_too(tmp_path):
+    """Zeros are written by who does not know them; the last line counts."""
+    plain = read_environment(write_map(tmp_path / "plain.hdr", dusk()), "dusk").radiance
+    wide = " ".join(map(str, REC_2020)).encode()
+    found = read_environment(with_primaries(tmp_path / "wide.hdr", wide), "dusk")
+    np.testing.assert_allclose(
+        found.radiance, np.maximum(plain @ np.array(OF_2020, np.float32).T, 0), rtol=2e-3, atol=1e-3
+    )
+    assert np.abs(found.radiance - plain).max() > 0.1
+    for words in (b"", b" 0 0 0 0 0 0 0 0", wide + b"\nPRIMARIES= " + " ".join(map(str, REC_709)).encode()):
+        same = read_environment(with_primaries(tmp_path / "same.hdr", words), "dusk")
+        np.testing.assert_array_equal(same.radiance, plain)
+        assert not same.warnings
+
+
+@pytest.mark.parametrize("words", [b"1 2 3", b"a b c d e f g h", b"nan " * 8, b"1e999 " * 8, b"0.3 0.3 " * 4])
+def test_radiance_primaries_that_are_none_are_said(tmp_path, words):
+    found = read_environment(with_primaries(tmp_path / "a.hdr", words), "dusk")
+    assert "primaries that are no colours" in found.warnings[0]
+    np.testing.assert_array_equal(found.radiance, read_environment(write_map(tmp_path / "b.hdr", dusk()), "b").radiance)
