@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { followMakings, forgetMaking, makings, makingWords, stopMaking } from "../src/library/making";
+import { followMakings, forgetMaking, isInTheMaking, makings, makingWords, stopMaking } from "../src/library/making";
 import type { BtfWorkBody } from "../src/protocol";
 import { libraryOpen } from "../src/state/panels";
 
@@ -37,6 +37,11 @@ beforeEach(() => {
 afterEach(() => {
   vi.useRealTimers();
   vi.unstubAllGlobals();
+});
+
+it("makes no second texture of a kind while one is made", () => {
+  makings.value = [work("a", { geometry: "weave" }), work("b", { geometry: "pebbles", state: "stopped" })];
+  expect([isInTheMaking("weave"), isInTheMaking("pebbles")]).toEqual([true, false]);
 });
 
 describe("textures in the making", () => {

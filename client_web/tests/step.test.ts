@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { stepName } from "../src/edit/step";
+import { stepName, stepWords } from "../src/edit/step";
 import type { Look, ModelBody } from "../src/protocol";
 import { LOOK } from "./look";
 
@@ -24,4 +24,9 @@ test("a parameter's step names material and parameter", () => {
 test("what belongs to no material keeps its own name; an unknown curve is called as it is", () => {
   expect(stepName("/display/exposure", "Exposure", shiny, models)).toBe("Exposure");
   expect(stepName("/materials/Tea~1pot/terms/3/curves/x", "Draw curve", shiny, models)).toBe("Tea/pot · x · draw curve");
+});
+
+test("a label is read as what was edited and what was done", () => {
+  expect(stepWords("Tea/pot · half angle θh · move point")).toEqual({ of: "Tea/pot", deed: "half angle θh · move point" });
+  expect(stepWords("Opened")).toEqual({ of: null, deed: "Opened" });
 });

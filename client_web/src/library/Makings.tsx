@@ -2,7 +2,7 @@
 import { useRef } from "preact/hooks";
 import type { BtfWorkBody } from "../protocol";
 import { BTFS, goOn, importMaterial, make, model, sending } from "./library";
-import { forgetMaking, GEOMETRIES, isGoingOn, makings, makingWords, sendingImages, stopMaking } from "./making";
+import { forgetMaking, GEOMETRIES, isGoingOn, isInTheMaking, makings, makingWords, sendingImages, stopMaking } from "./making";
 
 export const MATERIAL_FILES = ".binary,.zip,.btf";
 
@@ -53,7 +53,7 @@ function Synthetic() {
     <div class="library-synthetic" role="group" aria-label="Make a synthetic texture">
       <span>Render a synthetic one, some minutes:</span>
       {GEOMETRIES.map((geometry) => (
-        <button key={geometry} onClick={() => void make(geometry)}>
+        <button key={geometry} disabled={isInTheMaking(geometry)} onClick={() => void make(geometry)}>
           {geometry}
         </button>
       ))}

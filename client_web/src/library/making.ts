@@ -23,6 +23,11 @@ export function isGoingOn({ state }: Pick<BtfWorkBody, "state">): boolean {
   return state === "queued" || state === "running";
 }
 
+/** A second one would be the same. */
+export function isInTheMaking(geometry: Geometry): boolean {
+  return makings.value.some((work) => work.geometry === geometry && isGoingOn(work));
+}
+
 /** Follow what is made until nothing is, or the library is closed; `arrived` is called when something is ready. */
 export async function followMakings(arrived: () => Promise<void>): Promise<void> {
   if (isFollowing) return;

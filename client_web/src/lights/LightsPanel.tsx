@@ -4,7 +4,7 @@ import { hold } from "../live/touch";
 import type { Light } from "../protocol";
 import { soloLight, toggleLightSolo } from "../seen/solo";
 import { handlesOpen } from "../state/display";
-import { defaultLook } from "../state/look";
+import { defaultLook, look } from "../state/look";
 import { folded, toggleFolded } from "../state/panels";
 import { selectedLight, selectLight } from "../state/selection";
 import { IconButton } from "../ui/Button";
@@ -95,7 +95,7 @@ export function LightsPanel() {
   return (
     <Section title={TITLE} count={all.length} actions={<Actions />}>
       {adding.value && <Kinds />}
-      {all.length === 0 && !adding.value && <p class="environment-words">None yet; + adds one.</p>}
+      {all.length === 0 && look.value !== null && !adding.value && <p class="environment-words">None yet; + adds one.</p>}
       <ul class="lights">
         {all.map(([name, light]) => (
           <Row key={name} name={name} light={light} />

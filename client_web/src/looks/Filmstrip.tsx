@@ -3,6 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { isSame } from "../document/difference";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
+import { stepWords } from "../edit/step";
 import { connect } from "../live/connect";
 import type { Look } from "../protocol";
 import { bake } from "../state/bakes";
@@ -132,6 +133,17 @@ function Variants() {
   );
 }
 
+/** What was edited on a line of its own, so that a long name leaves room for what was done. */
+function StepWords({ label }: { label: string }) {
+  const { of, deed } = stepWords(label);
+  return (
+    <span class="tile-name" title={label}>
+      {of !== null && <span class="of">{of}</span>}
+      <span class="deed">{deed}</span>
+    </span>
+  );
+}
+
 function StepTile({ count, label, of }: { count: number; label: string; of: Look | undefined }) {
   const current = history.cursor.value === count;
   const undone = count > history.cursor.value;
@@ -145,9 +157,7 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
       >
         <Picture image={lookThumbnail(of)} text={label} />
       </button>
-      <span class="tile-name" title={label}>
-        {label}
-      </span>
+      <StepWords label={label} />
     </li>
   );
 }
@@ -157,7 +167,7 @@ function Steps() {
   const steps = history.steps.value;
   useEffect(
     () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" }),
-    [history.cursor.value, steps.length],
+    [history.cursor.value, steps.length, scene.value?.variants.length], // variants take room from it
   );
   const first = Math.max(0, steps.length - MAX_STEPS);
   const opened = steps.find((step) => step.of === "look")?.before ?? look.value ?? undefined;

@@ -125,6 +125,7 @@ function usePointer(screen: Screen | null, view: string) {
     drag.current = { x: event.clientX, y: event.clientY, moved: true };
     const eye = eyeOf(view);
     if (eye === null) return panBy(screen, dx, dy);
+    leavePicture(); // what was probed has moved away from the pointer
     const { height } = screen.size();
     if (event.shiftKey || (event.buttons & 6) !== 0) eye.change((orbit) => panned(orbit, dx / height, dy / height));
     else eye.change((orbit) => turned(orbit, (-TURN * dx) / height, (TURN * dy) / height));
