@@ -165,10 +165,13 @@ function StepTile({ count, label, of }: { count: number; label: string; of: Look
 function Steps() {
   const strip = useRef<HTMLUListElement>(null);
   const steps = history.steps.value;
-  useEffect(
-    () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" }),
-    [history.cursor.value, steps.length, scene.value?.variants.length], // variants take room from it
-  );
+  const showCurrent = () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  useEffect(showCurrent, [history.cursor.value, steps.length]);
+  useEffect(() => {
+    const observer = new ResizeObserver(showCurrent); // saved looks and variants that arrive take room from it
+    observer.observe(strip.current as Element);
+    return () => observer.disconnect();
+  }, []);
   const first = Math.max(0, steps.length - MAX_STEPS);
   const opened = steps.find((step) => step.of === "look")?.before ?? look.value ?? undefined;
   // steps that are not of the look (one was deleted) show the picture before them

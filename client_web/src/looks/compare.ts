@@ -7,12 +7,14 @@ import { completedLight } from "../lights/kinds";
 import { withPicturesOf } from "../live/want";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
+import { isPartOfLook } from "../seen/limits";
 import { connection } from "../state/connection";
 import { held, showBefore, wipe } from "../state/display";
 import { exact } from "../state/fidelity";
 import { defaultLook, look } from "../state/look";
 import { filmstripOpen } from "../state/panels";
 import { scene } from "../state/scene";
+import { lookThumbnail } from "../state/thumbnails";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
 import { addLook, keepThumbnail, unusedName } from "./shelf";
@@ -74,10 +76,10 @@ export function toggleWipe(): void {
 export async function saveLook(): Promise<void> {
   const current = look.value;
   if (current === null) return;
-  const image = thumbnail(stage.active.pixels, current.display);
+  const image = isPartOfLook() ? lookThumbnail(current) : thumbnail(stage.active.pixels, current.display);
   const name = await attempt(unusedName);
   if (name === undefined) return;
-  keepThumbnail(name, image);
+  if (image !== null) keepThumbnail(name, image); // else it gets one when it is shown whole
   filmstripOpen.value = true;
   justSaved.value = name;
   await addLook(name, current);

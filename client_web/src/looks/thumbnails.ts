@@ -3,8 +3,7 @@ import { effect } from "@preact/signals";
 import { isDrawn } from "../live/exactness";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
-import { seenPaths } from "../seen/paths";
-import { soloLight } from "../seen/solo";
+import { isPartOfLook } from "../seen/limits";
 import { connection } from "../state/connection";
 import { drawn, held } from "../state/display";
 import { exact } from "../state/fidelity";
@@ -30,9 +29,7 @@ function giveToSaved(of: Look, image: string): void {
 }
 
 function take(current: Look): void {
-  // one light alone is no picture of the look, nor are some of its paths
-  const partly = soloLight.peek() !== null || seenPaths.peek() !== null;
-  if (look.peek() !== current || held.peek() || partly || !stage.active.isThere) return;
+  if (look.peek() !== current || held.peek() || isPartOfLook() || !stage.active.isThere) return;
   // while there is no connection, what is shown is of the step before
   if (connection.peek() !== "open" || !isDrawn()) return;
   const image = thumbnail(stage.active.pixels, current.display);

@@ -2,7 +2,7 @@
 import { computed } from "@preact/signals";
 import { defaultLook, look } from "../state/look";
 import { limitWords } from "./pathWords";
-import { seePaths, shownPaths } from "./paths";
+import { seenPaths, seePaths, shownPaths } from "./paths";
 import { hasSource, solo, soloLight } from "./solo";
 
 export interface Limit {
@@ -15,6 +15,11 @@ export interface Limit {
 function showAllPaths(): void {
   const initial = defaultLook.peek()?.transport;
   if (initial !== undefined) seePaths(initial);
+}
+
+/** Whether light of the look is left out now: one light alone is no picture of a look, nor are some of its paths. */
+export function isPartOfLook(): boolean {
+  return soloLight.peek() !== null || seenPaths.peek() !== null;
 }
 
 /** Of light: what is missing in the pictures of the server, so in exported ones too. */
