@@ -1,4 +1,4 @@
-"""Inverse functions of angles by polynomials: libm's are calls for every pixel, and keep loops from vector code."""
+"""Inverse functions of angles and logarithms by polynomials: libm's are calls, which keep loops from vector code."""
 
 from __future__ import annotations
 
@@ -44,3 +44,20 @@ def azimuth_turns(x, y):  # type: ignore[no-untyped-def]
     turn = np.float32(0.25) - turn if across > along else turn
     turn = np.float32(0.5) - turn if x < 0 else turn
     return _ONE - turn if y < 0 and turn > 0 else turn
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def log2_above_one(x):  # type: ignore[no-untyped-def]
+    """Logarithm to base 2 of a float32 that is 1 or more; error below 1e-6, exact for powers of 2.
+
+    Of a mantissa 1 + t it is t (1 + (t − 1) q(t)), q by least squares.
+    """
+    bits = np.float32(x).view(np.int32)
+    t = np.int32((bits & 0x7FFFFF) | 0x3F800000).view(np.float32) - _ONE
+    q = np.float32(0.01486540)
+    q = q * t - np.float32(0.06244901)
+    q = q * t + np.float32(0.12888130)
+    q = q * t - np.float32(0.19509052)
+    q = q * t + np.float32(0.27782506)
+    q = q * t - np.float32(0.44266276)
+    return np.float32((bits >> 23) - 127) + t * (_ONE + (t - _ONE) * q)

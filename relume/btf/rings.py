@@ -89,23 +89,17 @@ def polar(theta: F64, phi: F64) -> F64:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
-    """Find the four directions about one, and their weights.
+def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
+    """Do as `taps` of angles.
 
     Args:
-        rings: the `Rings`. x, y, z: the direction, unit, above the horizon.
-        index: written. (4,) int32. weight: written. (4,) float32
-    Returns:
-        What is left of the cosine beyond the last ring: z over the last ring's, at most one.
+        rings, index, weight: as there. theta: radians, up to π/2. turn: φ, a share of a turn.
     """
-    theta_last = rings.theta[rings.theta.shape[0] - 1]
-    theta = acos_clamped(z)
     lower = 0
     while lower < rings.theta.shape[0] - 2 and theta >= rings.theta[lower + 1]:
         lower += 1
     share: Any = (theta - rings.theta[lower]) / (rings.theta[lower + 1] - rings.theta[lower])
-    share = np.float32(min(max(share, 0.0), 1.0))
-    turn = azimuth_turns(x, y)
+    share = np.float32(min(max(share, np.float32(0)), np.float32(1)))
     for k in range(2):
         first, count = rings.first[lower + k], rings.first[lower + k + 1] - rings.first[lower + k]
         place = np.float32(turn * count - rings.shift[lower + k])
@@ -116,7 +110,20 @@ def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
         of_ring = share if k == 1 else np.float32(1) - share
         index[2 * k], index[2 * k + 1] = first + near, first + (near + 1 if near + 1 < count else 0)
         weight[2 * k], weight[2 * k + 1] = of_ring * (np.float32(1) - part), of_ring * part
-    return np.float32(min(max(z, np.float32(0)) / math.cos(theta_last), np.float32(1)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
+    """Find the four directions about one, and their weights.
+
+    Args:
+        rings: the `Rings`. x, y, z: the direction, unit, above the horizon.
+        index: written. (4,) int32. weight: written. (4,) float32
+    Returns:
+        What is left of the cosine beyond the last ring: z over the last ring's, at most one.
+    """
+    taps_at(rings, acos_clamped(z), azimuth_turns(x, y), index, weight)
+    return np.float32(min(max(z, np.float32(0)) / math.cos(rings.theta[rings.theta.shape[0] - 1]), np.float32(1)))
 
 
 def taps_numpy(rings: Rings, w: F64) -> tuple[NDArray[np.int64], F64, F64]:

@@ -17,6 +17,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.arcs import log2_above_one
 from relume.brdf.terms.btf import Texels
 from relume.btf.parallax import height_seen, height_seen_numpy, slant_of, slants
 from relume.btf.rings import Rings, taps, taps_numpy
@@ -75,7 +76,8 @@ def _from_listed(rings, axes, first, wi, irradiance, out):  # type: ignore[no-un
 def _beside(place, count):  # type: ignore[no-untyped-def]
     """Find the two texels of a row beside a place within [0, 1], and the share of the second."""
     x: Any = place * np.float32(count) - np.float32(0.5)
-    low: Any = min(max(np.int32(math.floor(x)), np.int32(-1)), np.int32(count - 1))  # whatever the place is
+    # a floor, which would be a call; whatever the place is
+    low: Any = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
     share = np.float32(x - np.float32(low))
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), share
 
@@ -90,11 +92,28 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
     Returns:
         How many there are: four of each level that has a share.
     """
-    finest, coarsest = np.float32(max(levels[0, 1], levels[0, 2])), levels.shape[0] - 1
-    level: Any = min(np.float32(math.log2(max(_TEXEL * footprint * finest, np.float32(1)))), np.float32(coarsest))
-    lower = np.int64(level)
-    between = np.float32(level - np.float32(lower))
+    level = level_of(footprint, np.float32(max(levels[0, 1], levels[0, 2])))
     u, v = np.float32(u - math.floor(u)), np.float32(v - math.floor(v))  # remainders of integers are slow
+    return texels_at(levels, u, v, level, texel, share)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def level_of(footprint, finest):  # type: ignore[no-untyped-def]
+    """Level of halvings for a footprint, however many there are. finest: side of the finest, in texels."""
+    return log2_above_one(max(_TEXEL * footprint * finest, np.float32(1)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def]
+    """Do as `texels_about`.
+
+    Args:
+        levels, texel, share: as there. u, v: shares of a repeat. level: between two, see `level_of`.
+    """
+    coarsest = levels.shape[0] - 1
+    near: Any = min(level, np.float32(coarsest))
+    lower = np.int64(near)
+    between = np.float32(near - np.float32(lower))
     num = 0
     for step in range(2):
         of_level = between if step == 1 else np.float32(1) - between

@@ -1,8 +1,8 @@
-"""Angles by polynomials are those of NumPy, as near as they say."""
+"""Angles and logarithms by polynomials are those of NumPy, as near as they say."""
 
 import numpy as np
 
-from relume.basis.arcs import acos_clamped, azimuth_turns
+from relume.basis.arcs import acos_clamped, azimuth_turns, log2_above_one
 
 
 def test_arc_cosine_is_that_of_numpy_and_clamps():
@@ -21,3 +21,10 @@ def test_azimuth_is_that_of_numpy_all_round():
     assert found.min() >= 0
     assert found.max() <= 1
     assert azimuth_turns(np.float32(0), np.float32(0)) == 0
+
+
+def test_logarithm_is_that_of_numpy_and_exact_for_powers():
+    x = np.concatenate([np.linspace(1, 2, 2001), np.geomspace(1, 1e30, 997)]).astype(np.float32)
+    found = np.array([log2_above_one(one) for one in x], np.float64)
+    np.testing.assert_allclose(found, np.log2(x.astype(np.float64)), rtol=2e-7, atol=1e-6)
+    assert [log2_above_one(np.float32(2.0**k)) for k in range(20)] == list(range(20))

@@ -18,8 +18,8 @@ from relume.basis.zernike import ladder
 from relume.moving.look_up import need_points
 from relume.moving.points.surface import Surface
 from relume.moving.points.vertices import Vertices
-from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, OF_ORDER, WIDTH
-from relume.moving.relief.place import cross, dot, row
+from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, OF_ORDER, PAIRS, WIDTH
+from relume.moving.relief.place import cross, dot, face_places, row
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -34,7 +34,8 @@ class VertexLight(NamedTuple):
 
     Attributes:
         tangent: that azimuths are counted from, about as unit. (vertices, 3) float32
-        vectors: the first functions of the in-basis, in lanes, channels outermost. (vertices, 3 F) float32
+        vectors: the first functions of the in-basis, in lanes: the cosine parts of the three channels, then their sine
+            parts. (vertices, 3 F) float32
     """
 
     tangent: F32
@@ -54,29 +55,24 @@ def turn_by(x, y):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def add_turned(lanes, turn, side, weight, out):  # type: ignore[no-untyped-def]
+def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 
     Args:
         lanes: of it. (3 F,) float32. turn: from `turn_by`. side: −1 where azimuths run the other way round, else 1.
-        weight: that it counts with. out: added to. (3 F,) float32
+        weight: that it counts with. is_added: to what is in `out`, which is written. (3 F,) float32
     """
     c1, s1, c2, s2, c3, s3, c4, s4 = turn
-    for i in range(HALF):
+    for i in range(PAIRS):
         # sums over orders, of which each lane has one: what is looked up in arrays that were just written stalls
         is0, is1, is2, is3, is4 = OF_ORDER[0, i], OF_ORDER[1, i], OF_ORDER[2, i], OF_ORDER[3, i], OF_ORDER[4, i]
         cosine = weight * (is0 + c1 * is1 + c2 * is2 + c3 * is3 + c4 * is4)
         sine = weight * (s1 * is1 + s2 * is2 + s3 * is3 + s4 * is4)
         mirror = is0 + side * (np.float32(1) - is0)  # what no order turns is not mirrored either
-        a, b = lanes[i], mirror * lanes[HALF + i]
-        c, d = lanes[WIDTH + i], mirror * lanes[WIDTH + HALF + i]
-        e, f = lanes[2 * WIDTH + i], mirror * lanes[2 * WIDTH + HALF + i]
-        out[i] += cosine * a - sine * b
-        out[HALF + i] += sine * a + cosine * b
-        out[WIDTH + i] += cosine * c - sine * d
-        out[WIDTH + HALF + i] += sine * c + cosine * d
-        out[2 * WIDTH + i] += cosine * e - sine * f
-        out[2 * WIDTH + HALF + i] += sine * e + cosine * f
+        a, b = lanes[i], mirror * lanes[PAIRS + i]
+        before, other = (out[i], out[PAIRS + i]) if is_added else (np.float32(0), np.float32(0))
+        out[i] = before + cosine * a - sine * b
+        out[PAIRS + i] = other + sine * a + cosine * b
 
 
 @nb.njit(nogil=True, cache=True)
@@ -86,7 +82,8 @@ def _lay(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
         for channel in range(3):
             for i in range(WIDTH):
                 if i != EMPTY:  # what that lane had at first, nothing, stays
-                    out[p, channel * WIDTH + i] = vectors[p, channel, FUNCTIONS[i]]
+                    place = i if i < HALF else PAIRS - HALF + i
+                    out[p, channel * HALF + place] = vectors[p, channel, FUNCTIONS[i]]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -111,17 +108,31 @@ def _spread(vertices, tangents, lanes, rows, start, stop, tangent, out):  # type
                 turn = turn_by(dot(of_point, t), dot(of_point, b))
                 for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
                     of_one[i] = lanes[point, i]
-                add_turned(of_one, turn, np.float32(1), weight, sums)
+                add_turned(of_one, turn, np.float32(1), weight, True, sums)
         for i in range(3 * WIDTH):
             out[v, i] = sums[i]
 
 
 class ReliefLight:
-    """What arrives about the vertices that a moving picture has seen in a light; used from one thread at a time."""
+    """What arrives about the vertices that a moving picture has seen in a light, and where textures lie.
+
+    Used from one thread at a time.
+    """
 
     def __init__(self) -> None:
         self._vectors: F32 | None = None
+        self._places: F32 | None = None
         self._lanes, self._found, self._is_found = _NOTHING, VertexLight(_NOTHING, _NOTHING), np.empty(0, np.uint8)
+
+    def places(self, surface: Surface, positions: F32) -> F32:
+        """Find where the surface's triangles lie in textures, once: it stays as it is.
+
+        Args:
+            surface, positions: as in `face_places`, which is what is returned.
+        """
+        if self._places is None:
+            self._places = face_places(positions, surface)
+        return self._places
 
     def about(self, surface: Surface, vectors: F32, is_asked: U8) -> VertexLight:
         """Find what arrives about vertices, which is kept as long as the light is.

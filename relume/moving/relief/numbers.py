@@ -19,8 +19,9 @@ DEGREE = 4  # of the in-basis, as of harmonics in the paper: a BTF tells no ligh
 NUM_FUNCTIONS = num_functions(DEGREE)
 WIDTH = 16  # F: lanes of a channel
 HALF = WIDTH // 2
-OF_ORDER = (np.array([1, 2, 0, 0, 1, 3, 2, 4]) == np.arange(DEGREE + 1)[:, None]).astype(np.float32)
-"""Whether m, up to 4, is the order of lanes i and i + 8. (5, 8) float32"""
+PAIRS = 3 * HALF  # of lanes that turn together, of all channels
+OF_ORDER = (np.tile([1, 2, 0, 0, 1, 3, 2, 4], 3) == np.arange(DEGREE + 1)[:, None]).astype(np.float32)
+"""Whether m, up to 4, is the order of pairs of lanes. (5, 24) float32"""
 FUNCTIONS = np.array([1, 4, 0, 3, 6, 8, 11, 13, 2, 5, 10, -1, 7, 9, 12, 14])
 """Which function of the in-basis each lane has; the two that no order turns share a pair, one lane has none. (F,)"""
 EMPTY = int(np.flatnonzero(FUNCTIONS < 0)[0])
