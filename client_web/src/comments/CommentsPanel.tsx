@@ -13,7 +13,10 @@ function Writing() {
   const [text, setText] = useState("");
   const field = useRef<HTMLTextAreaElement>(null);
   const pin = pinning.value;
-  useEffect(() => field.current?.focus(), []);
+  // a click that pins it elsewhere must not leave the words to the keys of the page; a pin moved by keys keeps the focus
+  useEffect(() => {
+    if (document.activeElement?.matches(".pin:focus-visible") !== true) field.current?.focus();
+  }, [pin]);
   if (pin === null) return null;
   const keep = async () => {
     if (text.trim() !== "" && (await keepComment(text))) setText("");

@@ -45,3 +45,13 @@ def test_a_comment_is_pinned_written_resolved_and_deleted_without_a_pointer(edit
     expect(entry.locator("img")).to_be_visible()
     panel.get_by_role("button", name="Delete comment 1").press("Enter")
     expect(panel).to_contain_text("Nobody has written any yet.")
+
+
+def test_words_go_on_after_a_click_that_pins_them_elsewhere(editor: Editor) -> None:
+    page = editor.page
+    page.keyboard.press("n")
+    words = page.get_by_role("complementary", name="Comments").get_by_role("textbox")
+    words.fill("Too bright")
+    editor.canvas.click(position={"x": 200, "y": 200})
+    expect(words).to_be_focused()
+    expect(words).to_have_value("Too bright")
