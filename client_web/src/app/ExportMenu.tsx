@@ -1,7 +1,10 @@
 /** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
 import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES } from "../looks/export";
+import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
+import { drawn } from "../state/display";
+import { look } from "../state/look";
 import { moves, sideBySide, viewName } from "../state/views";
 
 /** What an export is of: with several views shown it must be said. */
@@ -45,7 +48,9 @@ const TURNTABLES: Choice[] = [
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
-  const busy = exporting.value !== null;
+  drawn.value;
+  const none = look.value === null || !stage.active.isThere;
+  const busy = none || exporting.value !== null;
   const escape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || !open) return;
     event.stopPropagation(); // a menu that the buttons are in stays
@@ -54,7 +59,11 @@ export function ExportMenu() {
   return (
     <div class="menu" onKeyDown={escape}>
       <div class="group" role="group" aria-label="Export">
-        <button title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`} onClick={() => void exportPng()}>
+        <button
+          title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`}
+          disabled={none}
+          onClick={() => void exportPng()}
+        >
           PNG
         </button>
         <button

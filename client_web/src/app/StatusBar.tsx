@@ -6,7 +6,7 @@ import { cancelBake } from "../net/api";
 import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
 import { limits } from "../seen/limits";
 import { coming } from "../state/bakes";
-import { connection, freezing, refusedBecause, retryInMs } from "../state/connection";
+import { connection, freezing, retryInMs } from "../state/connection";
 import { settled } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
 import { bakedLight, look } from "../state/look";
@@ -14,24 +14,10 @@ import { shownPanels } from "../state/room";
 import { companyWords } from "../state/together";
 import { moves } from "../state/views";
 import { toggleTruth } from "../truth/truth";
-import { formatBytes, formatSeconds } from "../ui/scale";
+import { formatBytes } from "../ui/scale";
 import { attempt } from "../ui/toasts";
+import { connectionWords } from "./connectionWords";
 import { useMemory } from "./memory";
-
-function connectionWords(): string {
-  switch (connection.value) {
-    case "open":
-      return "Connected";
-    case "connecting":
-      return "Connecting…";
-    case "reconnecting":
-      return retryInMs.value > 0
-        ? `${refusedBecause.value === null ? "Connection lost. Edits are kept" : `Not let in: ${refusedBecause.value}`}; trying again in ${formatSeconds(retryInMs.value / 1000)}`
-        : "Reconnecting…";
-    case "closed":
-      return "Not connected";
-  }
-}
 
 function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
@@ -78,6 +64,7 @@ export function StatusBar() {
       <button 
         aria-pressed={shownPanels.value.includes("truth")}
         title="Compare this picture with brute force"
+        disabled={look.value === null}
         onClick={toggleTruth}
       >
         How true is this?
