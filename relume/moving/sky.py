@@ -56,8 +56,8 @@ def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
-    """Add a share of one level in a place; bilinear, round about in u. out: (3,)"""
+def _level_at(sky, level, u, v):  # type: ignore[no-untyped-def]
+    """Look up one level in a place; bilinear, round about in u. Returns three numbers."""
     first, height, width = sky.levels[level, 0], sky.levels[level, 1], sky.levels[level, 2]
     x = u * np.float32(width) - np.float32(0.5)
     y: Any = min(max(v * np.float32(height) - np.float32(0.5), np.float32(0)), np.float32(height - 1))
@@ -66,12 +66,16 @@ def _add_level(sky, level, u, v, share, out):  # type: ignore[no-untyped-def]
     fx, fy = x - np.float32(column), y - np.float32(row)
     beside, below = (column + 1 if column + 1 < width else column + 1 - width), min(row + 1, height - 1)
     column = column + width if column < 0 else column
-    for channel in range(3):
-        top = sky.texels[first + row * width + column, channel] * (1 - fx)
-        top += sky.texels[first + row * width + beside, channel] * fx
-        bottom = sky.texels[first + below * width + column, channel] * (1 - fx)
-        bottom += sky.texels[first + below * width + beside, channel] * fx
-        out[channel] += share * (top * (1 - fy) + bottom * fy)
+    upper, lower = first + row * width, first + below * width
+    a, b, c, d = upper + column, upper + beside, lower + column, lower + beside
+    wb, wd = fx * (np.float32(1) - fy), fx * fy
+    wa, wc = np.float32(1) - fy - wb, fy - wd
+    t = sky.texels
+    return (
+        wa * t[a, 0] + wb * t[b, 0] + wc * t[c, 0] + wd * t[d, 0],
+        wa * t[a, 1] + wb * t[b, 1] + wc * t[c, 1] + wd * t[d, 1],
+        wa * t[a, 2] + wb * t[b, 2] + wc * t[c, 2] + wd * t[d, 2],
+    )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -95,21 +99,20 @@ def add_sky_about(sky, turn, direction, level, gain, out):  # type: ignore[no-un
     lower = np.int64(place)
     share = place - np.float32(lower)
     u, v = _place(turn, direction[0], direction[1], direction[2])
-    _add_level(sky, lower, u, v, gain * (np.float32(1) - share), out)
-    if share > 0:
-        _add_level(sky, lower + 1, u, v, gain * share, out)
+    beside: Any = min(lower + 1, sky.levels.shape[0] - 1)
+    sharp, blurred = _level_at(sky, lower, u, v), _level_at(sky, beside, u, v)
+    for channel in range(3):
+        out[channel] += gain * (sharp[channel] + share * (blurred[channel] - sharp[channel]))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _fill(sky, turn, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
     """Fill pixels [start, stop) that see nothing."""
-    found = np.empty(3, np.float32)
     for p in range(start, stop):
         if face[p] >= 0:
             continue
-        found[:] = 0
         u, v = _place(turn, directions[p, 0], directions[p, 1], directions[p, 2])
-        _add_level(sky, 0, u, v, np.float32(1), found)
+        found = _level_at(sky, 0, u, v)
         for channel in range(3):
             out[p, channel] = gain[channel] * found[channel]
 
