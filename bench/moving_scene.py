@@ -115,8 +115,8 @@ class MovingScene:
         return picture
 
     def eye_s(self, frames: int, change: Callable[[dict[str, Any]], None] = lambda document: None) -> list[float]:
-        """Seconds from an eye to its encoded frame, each once; of a changed look."""
-        picture, camera = self.picture(self.look(change)), self._scene.cameras[0]
+        """Seconds from an eye to its encoded frame, each once; of a changed look. Somebody watches."""
+        picture, camera = self.picture(self.look(change), is_watched=True), self._scene.cameras[0]
 
         def move(k: int) -> None:
             to_world = camera.to_world.copy()

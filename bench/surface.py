@@ -2,8 +2,9 @@
 
 Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
 points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the look
-stays; `surface.sun_fps`: the same under a clear sky, the shadows of whose sun pixels find. `surface.brdf_ms`: the
-exponent of the floor's highlight moves, the eye and the lights stay; `edited_share` of the picture's pixels show it.
+stays, and highlights are found finely only once the eye rests; `surface.sun_fps`: the same under a clear sky, the
+shadows of whose sun pixels find. `surface.brdf_ms`: the exponent of the floor's highlight moves, the eye and the lights
+stay; `edited_share` of the picture's pixels show it.
 What surfaces reflect onto each other is made beside the frames and follows `lag_ms` behind; `per_s` counts all frames,
 those among them that show it in every pixel, too. `surface.light_ms`: the environment turns, with all bounces, and is
 followed roughly, in the same way; `all_points_ms` is what all of it takes, at rest.

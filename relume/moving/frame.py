@@ -81,6 +81,7 @@ class Wanted(NamedTuple):
         look: whose materials and background. light: what arrives, by its sources. gain: of all, in each channel. (3,)
         arriving: light vectors of that light. is_rough: they were found quickly.
         relief: what was made of them for texels, in frames of before.
+        is_fine: highlights are found for each pixel as for points, and rims of them smoothed (`relume.moving.rims`).
     """
 
     look: Look
@@ -90,6 +91,7 @@ class Wanted(NamedTuple):
     arriving: Arriving
     is_rough: bool
     relief: ReliefLight
+    is_fine: bool
 
 
 class Sums(NamedTuple):
@@ -130,14 +132,43 @@ def frame_of(
     size: tuple[int, int],
     shares: Sequence[F32] = (),
 ) -> Frame:
-    """Find what an eye sees.
+    """Find what an eye sees, but for rims.
 
     Args:
         transfer: of the bake. wanted: what is shown.
         seen: by the rays of the camera. size: width and height in pixels.
         shares: of each beam that arrives, seen by the rays. (rays,) float32 each
     """
-    (width, height), surface, light = size, transfer.surface, wanted.light
+    width, height = size
+    found = finished_along(transfer, wanted, seen, camera, height, shares)
+    image = resolve(found.radiance, seen.owner, width * height).reshape(height, width, 3)
+    if wanted.look.background.kind != "transparent":
+        return Frame(image, None, found.sums)
+    return Frame(image, resolve(found.hides, seen.owner, width * height).reshape(height, width), found.sums)
+
+
+class Finished(NamedTuple):
+    """What rays show.
+
+    Attributes:
+        radiance: with the background. (rays, 3) float32. hides: how much of what is behind them. (rays,) float32
+        sums: what it was summed from.
+    """
+
+    radiance: F32
+    hides: F32
+    sums: Sums
+
+
+def finished_along(
+    transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, height: int, shares: Sequence[F32] = ()
+) -> Finished:
+    """Find what rays show, glass and background included.
+
+    Args:
+        transfer, wanted, seen, camera, shares: as of `frame_of`. height: of the picture, pixels.
+    """
+    surface, light = transfer.surface, wanted.light
     sums = _summed(transfer, wanted, seen, Part(seen.is_needed, seen.is_seen, None), camera, height)
     out = sums.radiance
     _add_beams(transfer, wanted, seen, camera, height, shares, None, out)
@@ -146,11 +177,7 @@ def frame_of(
     caught = _caught(transfer, wanted, seen)
     behind = seen_behind(transfer, wanted.look.background, light, wanted.gain, seen, caught.is_catcher)
     hides = lay_over(surface, seen, behind, caught, wanted.gain, is_direct=light.paths.direct, out=out)
-    out, hides = lay_over_glass(seen.panes, out), hide_less(seen.panes, hides)
-    image = resolve(out, seen.owner, width * height).reshape(height, width, 3)
-    if wanted.look.background.kind != "transparent":
-        return Frame(image, None, sums)
-    return Frame(image, resolve(hides, seen.owner, width * height).reshape(height, width), sums)
+    return Finished(lay_over_glass(seen.panes, out), hide_less(seen.panes, hides), sums)
 
 
 def only_materials_differ(before: Wanted, after: Wanted) -> bool:
@@ -210,12 +237,13 @@ def _summed(
     glances = _glanced(transfer, wanted, eye, points, glances)
     sky = _sky_in(transfer, wanted.light)
     sent = send(surface, arriving.total, arriving.others, materials.tables, eye, points, sent)
-    add_sky_in_highlights(surface, lobes, sky, eye, glances, points, sent)
+    add_sky_in_highlights(surface, lobes, sky, eye, glances, points, sent, is_fine=wanted.is_fine)
     broad, along = at_vertices(surface, vertices, sent.radiance, broad), at_vertices(surface, vertices, glances, along)
     towards = _towards_light(transfer, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
     pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
-    out = combine(surface, seen, pixel_angle, from_vertices, emission, Mirrored(lobes, sky, along), rays, out)
+    mirrored = Mirrored(lobes, sky, along, wanted.is_fine)
+    out = combine(surface, seen, pixel_angle, from_vertices, emission, mirrored, rays, out)
     sight = Sight(eye, pixel_angle, seen)
     arrived = Arrived(arriving.total, wanted.relief)
     show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, out)

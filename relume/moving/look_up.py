@@ -127,8 +127,7 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
     """
     num, eye = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num, dtype=np.int32), _MIDDLE)
-    hits, panes = trace_from(embree, eye, directions, PAST_GLASS), Panes(np.empty(0, np.int64), _NOTHING)
-    first = find_glass(embree, eye, directions)
+    hits, first = trace_from(embree, eye, directions, PAST_GLASS), find_glass(embree, eye, directions)
     edges = find_edges(surface, hits, directions, size)
     if first is not None:
         edges = np.union1d(edges, find_edges(surface, first, directions, size)).astype(np.int32)
@@ -140,6 +139,36 @@ def look(surface: Surface, embree: EmbreeScene, camera: Camera, size: tuple[int,
         directions = np.concatenate([directions, towards])
     if first is not None:
         first = Hits.joined([first, trace_from(embree, eye, directions[num:], EVERYWHERE)])
+    return _seen_along(surface, embree, directions, hits, first, owner)
+
+
+def look_through(
+    surface: Surface,
+    embree: EmbreeScene,
+    camera: Camera,
+    size: tuple[int, int],
+    pixels: NDArray[np.int32],
+    places: F32,
+) -> Seen:
+    """Find what more rays through some pixels see, and none through the middles of others.
+
+    Args:
+        surface, embree, camera, size: as of `look`.
+        pixels: that are looked through. (n,) int32. places: in each of them, pixel units. (k, 2) float32
+    Returns:
+        Of k rays for each pixel in a row, as if each were a pixel by itself.
+    """
+    eye, directions = camera.to_world[:3, 3].astype(np.float32), _directions(camera, size, pixels, places)
+    hits, first = trace_from(embree, eye, directions, PAST_GLASS), find_glass(embree, eye, directions)
+    return _seen_along(surface, embree, directions, hits, first, np.empty(0, np.int32))
+
+
+def _seen_along(
+    surface: Surface, embree: EmbreeScene, directions: F32, hits: Hits, first: Hits | None, owner: NDArray[np.int32]
+) -> Seen:
+    """Find what is about the hits of rays, and of the glass before them. first: hits of that, None: there is none."""
+    panes = Panes(np.empty(0, np.int64), _NOTHING)
+    if first is not None:
         panes = panes_of(embree, surface, first, directions)
         hits = Hits.joined([hits, first.rows(panes.ray)])
         directions = np.concatenate([directions, directions[panes.ray]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from relume.moving.beams.beam import Beam
 from relume.moving.beams.shadows import shares_seen
 from relume.moving.behind import alpha_of
 from relume.moving.correction import corrected
+from relume.moving.drawn import Drawn
+from relume.moving.fine_job import FineJob, fine_frame
 from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
 from relume.moving.look_up import Seen, look
 from relume.moving.parted import mend
@@ -33,31 +35,18 @@ from relume.picture.picture import Advance
 from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
 from relume.picture.view_images import documents_of
 from relume.scene.model import Camera
-from relume.views.resolve import encode_coverage, encode_pixels, packed
+from relume.views.resolve import encode_coverage, encode_pixels
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
-
-
-@dataclass
-class _Drawn:
-    """What was drawn last.
-
-    Attributes:
-        words: its pixels, packed as RGB9_E5; None where nobody has asked for them. (pixels,) uint32
-    """
-
-    wanted: Wanted
-    seen: Seen
-    frame: Frame
-    words: NDArray[np.uint32] | None = None
 
 
 class MovingPicture:
     """State of one session's picture; used from one thread at a time.
 
     Args:
-        is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long.
+        is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long,
+            and its highlights finely only once eye and light rest.
 
     Attributes:
         draws: its pixels are wanted at every step; else a shader elsewhere finds them from `parts`, and they are drawn
@@ -74,7 +63,7 @@ class MovingPicture:
         self._is_watched = is_watched
         self._is_rough = False  # what is shown was found quickly
         self._shown: tuple[Any, ...] | None = None
-        self._drawn: _Drawn | None = None
+        self._drawn: Drawn | None = None
         self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
         self._materials: tuple[Any, Materials] | None = None
@@ -84,6 +73,7 @@ class MovingPicture:
         self._relief = ReliefLight()
         self._by: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
+        self._is_finer = False  # than it was when somebody saw it
         self.draws = True
         self._told: Arriving | None = None
         self._num_told = self._num_materials = 0
@@ -156,10 +146,27 @@ class MovingPicture:
         if pointer.name not in [one.name for one in names]:
             raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")
 
-    def next_job(self) -> FollowJob | LightJob | None:
-        """What makes a rough picture as good as it gets: the light vectors that it lacks."""
-        is_waiting = self._is_rough and self._has_to_be_rough()
-        return self._vectors.next_job(self._asked(), self._needed) if is_waiting else None
+    def next_job(self) -> FollowJob | LightJob | FineJob | None:
+        """What makes a rough picture as good as it gets: the light vectors that it lacks; then its highlights."""
+        if self._is_rough and self._has_to_be_rough():
+            return self._vectors.next_job(self._asked(), self._needed)
+        return self._fine_job() if self._is_watched and self.draws else None
+
+    def _fine_job(self) -> FineJob | None:
+        """Find highlights finely in what is shown, if they were not."""
+        drawn, wanted = self._drawn, (self._look, self._solo, self._num_eyes, self._vectors.version)
+        if drawn is None or drawn.has_rims or self._is_stale or self._is_rough or wanted != self._shown:
+            return None
+        # made beside frames, which go on with the relief that they have
+        finely = drawn.wanted._replace(is_fine=True, relief=ReliefLight())
+        of = self._transfer, finely, drawn.seen, self._camera, self._size, drawn.shares
+
+        def take(frame: Frame) -> None:
+            if self._drawn is drawn and not self._is_stale and not drawn.has_rims:
+                self._drawn = Drawn(finely, drawn.seen, frame, drawn.shares, has_rims=True)
+                self._is_finer = True
+
+        return FineJob(partial(fine_frame, *of), ("finer", self._num_eyes, id(drawn.wanted)), take)
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
@@ -169,9 +176,9 @@ class MovingPicture:
         """Bring the picture to its look and its eye."""
         wanted = (self._look, self._solo, self._num_eyes, self._vectors.version)
         is_drawn = wanted == self._shown and self._is_rough == self._has_to_be_rough()
-        if self._look is None or (is_drawn and self._is_corrected == self.is_corrected):
+        if self._look is None or (is_drawn and self._is_corrected == self.is_corrected and not self._is_finer):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)
-        self._is_corrected = self.is_corrected
+        self._is_corrected, self._is_finer = self.is_corrected, False
         if not is_drawn:
             self._is_rough = self._has_to_be_rough()
             self._is_stale, self._shown = True, wanted
@@ -197,7 +204,7 @@ class MovingPicture:
         """Points whose light is asked about: those that the eye sees, or all where a shader draws from anywhere."""
         return self._look_around().is_needed if self.draws else self._everywhere
 
-    def _draw(self) -> _Drawn | None:
+    def _draw(self) -> Drawn | None:
         """What is shown, evaluated where that has not been done; None before there is a look."""
         if not self._is_stale or self._look is None:
             return self._drawn
@@ -205,17 +212,20 @@ class MovingPicture:
         wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
         self._is_stale, shares = False, self._shares_of(wanted.arriving.beams, seen)
         if drawn is not None and self._may_change(drawn, wanted, seen):
+            wanted = wanted._replace(is_fine=drawn.wanted.is_fine)
             shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
-            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, _words_of(drawn), shares)
-            drawn.wanted = wanted
+            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, drawn.packed(), shares)
+            drawn.wanted, drawn.has_rims = wanted, False
         else:
-            frame = frame_of(self._transfer, wanted, seen, self._camera, self._size, shares)
-            self._drawn = _Drawn(wanted, seen, frame)
+            find = fine_frame if wanted.is_fine else frame_of
+            frame = find(self._transfer, wanted, seen, self._camera, self._size, shares)
+            self._drawn = Drawn(wanted, seen, frame, shares, has_rims=wanted.is_fine)
         return self._drawn
 
-    @staticmethod
-    def _may_change(drawn: _Drawn, wanted: Wanted, seen: Seen) -> bool:
-        return drawn.seen is seen and not len(seen.panes.ray) and only_materials_differ(drawn.wanted, wanted)
+    def _may_change(self, drawn: Drawn, wanted: Wanted, seen: Seen) -> bool:
+        """Whether what was drawn may be changed; where nobody waits for it, all rims are found anew."""
+        is_same = drawn.seen is seen and not len(seen.panes.ray) and only_materials_differ(drawn.wanted, wanted)
+        return is_same and self._is_watched
 
     def _shown_of(self, before: Materials, after: Materials, seen: Seen) -> Shown:
         """What shows materials that were edited; found once while a hand is on them."""
@@ -238,7 +248,9 @@ class MovingPicture:
         gain = np.array(gain_of(shown, self._solo), np.float32)
         is_exact_but_for_surfaces = self._vectors.follow(self._asked())
         is_rough = self._is_rough and not is_exact_but_for_surfaces
-        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough, self._relief)
+        # what is added to a frame is the error of a fine one
+        is_fine = not self._is_watched or self.is_corrected
+        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough, self._relief, is_fine)
 
     def parts(self) -> tuple[dict[str, Part], Numbers]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""
@@ -265,7 +277,7 @@ class MovingPicture:
         """
         assert self._look is not None
         seen = self._looked(size).middles(size[0] * size[1])
-        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
+        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))._replace(is_fine=True)
         of = self._transfer.solid, seen, self._camera, size
         shares = [shares_seen(*of, beam.targets) for beam in wanted.arriving.beams]
         return frame_of(self._transfer, wanted, seen, self._camera, size, shares).image, seen
@@ -309,7 +321,7 @@ class MovingPicture:
         """Payload of a frame: the tiles one after another, row-major."""
         drawn = self._draw()
         if drawn is not None and self._by is None and form == "rgb9e5" and list(tiles) == self.all_tiles():
-            return _words_of(drawn).tobytes()
+            return drawn.packed().tobytes()
         image = self._image()
         parts = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
         return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
@@ -374,10 +386,3 @@ class MovingPicture:
         raise EditNotSupportedError(
             self._transfer.method, "a brush over a curve; open a fixed view of the scene for it"
         )
-
-
-def _words_of(drawn: _Drawn) -> NDArray[np.uint32]:
-    """Its pixels, packed, from when somebody asks for them first."""
-    if drawn.words is None:
-        drawn.words = packed(drawn.frame.image.reshape(-1, 3))
-    return drawn.words

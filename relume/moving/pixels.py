@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.bumps import leaning, shading_ratio, unit
-from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_lobe
+from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_both, along_lobe
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import EMISSION, NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
@@ -31,11 +31,13 @@ class Mirrored(NamedTuple):
     Attributes:
         lobes: of all materials. sky: that they show where points see it.
         glances: of vertices along their lobes, from `relume.moving.highlights.glances`. (vertices, 3) float32
+        is_fine: two lobes stand for a highlight, as at points, not one.
     """
 
     lobes: Lobes
     sky: SkyLight
     glances: F32
+    is_fine: bool
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -82,7 +84,13 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     hidden, facing = _beyond(per * away), _beyond(per * abs(along))
     above = min((np.float32(1) + facing) / (np.float32(1) + hidden), np.float32(1))
     light[0] = light[1] = light[2] = 0
-    add_sky_in_lobe(mirrored.sky, seen, ray, sigma, above, light)
+    one, other, first = ray, ray, np.float32(1)
+    if mirrored.is_fine:
+        row, share, one, other, first, sigma = along_both(mirrored.lobes, lobe, n, direction)
+    for k in range(2):
+        part = first if k == 0 else np.float32(1) - first
+        if part > 0:
+            add_sky_in_lobe(mirrored.sky, seen, one if k == 0 else other, sigma, above * part, light)
     for channel in range(3):
         light[channel] *= mirrored.sky.gain[channel]
     return row, share

@@ -10,6 +10,7 @@ from relume.memory import Memory
 from relume.methods.harmonic_light import read_harmonic_light
 from relume.methods.registry import open_bake
 from relume.methods.store_io import read_cells
+from relume.moving.fine_job import FineJob
 from relume.moving.picture import MovingPicture
 from relume.reference import reference_image
 from relume.scene.model import Camera
@@ -53,19 +54,44 @@ def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(
 def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
     """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
     direct = transport(show="direct")
-    picture = seen(moving, direct)
+    picture = begun(moving, direct)
     picture.encode(picture.all_tiles(), "rgb9e5")
     before = picture.image()
     with monkeypatch.context() as nothing_whole:
         nothing_whole.setattr("relume.moving.picture.frame_of", None)
         picture.set_look(look_of(moving, lit(direct, change)))
         assert picture.advance(None).changed
-    anew = seen(moving, direct, change)
+    anew = begun(moving, direct, change)
     np.testing.assert_array_equal(picture.image(), anew.image())
     assert picture.encode(picture.all_tiles(), "rgb9e5") == anew.encode(anew.all_tiles(), "rgb9e5")
     differs = (picture.image() != before).any(axis=2)
     assert differs.any()
     assert not differs.all()
+
+
+def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monkeypatch):
+    """Twice, the second time after an edit, which costs no whole frame; no eye that moves waits for them."""
+    direct = transport(show="direct")
+    picture = begun(moving, direct)
+    at_first, job = picture.image(), picture.next_job()
+    for value in (40, 90):
+        with monkeypatch.context() as nothing_whole:
+            nothing_whole.setattr("relume.moving.picture.frame_of", None)
+            picture.set_look(look_of(moving, lit(direct, exponent(value))))
+            assert picture.advance(None).changed
+        rest(picture)
+        assert picture.next_job() is None
+        np.testing.assert_array_equal(picture.image(), seen(moving, direct, exponent(value)).image())
+    picture.set_look(look_of(moving, lit(direct)))
+    for eye in (aside, moving.views["front"].camera):
+        picture.set_eye(eye, (48, 36))
+        picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), at_first)
+    picture.install(job, made(job))  # of a frame that is gone
+    assert not picture.advance(None).changed
+    assert picture.next_job().key != job.key
+    coarse, fine = (show(moving, direct, replaced).image() for show in (begun, seen))
+    assert relative_rmse(coarse, fine) > 1e-3
 
 
 def test_a_picture_does_not_depend_on_where_its_eye_was(moving, aside):
@@ -108,6 +134,7 @@ def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched
     assert shares[-1] == 1
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
+    rest(picture)
     exact = seen(moving, change, other).image()
     np.testing.assert_array_equal(picture.image(), exact)
     assert relative_rmse(rough, exact) < 0.3
@@ -178,25 +205,34 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
     picture.install(job, made(job))
     assert picture.advance(None).fidelity == "preview"
     seen = picture.image()
+    find_light(picture)
+    assert np.linalg.norm(seen - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
     rest(picture)
     exact = picture.image()
     alone = MovingPicture(moving, "front")
     alone.set_look(shown(change), solo=solo)
     alone.advance(None)
     np.testing.assert_array_equal(exact, alone.image())
-    assert np.linalg.norm(seen - exact) < 0.1 * np.linalg.norm(stale - exact)
     picture.set_look(shown(), solo=solo)
     assert picture.advance(None).fidelity == "approximate"  # it is known
+    rest(picture)
     np.testing.assert_array_equal(picture.image(), before)
 
 
 def begun(moving, *changes):
-    """A picture that somebody watches, all its light there."""
+    """A picture that somebody watches, all its light there, its highlights not found finely yet."""
     picture = MovingPicture(moving, "front", is_watched=True)
     picture.set_look(look_of(moving, lit(*changes)))
     picture.advance(None)
-    rest(picture)
+    find_light(picture)
     return picture
+
+
+def find_light(picture):
+    """What follows when a hand rests, but for fine highlights."""
+    while not isinstance(job := picture.next_job(), FineJob):
+        picture.install(job, made(job))
+        picture.advance(None)
 
 
 def made(job):

@@ -175,7 +175,8 @@ def few_at_once(picture, aside, monkeypatch):
         is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
-    monkeypatch.setattr("relume.moving.picture.frame_of", darkened)
+    for user in ("picture", "fine_job"):
+        monkeypatch.setattr(f"relume.moving.{user}.frame_of", darkened)
     monkeypatch.setattr("relume.moving.rest.still_jobs.STEP", 4)
     picture.set_eye(aside, (160, 100))
     picture.advance(None)

@@ -141,8 +141,10 @@ def sky_numpy(directions, shares, sigma, light, glance):
     return shown * light.gain
 
 
-@pytest.mark.parametrize("rotation", [0.0, 123.0])
-def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_one(shiny_ball, rotation):
+@pytest.mark.parametrize(("rotation", "is_fine"), [(0.0, False), (123.0, False), (123.0, True)])
+def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_what_pixels_find(
+    shiny_ball, rotation, is_fine
+):
     moving, _ = shiny_ball
     surface, rng, light = moving.surface, np.random.default_rng(7), sky_light(rotation)
     num, eye = surface.points.num_points, np.array([0.4, 1.5, 3.0], np.float32)
@@ -152,14 +154,14 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_one(shi
     sky = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    add_sky_in_highlights(surface, lobes, light, eye, glances, is_needed, Sent(sent, sky))
+    add_sky_in_highlights(surface, lobes, light, eye, glances, is_needed, Sent(sent, sky), is_fine=is_fine)
     assert not sent[is_needed == 0].any()
     held, most = 0, float(lobes.most[0])
     for point in np.flatnonzero(is_needed)[::17]:
         at, _, _ = seen_along(lobes, surface, eye.astype(np.float64), point)
         said, found = (
             at(lobes.albedo) * sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
-            for lobe in (two_numpy, one_numpy)
+            for lobe in (two_numpy, two_numpy if is_fine else one_numpy)
         )
         expected = np.clip(sky[point], said / most, said * most)
         held += int((expected != sky[point]).sum())
@@ -178,7 +180,7 @@ def test_what_the_in_basis_cannot_tell_is_a_lobe_alone(shiny_ball):
     sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
     sky = rng.normal(size=(num, 3, 3)).astype(np.float32)
     eye, glances = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
-    add_sky_in_highlights(surface, lobes, sky_light(), eye, glances, everywhere, Sent(sent, sky))
+    add_sky_in_highlights(surface, lobes, sky_light(), eye, glances, everywhere, Sent(sent, sky), is_fine=True)
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
 

@@ -120,6 +120,9 @@ Lobes alongBoth(int of, float share, vec3 n, vec3 d) {
   vec3 aside = asideOf(n, d);
   return Lobes(leanTo(shape.x, aside, n), leanTo(shape.y, aside, n), shape.z, shape.w);
 }
+vec3 skyInBoth(Lobes lobes, vec3 seen) {
+  return mix(skyInLobe(lobes.other, lobes.sigma, seen), skyInLobe(lobes.one, lobes.sigma, seen), lobes.first);
+}
 `;
 /** The albedo of a lobe in a group of terms, whose texel of a table is `of`. */
 export const albedoOf = (of: string) =>

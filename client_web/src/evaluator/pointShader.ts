@@ -145,17 +145,14 @@ function sum(surface: SurfaceBody, features: PointFeatures, of: Sent, name: stri
   ${groups.join("\n  ")}`;
 }
 
-/** The sky in highlights: what the in-basis says, within what two lobes allow, less what pixels find by one. */
+/** The sky in highlights: what the in-basis says, within what two lobes allow, less these, which pixels find. */
 function sky(surface: SurfaceBody, features: PointFeatures): string {
-  const isTold = isAsked(features.sky);
-  const add = (group: number) => {
-    const held = isTold ? `clamp(told${group}, albedo * both / most, albedo * both * most)` : "albedo * both";
-    return `albedo = ${albedoOf(`of - ${GROUPS - group}`)}; sent${group} += ${held} - albedo * light;`;
-  };
-  return `${isTold ? sum(surface, features, "sky", "told") : ""}
-  float wide, most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;
-  vec3 ray = alongLobe(of, share, n, -wo, wide), light = skyInLobe(ray, wide, glance.xyz), albedo;
-  vec3 both = mix(skyInLobe(lobes.other, lobes.sigma, glance.xyz), skyInLobe(lobes.one, lobes.sigma, glance.xyz), lobes.first);
+  if (!isAsked(features.sky)) return "";
+  const add = (group: number) =>
+    `albedo = ${albedoOf(`of - ${GROUPS - group}`)} * both; sent${group} += clamp(told${group}, albedo / most, albedo * most) - albedo;`;
+  return `${sum(surface, features, "sky", "told")}
+  float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;
+  vec3 both = skyInBoth(lobes, glance.xyz), albedo;
   ${range(GROUPS).map(add).join("\n  ")}`;
 }
 

@@ -182,7 +182,8 @@ vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, 
   vec3 ray = alongLobe((lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS}, share, n, d, wide);
   float away = dot(ray, outward) * (along > 0.0 ? -1.0 : 1.0);
   float above = min(shareAbove(away / wide) / shareAbove(abs(along) / wide), 1.0);
-  return above * skyInLobe(ray, wide, glance.xyz);
+  Lobes lobes = alongBoth((lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS}, share, n, d);
+  return above * skyInBoth(lobes, glance.xyz);
 }
 `;
 

@@ -2,10 +2,11 @@
 
     B(pixel) = L(pixel) + Σ_points w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lamps V_j L̄_j(ωm, σ))
 
-L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate. It is what turns
-fastest where surfaces are curved, twice as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says.
-Beside what is bright it rings, and says what cannot be: it is held within a multiple of L_2, the sky in two lobes that
-stand for the highlight better than one; the more the in-basis misses, the smaller is the multiple, down to L_2 itself.
+L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames
+L_2, the sky in two lobes that stand for the highlight better. It is what turns fastest where surfaces are curved, twice
+as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says. Beside what is bright it rings, and says
+what cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple, down to
+L_2 itself.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add(points, material, lobes, light, eye, glances, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
+def _add(points, material, lobes, light, eye, glances, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
     """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
     position, normal, _, _ = points
     shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
@@ -41,11 +42,14 @@ def _add(points, material, lobes, light, eye, glances, rows, start, stop, sent, 
         seen = glances[p, 0], glances[p, 1], glances[p, 2]
         for channel in range(3):
             shown[channel] = both[channel] = 0
-        row, share, ray, wide = along_lobe(lobes, lobe, n, d)
-        add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
         row, share, one, other, first, sigma = along_both(lobes, lobe, n, d)
         add_sky_in_lobe(light, seen, one, sigma, first, both)
         add_sky_in_lobe(light, seen, other, sigma, np.float32(1) - first, both)
+        if is_fine:
+            shown[0], shown[1], shown[2] = both[0], both[1], both[2]
+        else:
+            _, _, ray, wide = along_lobe(lobes, lobe, n, d)
+            add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
         most = lobes.most[lobe]
         for group in range(sent.shape[1]):
             for channel in range(3):
@@ -57,7 +61,15 @@ def _add(points, material, lobes, light, eye, glances, rows, start, stop, sent, 
 
 
 def add_sky_in_highlights(
-    surface: Surface, lobes: Lobes, light: SkyLight, eye: F32, glances: F32, is_needed: NDArray[np.uint8], sent: Sent
+    surface: Surface,
+    lobes: Lobes,
+    light: SkyLight,
+    eye: F32,
+    glances: F32,
+    is_needed: NDArray[np.uint8],
+    sent: Sent,
+    *,
+    is_fine: bool,
 ) -> None:
     """Add what points know of the sky in highlights, less what pixels find.
 
@@ -65,8 +77,9 @@ def add_sky_in_highlights(
         surface: whose points. lobes: of all materials. light: that they show. eye: where it is. (3,) float32
         glances: of the points along their lobes, from `relume.moving.highlights.glances`. (points, 3)
         is_needed: points that are asked. (points,) uint8
-        sent: by them; its radiance is added to.
+        sent: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
-    args = (surface.points, surface.material, lobes, light, np.ascontiguousarray(eye, np.float32), glances, rows)
+    seen = np.ascontiguousarray(eye, np.float32), glances
+    args = (surface.points, surface.material, lobes, light, *seen, is_fine, rows)
     for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))

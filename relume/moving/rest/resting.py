@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from relume.errors import ParameterError
 from relume.look import Look
 from relume.memory import Memory
+from relume.moving.fine_job import FineJob
 from relume.moving.picture import MovingPicture
 from relume.moving.rest.still_jobs import ExactView, Eye, MakeStill, SparseJob, StillJob
 from relume.moving.shader.tables import Numbers, Part
@@ -145,7 +146,7 @@ class RestingPicture:
 
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
-        if isinstance(job, StillJob | SparseJob | FollowJob | LightJob):
+        if isinstance(job, StillJob | SparseJob | FollowJob | LightJob | FineJob):
             job.install(made)
         elif self._still is not None:  # else it was made for one that is gone
             self._still.install(job, made)

@@ -1,0 +1,76 @@
+"""Rims of highlights a pixel thin, against pictures of many times the size."""
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, scene_of, sphere
+
+from relume.bake import Recipe
+from relume.color import LUMINANCE
+from relume.look import complete, validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving import rims
+from relume.moving.rims import PLACES, find_rims
+from relume.render.image import render_image
+from relume.scene.model import Material
+from relume.store import bake_here
+
+CAMERA = looking("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
+SIZE, FINER = (32, 24), 6
+
+
+def beside(luminance, y, x):
+    height, width = luminance.shape
+    for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
+        if 0 <= v < height and 0 <= u < width:
+            yield luminance[v, u]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.05])
+def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, share):
+    monkeypatch.setattr(rims, "_MOST", share)
+    rng = np.random.default_rng(1)
+    image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
+    is_asked = rng.random(13 * 17) > 0.2
+    luminance = image.astype(np.float64) @ LUMINANCE
+    jump = [max(abs(luminance[y, x] - one) for one in beside(luminance, y, x)) for y, x in np.ndindex(13, 17)]
+    jump = np.where(is_asked, jump, 0)
+    expected = np.flatnonzero(jump > luminance.mean())
+    assert 0 < len(expected) < is_asked.sum()
+    expected = np.sort(expected[np.argsort(-jump[expected])][: int(share * 13 * 17)])
+    np.testing.assert_array_equal(find_rims(image, is_asked), expected)
+
+
+def test_rays_share_no_row_and_no_column():
+    assert len(np.unique(PLACES[:, 0])) == len(np.unique(PLACES[:, 1])) == len(PLACES)
+    assert ((PLACES > 0) & (PLACES < 1)).all()
+    np.testing.assert_allclose(PLACES.mean(axis=0), 0.5)
+
+
+@pytest.fixture(scope="module")
+def shiny(tmp_path_factory):
+    """A ball that is a highlight, seen across its horizon, where the sky that it shows is narrowest."""
+    term = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.25, "f0": 0.9}}
+    sky = np.full((32, 64, 3), 0.05, np.float32)
+    sky[12, ::8] = 60
+    ball = sphere("ball", (0, 0.5, 0), 0.5, 0, rings=24)
+    scene = scene_of(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
+    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=4000)
+    folder = tmp_path_factory.mktemp("rims")
+    return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / "s.zarr"), Memory(1 << 30))
+
+
+def shown(opened, scale):
+    look = validate(complete({}, opened.default_look), opened.default_look)
+    image = render_image(opened, "front", look, eye=(CAMERA, (SIZE[0] * scale, SIZE[1] * scale)))[..., :3]
+    return image.reshape(SIZE[1], scale, SIZE[0], scale, 3).mean(axis=(1, 3))
+
+
+def test_rims_show_what_their_pixels_see(shiny, monkeypatch):
+    found = shown(shiny, 1)
+    monkeypatch.setattr(rims, "_MOST", 0.0)
+    without, truth = shown(shiny, 1), shown(shiny, FINER)
+    changed = (found != without).any(axis=2)
+    assert 0 < changed.sum() <= 0.02 * changed.size
+    off, was_off = (np.sqrt(np.mean((image[changed] - truth[changed]) ** 2)) for image in (found, without))
+    assert off < 0.3 * was_off
