@@ -65,7 +65,9 @@ def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
     """
     term = TERMS[document["model"]].settled(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-    return freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
+    frozen = freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
+    assert isinstance(frozen, Frozen)
+    return frozen
 
 
 def frame_radiance(lit: Lit, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:

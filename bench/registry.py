@@ -52,6 +52,7 @@ GROUPS = (
     Group("bench.shade", ("shade.pairs_per_s_vs_limit", "shade.vs_leaves")),
     Group("bench.glimpse", ("glimpse.speedup", "glimpse.error")),
     Group("bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
+    Group("bench.large", ("large.frame_ms", "large.frame_ratio", "large.bytes_ratio")),
     Group("bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),
     Group("bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
     Group(

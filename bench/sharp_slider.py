@@ -23,7 +23,6 @@ from relume.brdf.sweep import moved_curves, slider_values, solid_angles
 from relume.brdf.term import F64
 from relume.imageio.tonemap import tone_map
 from relume.operators.nodes import Linearised, linearise
-from relume.operators.stream import columns_of, stream
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
@@ -65,7 +64,7 @@ def _errors(lit: Lit, model: str, parameter: str, num: int) -> dict[str, float]:
         even = _shaded(lit, document, _spread(along, _bands(document)))
         tiles, _, _, samples = frozen.transport.shape
         image = np.zeros((tiles, 3, samples), np.float32)
-        stream(frozen.transport, columns_of(along.coefficients(_bands(document))), image)
+        frozen.add(along.coefficients(_bands(document)), image)
         shown = image.transpose(0, 2, 1).reshape(-1, 3)[: lit.points.num_points].astype(np.float64)
         shares.append(np.abs(shown - exact) / (exact + 0.01 * even + 1e-12))
         negative.append(float((shown < -0.01 * even).any(axis=1).mean()))

@@ -13,6 +13,7 @@ from relume.basis.daubechies import analysis
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
 from relume.operators.frozen import Frozen, freeze
+from relume.operators.packed import Packed
 from relume.project.receivers import Receivers
 
 F64 = NDArray[np.float64]
@@ -57,7 +58,9 @@ class EditBasis(Protocol):
         receivers: Receivers,
         progress: Callable[[float], None],
         cancelled: Callable[[], bool],
-    ) -> Frozen:
+        *,
+        is_packed: bool = False,
+    ) -> Frozen | Packed:
         """The operator. See `relume.operators.frozen.freeze`."""
         ...
 
@@ -98,6 +101,8 @@ class CurveBasis:
         receivers: Receivers,
         progress: Callable[[float], None],
         cancelled: Callable[[], bool],
-    ) -> Frozen:
+        *,
+        is_packed: bool = False,
+    ) -> Frozen | Packed:
         """See `relume.operators.frozen.freeze`."""
-        return freeze(term, bands, self.name, lights, receivers, progress, cancelled)
+        return freeze(term, bands, self.name, lights, receivers, progress, cancelled, is_packed=is_packed)

@@ -27,8 +27,8 @@ from relume.brdf.registry import TERMS
 from relume.brdf.sweep import moved_curves, slider_values, solid_angles
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
-from relume.operators.frozen import Frozen, level_bounds, tiles_of
-from relume.parallel import for_steps
+from relume.operators.frozen import Frozen, lay_out, level_bounds
+from relume.operators.packed import Packed
 from relume.project.contraction import contract
 from relume.project.levels import at_level, freed, num_levels, project_levels
 from relume.project.receivers import Receivers
@@ -42,7 +42,6 @@ MAX_NODES = 36
 _ENOUGH = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
 _NUM_VALUES = 97
 _BANDS_BESIDE = 12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
-_SAMPLES_A_STEP = 512
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,9 @@ class Linearised:
         receivers: Receivers,
         progress: Callable[[float], None],
         cancelled: Callable[[], bool],
-    ) -> Frozen:
+        *,
+        is_packed: bool = False,
+    ) -> Frozen | Packed:
         """Contract all curves at all nodes in one pass: the columns are the images there.
 
         Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
@@ -125,6 +126,7 @@ class Linearised:
             bands: of all the term's curves, (3, J) each; the moved ones' values do not matter.
             lights, receivers: what arrives, and where.
             progress: called with the share done. cancelled: asked now and then.
+            is_packed: whether the operator is packed.
         Raises:
             CancelledError: `cancelled` said so.
         """
@@ -133,23 +135,16 @@ class Linearised:
         held = freed(bands, self.moves)  # nodes are the same at all levels
         dormant = [at_level(held, level) for level in range(num_levels(held))]
         contractions = [contract(term, b if alone else {**b, **at_nodes}, alone) for b in dormant]
-        num_samples = len(receivers.normal)
-        tiles, samples = tiles_of(num_samples)
-        rows = np.zeros((tiles * samples, self.num_columns, 3), np.float32)
-
-        def step(start: int, stop: int) -> None:
-            projected = project_levels(term, contractions, lights, receivers, start, stop)
-            if alone is not None:
-                matrices = at_nodes[alone].astype(np.float32)
-                projected = np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)], axis=2)
-            rows[start:stop] = projected
-
-        for_steps(step, num_samples, _SAMPLES_A_STEP, progress, cancelled, "freezing")
         bounds = level_bounds(receivers, bands, self.moves)
-        cut = [rows] if bounds is None else np.split(rows[:num_samples], bounds[1:-1])
-        importance = np.sqrt([np.einsum("nsc,nsc->cs", some, some, dtype=np.float64) for some in cut])
-        transport = np.ascontiguousarray(rows.reshape(tiles, samples, -1, 3).transpose(0, 3, 2, 1))
-        return Frozen(transport, importance[0] if bounds is None else importance, bounds)
+        matrices = None if alone is None else at_nodes[alone].astype(np.float32)
+
+        def rows(begin: int, end: int) -> F32:
+            projected = project_levels(term, contractions, lights, receivers, begin, end)
+            if matrices is not None:
+                return np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)])
+            return np.ascontiguousarray(projected.transpose(2, 0, 1))
+
+        return lay_out(rows, self.num_columns, receivers, bounds, progress, cancelled, is_packed=is_packed)
 
 
 def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:

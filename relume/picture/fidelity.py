@@ -11,14 +11,16 @@ class Fidelity(IntEnum):
     """How truly an image shows the curves and the light that it is said to show, worst first.
 
     NOTHING: nothing has been made. PREVIEW: interpolated between few samples. FOLLOWED: an exact image and what has
-    changed of light since, evaluated roughly. NEAR: a sum along the few nodes of a parameter. EXACT: the whole sum.
+    changed of light since, evaluated roughly. COARSE: an exact image and what has changed of a curve since, found at
+    some of its samples. NEAR: a sum along the few nodes of a parameter, or of packed columns. EXACT: the whole sum.
     """
 
     NOTHING = 0
     PREVIEW = 1
     FOLLOWED = 2
-    NEAR = 3
-    EXACT = 4
+    COARSE = 3
+    NEAR = 4
+    EXACT = 5
 
 
 Word = Literal["preview", "approximate", "followed", "near", "exact"]
@@ -33,7 +35,9 @@ def word_of(fidelity: Fidelity, *, is_wanted: bool) -> Word:
         return "preview"
     if not is_wanted:
         return "approximate"
-    return {Fidelity.FOLLOWED: "followed", Fidelity.NEAR: "near"}.get(fidelity, "exact")  # type: ignore[return-value]
+    if fidelity <= Fidelity.COARSE:
+        return "followed"
+    return "near" if fidelity == Fidelity.NEAR else "exact"
 
 
 def worst(found: Iterable[Word]) -> Word:

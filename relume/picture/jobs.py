@@ -6,7 +6,7 @@ whether what was made is still wanted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Literal, NamedTuple, Protocol
@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
-from relume.operators.frozen import Frozen, frozen_bytes
+from relume.operators.frozen import Frozen
+from relume.operators.operator import Operator
+from relume.operators.packed import Packed
 from relume.operators.shade import Shaded, shade, shaded_bytes
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light, parts_of
 from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
 from relume.picture.shown import Shown
+from relume.picture.thinning import Form, freeze_some
 from relume.picture.view_images import ViewImages
+from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -89,6 +93,7 @@ class Freeze:
 
     Attributes:
         bands: of the term's curves, (3, J) each. light: what arrives.
+        form: what it is made of.
     """
 
     place: Place
@@ -97,15 +102,20 @@ class Freeze:
     term: Term
     bands: Mapping[str, F64]
     light: Light
+    form: Form
     refines: bool
     state: Literal["freezing", "shading"] = "freezing"
 
     @classmethod
-    def of(cls, place: Place, basis: EditBasis) -> Freeze:
-        """The operator for what is wanted of a term now."""
+    def of(cls, place: Place, basis: EditBasis, form: Form) -> Freeze:
+        """The operator for what is wanted of a term now.
+
+        Args:
+            place: of the term. basis: what is free in it. form: from `form_for`.
+        """
         images, material, live = place
         key, is_seen = images.key_of_operator(material, live, basis, live.target), live.is_seen()
-        return cls(place, basis, key, live.term, live.target, live.light, is_seen)
+        return cls(place, basis, key, live.term, live.target, live.light, form, is_seen)
 
     @property
     def what(self) -> str:
@@ -115,33 +125,57 @@ class Freeze:
     @property
     def num_bytes(self) -> int:
         """Memory to keep it."""
-        return frozen_bytes(self.place.material.num_samples, self.basis.num_columns)
+        return self.form.num_bytes(self.place.material, self.basis.num_columns)
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Frozen:
+    def make(self, progress: Progress, cancelled: Cancelled) -> Operator:
         """See `Job`."""
         images, material, _ = self.place
 
-        def frozen() -> Frozen:
-            arriving = images.arriving(material, self.light)
-            return self.basis.freeze(self.term, self.bands, *arriving, progress, cancelled)
+        def frozen() -> Operator:
+            lights, receivers = images.arriving(material, self.light)
 
-        return images.cache.get(self.key, Frozen, self.num_bytes, frozen)
+            def freeze(some: Receivers) -> Frozen | Packed:
+                watched = progress, cancelled
+                return self.basis.freeze(self.term, self.bands, lights, some, *watched, is_packed=self.form.is_packed)
 
-    def install(self, made: Frozen) -> None:
+            if self.form.step == 1:
+                return freeze(receivers)
+            return freeze_some(images.view, material.index, self.form.step, receivers, freeze)
+
+        return images.cache.get(self.key, Operator, self.num_bytes, frozen)  # type: ignore[type-abstract]
+
+    def install(self, made: Operator) -> None:
         """See `Job`; the dormant curves of the operator must be those that are wanted now.
 
-        Where the image shows other curves, or the operator can say them better, it is summed anew.
+        Where the image shows other curves, or the operator can say them better, it is summed anew. An operator that is
+        not exact goes on from the image as it is, if that differs in nothing else.
         """
         images, material, live = self.place
         if not self.place.is_there() or self.key != images.key_of_operator(material, live, self.basis, live.target):
             return
         ready, differing = live.ready, set(live.differing())
         is_known = live.is_firm and ready.basis == self.basis  # its coefficients hold, also where only some were moved
-        says_better = ready.fidelity == Fidelity.NEAR and self.basis.is_complete
+        if not made.is_exact and goes_on_from(ready, differing, self.basis):
+            if not is_known:
+                live.put(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(ready.bands)))
+            return
+        if not made.is_whole:
+            return
+        says_better = ready.fidelity < Fidelity.EXACT and self.basis.is_complete
         if not differing <= set(self.basis.moves) or (differing and not is_known) or says_better:
             live.put(ready.summed(made, self.basis, live.target, live.light))
         elif not is_known:
             live.put(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(live.target)))
+
+
+def goes_on_from(ready: Shown, differing: Collection[str], basis: EditBasis) -> bool:
+    """Whether changes along a basis may be added to what is ready: its curves are known, and no other one differs.
+
+    Args:
+        ready: of a term. differing: curves whose target is not summed in it. basis: of an operator.
+    """
+    is_known = all(not np.isnan(ready.bands.get(name, np.nan)).any() for name in basis.moves)
+    return ready.is_firm and is_known and set(differing) <= set(basis.moves)
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,7 +127,7 @@ class LiveTerm:
         picture that has just been opened, is the only one, and knows nothing of curves that were moved since.
         """
         ready = self.ready
-        is_rough = Fidelity.NOTHING < ready.fidelity < Fidelity.NEAR
+        is_rough = ready.fidelity > Fidelity.NOTHING and not ready.is_firm
         return is_rough and (ready.anchor is not None or not ready.differing(self.target))
 
     def lacks_only_light(self) -> bool:

@@ -13,6 +13,7 @@ from relume.brdf.mirror import mirrored_share
 from relume.picture.light import Light
 from relume.picture.live_term import LiveTerm
 from relume.views.compose import add_term
+from relume.views.squares import num_squares
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -45,6 +46,13 @@ class MaterialImage:
         self.factor_key: Hashable = None
         self._is_current = False
         self.num_composed = 0
+        self._num_squares: dict[int, int] = {}
+
+    def num_squares(self, step: int) -> int:
+        """How many squares of step × step pixels it is seen in."""
+        if step not in self._num_squares:
+            self._num_squares[step] = num_squares(self._view, self.index, step)
+        return self._num_squares[step]
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
         """New targets; terms that stay as they are keep their images."""

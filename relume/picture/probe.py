@@ -83,8 +83,7 @@ def _contributions(
     for sample, of_sample in zip(samples, gains, strict=True):
         if rows.start <= sample < rows.stop:
             row = int(sample) - rows.start
-            tile, offset = divmod(row, frozen.transport.shape[3])
-            columns = synthesis(frozen.transport[tile, :, :, offset].astype(np.float64))
+            columns = synthesis(frozen.columns_at(row))
             here = curve if curve.ndim == 2 else curve[material.level_at(row)]
             bands += of_sample[:, None] * columns * material.factors_at(term, row)[:, None] * here
     return bands

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.operators.edit_basis import EditBasis
-from relume.operators.frozen import Frozen
+from relume.operators.operator import Operator
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light
 
@@ -47,7 +47,7 @@ class Shown:
     @property
     def is_firm(self) -> bool:
         """Whether steps may be added to it: it is the sum of known coefficients in a known light."""
-        return self.fidelity >= Fidelity.NEAR
+        return self.fidelity >= Fidelity.COARSE
 
     def differing(self, wanted: Mapping[str, F64]) -> list[str]:
         """Names of the wanted curves that the image does not show."""
@@ -58,16 +58,16 @@ class Shown:
         anchor = replace(self, anchor=None) if self.is_firm else self.anchor
         return Shown(np.zeros_like(self.image), anchor=anchor)
 
-    def summed(self, frozen: Frozen, basis: EditBasis, target: Mapping[str, F64], light: Light) -> Shown:
+    def summed(self, frozen: Operator, basis: EditBasis, target: Mapping[str, F64], light: Light) -> Shown:
         """The image of a target from all coefficients of an operator, written where this one's image stood.
 
         Args:
-            frozen: the operator along `basis` in this light, its dormant curves those of the target.
+            frozen: the operator along `basis` in this light, of all samples, its dormant curves those of the target.
             target: bands of each of the term's curves. (3, J) each
         """
         coefficients = basis.coefficients(target)
         frozen.write_image(coefficients, self.image)
-        fidelity = Fidelity.EXACT if basis.is_complete else Fidelity.NEAR
+        fidelity = Fidelity.EXACT if basis.is_complete and frozen.is_exact else Fidelity.NEAR
         return Shown(self.image, fidelity, dict(target), light, basis, coefficients)
 
     def without_basis(self) -> Shown:

@@ -15,11 +15,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from relume.look import Look
 from relume.look.model import Rgb
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.frozen import frozen_bytes
 from relume.operators.shade import shaded_bytes
 from relume.picture.fidelity import Fidelity
 from relume.picture.hand import Hand
-from relume.picture.jobs import Freeze, Job, Place, Shade
+from relume.picture.jobs import Freeze, Job, Place, Shade, goes_on_from
 from relume.picture.light import Light, of_source, vector_of
 from relume.picture.routes import operator
 from relume.picture.routes.base import LightRoute
@@ -27,6 +26,7 @@ from relume.picture.routes.follow import Follow
 from relume.picture.routes.mix import Mix
 from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared
 from relume.picture.routes.recall import Recall
+from relume.picture.thinning import EXACT, Form, form_for
 from relume.picture.view_images import ViewImages
 from relume.project.levels import contract_levels
 
@@ -160,8 +160,9 @@ class Transition:
         if not candidates:
             return None
         place, basis = min(candidates, key=lambda item: _cost(item[0], item[1], hand))
-        if basis is not None:
-            return Freeze.of(place, basis)
+        form = None if basis is None else self._form(place, basis)
+        if basis is not None and form is not None:
+            return Freeze.of(place, basis, form)
         # where no operator fits, an image that shows older curves stands until the hand rests
         return Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
 
@@ -172,16 +173,21 @@ class Transition:
             basis = hand.basis_of(live, differing)
             if not live.is_firm:
                 # its operator along a curve gives the image as well, and exactly
-                is_whole = basis is not None and basis.is_complete and self._fits(place, basis)
+                is_whole = basis is not None and basis.is_complete and self._form(place, basis) == EXACT
                 yield place, basis if is_whole else None
             elif differing and not self._follows(place, basis):
                 first = next(name for name in live.target if name in differing)
                 wanted = basis or CurveBasis.of(live.term.curve(first))
-                yield place, wanted if self._fits(place, wanted) else None
+                yield place, wanted if self._serves(place, wanted, differing) else None
 
-    def _fits(self, place: Place, basis: EditBasis) -> bool:
-        """Whether the memory may hold an operator; where not, the term is shaded."""
-        return frozen_bytes(place.material.num_samples, basis.num_columns) <= self._images.cache.budget_bytes
+    def _form(self, place: Place, basis: EditBasis) -> Form | None:
+        """What the memory may hold an operator of; where of nothing, the term is shaded."""
+        return form_for(place.material, basis.num_columns, self._images.cache.budget_bytes)
+
+    def _serves(self, place: Place, basis: EditBasis, differing: set[str]) -> bool:
+        """Whether an operator would bring an image to its target; one of some samples does not sum others' curves."""
+        form = self._form(place, basis)
+        return form is not None and (form.step == 1 or goes_on_from(place.live.ready, differing, basis))
 
     def _follows(self, place: Place, basis: EditBasis | None) -> bool:
         """Whether the operator in use is the one to go on with: what differs is free in it, or some of it, and no other
@@ -203,17 +209,18 @@ class Transition:
         if touched is None or touched.basis is None or not touched.place.material.num_samples:
             return None
         live, basis, active = touched.place.live, touched.basis, touched.place.live.ready.basis
-        if live.differing() or not self._fits(touched.place, basis):
+        form = self._form(touched.place, basis)
+        if live.differing() or form is None:
             return None
         has_operator = active is not None and self._images.operator(touched.place.material, live) is not None
         is_enough = active is not None and (active == basis or (active.is_complete and active.moves == basis.moves))
-        return None if has_operator and is_enough else Freeze.of(touched.place, basis)
+        return None if has_operator and is_enough else Freeze.of(touched.place, basis, form)
 
     def _refining(self) -> Job | None:
         """What makes an image exact that is near it already."""
         for place in self._places():
             live = place.live
-            if live.ready.fidelity == Fidelity.NEAR and not live.differing():
+            if live.is_firm and live.ready.fidelity < Fidelity.EXACT and not live.differing():
                 return Shade.of(place, self._images.light, refines=True)
             if live.ready.rounding > 0 and live.is_exact() and (settling := self._settling(place)) is not None:
                 return settling

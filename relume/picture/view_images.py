@@ -14,8 +14,8 @@ from relume.light.triangles import TriangleLights
 from relume.look import Look, TermLook, validate
 from relume.memory import Memory
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.frozen import Frozen
 from relume.operators.nodes import linearise
+from relume.operators.operator import Operator
 from relume.operators.shade import Shaded, shaded_bytes
 from relume.picture.light import Light, Solo, emission_of, gain_of, light_of
 from relume.picture.live_term import LiveTerm
@@ -166,9 +166,10 @@ class ViewImages:
         key = self.key_of_image(material, live, self.light)
         return self.cache.find(key, Shaded) is not None or self.transfer.has_image(key[1:])
 
-    def operator(self, material: MaterialImage, live: LiveTerm) -> Frozen | None:
+    def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
         """The operator that a term follows now, unless the memory has dropped it."""
         ready = live.ready
         if ready.basis is None or not live.is_firm:
             return None
-        return self.cache.find(self.key_of_operator(material, live, ready.basis, ready.bands), Frozen)
+        key = self.key_of_operator(material, live, ready.basis, ready.bands)
+        return self.cache.find(key, Operator)  # type: ignore[type-abstract]

@@ -37,6 +37,10 @@ class Rays(Protocol):
         """The most rays that any point has."""
         ...
 
+    def alone(self, chosen: NDArray[np.integer]) -> Rays:
+        """Choose those of some points, which do not share them."""
+        ...
+
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
         """List the rays of points [start, stop) that bring light; returns their number.
 
@@ -103,6 +107,10 @@ class LocalRays:
         """The most rays that any point has."""
         return len(self.pattern.uv)
 
+    def alone(self, chosen: NDArray[np.integer]) -> LocalRays:
+        """Choose those of some points; see `Rays`."""
+        return replace(self, visible=self.visible[chosen])
+
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
         arriving = self.light, self.pattern, self.gain, self.visible
@@ -145,3 +153,8 @@ class Receivers:
         level = None if self.level is None else self.level[chosen]
         nothing = np.empty((len(chosen), 0), np.uint8)
         return Receivers(self.points.rows(chosen), self.wo[chosen], nothing, uv=uv, level=level)
+
+    def some(self, chosen: NDArray[np.integer]) -> Receivers:
+        """Choose some of them, with the light of each alone."""
+        rays = tuple(rays.alone(chosen) for rays in self.rays)
+        return replace(self.places(chosen), visible=self.visible[chosen], rays=rays)

@@ -23,7 +23,7 @@ IN_PROCESS = [
     "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
     "bench.glimpse", "bench.curve_switch_terms", "bench.shade",
     "bench.estimators", "bench.sharp_slider", "bench.mesh_files",
-    "bench.in_out",
+    "bench.in_out", "bench.large",
 ]  # fmt: skip
 LONG = [
     "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",

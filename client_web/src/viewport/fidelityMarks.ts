@@ -14,8 +14,8 @@ export interface Mark {
 const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
   preview: { words: "Preview", title: "A few points are shaded, the others guessed from them. All are shaded next." },
   approximate: { words: "Catching up", title: "The picture is of a moment ago; what the new one needs is being made." },
-  followed: { words: "Light followed closely", title: "Changed light is followed; at rest all of it is shaded anew." },
-  near: { words: "Nearly exact", title: "The slider is followed closely; at rest the material is shaded anew." },
+  followed: { words: "Followed closely", title: "What the hand changes is followed roughly. Exact at rest." },
+  near: { words: "Nearly exact", title: "What the hand changes is followed closely. Exact at rest." },
 };
 const OTHER_LIGHT: Mark = {
   words: "Baked for other light",

@@ -2,6 +2,8 @@
 
 A step adds the most important coefficients first where there is no time for all (eqs. 29 to 31, Ben-Artzi 2006). Along
 a parameter, whose few coefficients say curves only nearly, a step sums all of them, and the image is near its look.
+An operator of some samples (`relume.operators.thin`) adds the change of either kind to an image of all. What that and
+packed columns (`relume.operators.packed`) make is shaded when the hand rests.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.operators.frozen import Frozen
+from relume.operators.operator import Operator
+from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Place, Settle
 from relume.picture.shown import UNIT_ROUNDOFF, Shown, length_of
 
@@ -40,7 +43,7 @@ def step(place: Place, max_coefficients: int | None) -> None:
             live.put(after)
 
 
-def advance(ready: Shown, target: Mapping[str, F64], frozen: Frozen, max_coefficients: int | None) -> Shown:
+def advance(ready: Shown, target: Mapping[str, F64], frozen: Operator, max_coefficients: int | None) -> Shown:
     """What an image shows after one step along its basis; the same where that leaves nothing free that differs.
 
     Args:
@@ -51,9 +54,9 @@ def advance(ready: Shown, target: Mapping[str, F64], frozen: Frozen, max_coeffic
     if basis is None or light is None or set(ready.differing(target)).isdisjoint(basis.moves):
         return ready
     moved = {**ready.bands, **{name: target[name] for name in basis.moves}}
-    if not basis.is_complete:
-        return ready.summed(frozen, basis, moved, light)
-    return _add_change(ready, moved, frozen, max_coefficients)
+    if basis.is_complete:
+        return _add_change(ready, moved, frozen, max_coefficients)
+    return ready.summed(frozen, basis, moved, light) if frozen.is_whole else _add_change(ready, moved, frozen, None)
 
 
 def is_worn(ready: Shown) -> bool:
@@ -64,13 +67,13 @@ def is_worn(ready: Shown) -> bool:
 def settle_job(place: Place) -> Settle | None:
     """What makes of an image that was summed from steps one that was summed once from all coefficients.
 
-    None where the operator is gone, and where there is no need: a few small steps leave less than a sum of all
-    coefficients, whose columns cancel.
+    None where the operator is gone or not exact, and where there is no need: a few small steps leave less
+    than a sum of all coefficients, whose columns cancel.
     """
     images, material, live = place
     ready, frozen = live.ready, images.operator(material, live)
     basis, coefficients = ready.basis, ready.coefficients
-    if frozen is None or basis is None or coefficients is None:
+    if frozen is None or basis is None or coefficients is None or not frozen.is_exact:
         return None
     if ready.rounding <= _rounding(0.0, coefficients, frozen):
         return None
@@ -78,7 +81,7 @@ def settle_job(place: Place) -> Settle | None:
     return Settle(place, (*key, "settled"), ready, lambda image: frozen.write_image(coefficients, image))
 
 
-def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Frozen, max_coefficients: int | None) -> Shown:
+def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Operator, max_coefficients: int | None) -> Shown:
     """Add T · Δc; where float32 sums have left too much in the image, sum all of it anew."""
     assert ready.basis is not None
     assert ready.coefficients is not None
@@ -95,17 +98,19 @@ def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Frozen, max_coef
     frozen.add(change, ready.image)
     rounding = float(np.hypot(ready.rounding, _rounding(length, change, frozen)))
     after = replace(ready, bands=moved, coefficients=perfect, rounding=rounding)
+    if not frozen.is_exact:  # at rest it is shaded
+        return replace(after, fidelity=min(ready.fidelity, Fidelity.NEAR if frozen.is_whole else Fidelity.COARSE))
     return after if rounding <= MAX_ROUNDING * length else _anew(after, frozen)
 
 
-def _anew(ready: Shown, frozen: Frozen) -> Shown:
+def _anew(ready: Shown, frozen: Operator) -> Shown:
     """The same image summed once from its coefficients, in place."""
     assert ready.coefficients is not None
     frozen.write_image(ready.coefficients, ready.image)
     return replace(ready, rounding=0.0)
 
 
-def _rounding(length: float, change: F64, frozen: Frozen) -> float:
+def _rounding(length: float, change: F64, frozen: Operator) -> float:
     """Length of the rounding errors of one step, to be expected of n additions with unit roundoff u.
 
     √n u (‖R‖ + Σ_j |Δc_j| ‖T_j‖); n in place of √n bounds it always, and is never met (Higham and Mary 2019).

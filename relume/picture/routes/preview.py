@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from relume.brdf.term import Term
 from relume.look.model import Rgb
@@ -25,6 +24,7 @@ from relume.picture.jobs import Cancelled, Place, Progress
 from relume.picture.light import Light
 from relume.picture.transfer import Few, Transfer
 from relume.picture.view_images import ViewImages
+from relume.views.squares import nearest, one_of_each_square
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -32,7 +32,6 @@ F32 = NDArray[np.float32]
 _MOST_SHADED = 6000  # samples of a view, about
 _FEW_TO_SHADE = 8 * _MOST_SHADED  # samples of terms of a view; they take about as long as choosing some of them
 _NUM_NEIGHBOURS = 3
-_PIXELS_A_TURN = 10.0  # a unit of normals counts as so many squares of pixels
 _SOFT = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
 
 
@@ -62,20 +61,11 @@ def choose_sparse(transfer: Transfer, view: View, material: int) -> Sparse:
     Args:
         transfer: an opened bake. view: one of its views. material: index of the material.
     """
-    rows = view.rows(material)
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
-    y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
-    _, chosen = np.unique(y // step * view.width + x // step, return_index=True)
-    chosen.sort()  # samples of one level of roughness lie together
-    turn = _PIXELS_A_TURN * step * view.points(material).normal
-    place = np.concatenate([np.stack([x, y], axis=1), turn], axis=1)
-    num = min(_NUM_NEIGHBOURS, len(chosen))
-    distance, nearest = cKDTree(place[chosen]).query(place, k=list(range(1, num + 1)))
-    weight = 1 / (distance**2 + _SOFT)
-    weight /= weight.sum(axis=1, keepdims=True)
-    first = np.arange(0, weight.size + 1, num)
-    shape = (len(place), len(chosen))
-    weights = csr_array((weight.ravel().astype(np.float32), nearest.ravel(), first), shape=shape)
+    chosen = one_of_each_square(view, material, step)
+    near, weight = nearest(view, material, chosen, step, _NUM_NEIGHBOURS, _SOFT)
+    first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(chosen))
+    weights = csr_array((weight.ravel(), near.ravel(), first), shape=shape)
     return Sparse(transfer.some(view, material, chosen), weights)
 
 

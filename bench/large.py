@@ -1,0 +1,117 @@
+"""large.*: a curve dragged where a material fills 1920×1080 pixels and its operator does not fit in float32.
+
+A glossy teapot fills the picture; its θh, all 256 bands of it, is in hand, and every frame adds all columns.
+`large.frame_ms`: look → picture brought on, median of the edits, columns in 16 bits. In its row also by some samples,
+as where the memory is smaller; how long each operator takes to be made; how far the last frame is from the same look
+shaded (relative RMSE). `large.frame_ratio`: frames in 16 bits ÷ in float32, at a quarter of the pixels, where both fit.
+`large.bytes_ratio`: memory of the operator in 16 bits ÷ in float32.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.points import relative_rmse
+from bench.scenes import cook_torrance, teapot_on_table
+from relume.bake import Recipe
+from relume.environments.studio import studio
+from relume.look import Look, validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.registry import open_transfer
+from relume.operators.frozen import frozen_bytes, packed_bytes
+from relume.picture.jobs import Freeze
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
+from relume.store import bake_here
+
+_ROOMY, _BANDS = 16 << 30, 256
+_HAND = "/materials/Teapot/terms/0/curves/theta_h"
+_CLOSE = 0.3  # of the eye's distance; the teapot fills the picture
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Measure the large picture, then a quarter of it."""
+    (width, height), num_lights, num_edits = ((48, 27), 40, 2) if tiny else ((1920, 1080), 100, 10)
+    scene = teapot_on_table(studio(), (cook_torrance(0.2),), (cook_torrance(0.2),), _CLOSE)
+
+    def dragged(size: tuple[int, int], forms: tuple[str, ...]) -> dict[str, Any]:
+        with tempfile.TemporaryDirectory() as folder:
+            recipe = Recipe("direct", ("front",), size, num_lights)
+            path = bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr")
+            return _ways(open_transfer(path, Memory(_ROOMY)), forms, num_edits)
+
+    large = dragged((width, height), ("packed", "thin"))
+    quarter = dragged((width // 2, height // 2), ("packed", "float32"))
+    about = {"size": [width, height], "bands": _BANDS, "lights": num_lights, "edits": num_edits}
+    sizes = {form: of["bytes"] / (width * height) for form, of in large.items()}
+    whole = frozen_bytes(width * height, _BANDS)  # a sample a pixel, as where a material fills the picture
+    sizes["float32"] = whole / (width * height)
+    return [
+        Figure("large.frame_ms", large["packed"]["ms"], "ms", {**about, **large}),
+        Figure("large.frame_ratio", quarter["packed"]["ms"] / quarter["float32"]["ms"], "ratio", quarter),
+        Figure("large.bytes_ratio", large["packed"]["bytes"] / whole, "ratio", {"bytes_a_pixel": sizes}),
+    ]
+
+
+def _looks(transfer: Transfer, num: int) -> list[Look]:
+    """The highlight's curve, drawn higher and narrower from look to look."""
+    looks = []
+    for k in range(num):
+        document = copy.deepcopy(transfer.default_look)
+        peak = 1 + 8 * k / num
+        curve = {"points": [[0, peak], [30 / peak, 0.3], [90, 0]]}
+        document["materials"]["Teapot"]["terms"][0]["curves"] = {"theta_h": curve}
+        looks.append(validate(document, transfer.default_look))
+    return looks
+
+
+def _ways(transfer: Transfer, forms: tuple[str, ...], num_edits: int) -> dict[str, Any]:
+    """The drag with operators of several forms, each in a memory that has room for no better one."""
+    rows = transfer.views["front"].rows(0)
+    num = rows.stop - rows.start
+    budgets = {"float32": _ROOMY, "packed": frozen_bytes(num, _BANDS) - 1, "thin": packed_bytes(num, _BANDS) - 1}
+    looks = _looks(transfer, num_edits)
+    last = _settled(transfer, looks[-1], Memory(_ROOMY)).image()
+    return {form: _follow(transfer, looks, budgets[form], last) for form in forms}
+
+
+def _follow(transfer: Transfer, looks: list[Look], budget_bytes: int, last: Any) -> dict[str, Any]:
+    """Drag with what is touched frozen beforehand; last: what the last look is when it is shaded."""
+    memory = Memory(budget_bytes)
+    picture = _settled(transfer, looks[0], memory)
+    picture.touch(_HAND)
+    job = picture.next_job()
+    assert isinstance(job, Freeze)
+    began = time.perf_counter()
+    made = job.make(lambda share: None, lambda: False)
+    freeze_s = time.perf_counter() - began
+    picture.install(job, made)
+    taken = []
+    for look in looks[1:]:
+        began = time.perf_counter()
+        picture.set_look(look, hand=_HAND)
+        picture.advance(None)
+        taken.append(time.perf_counter() - began)
+    return {
+        "ms": 1e3 * float(np.median(taken)),
+        "freeze_s": freeze_s,
+        "error": relative_rmse(picture.image(), last),
+        "step": job.form.step,
+        "bytes": made.num_bytes,
+    }
+
+
+def _settled(transfer: Transfer, look: Look, memory: Memory) -> Picture:
+    picture = Picture(transfer, "front", memory)
+    picture.set_look(look)
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        picture.freeze(lambda share: None, lambda: False)
+    return picture
