@@ -94,7 +94,7 @@ def test_a_hundred_drags_in_sixteen_bits_leave_no_trace(transfer, half):
     np.testing.assert_array_equal(settle(picture).image(), before)
 
 
-@pytest.mark.parametrize("held", ["curves/theta_h", "params/roughness"])
+@pytest.mark.parametrize("held", ["curves/theta_h", pytest.param("params/roughness", marks=pytest.mark.slow)])
 def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, monkeypatch, held):
     if held == "params/roughness":  # its few nodes would fit
         small._room.budget_bytes = packed_bytes(num_samples(transfer, "Floor"), 12)
@@ -143,6 +143,7 @@ def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(trans
     assert relative_rmse(settle(picture).image(), shown_exactly(transfer, look)) < 1e-6
 
 
+@pytest.mark.slow
 def test_two_curves_one_after_another(transfer, small):
     """The second is of another material, and has room; then both have changed at once, as after an undo."""
     picture = opened(transfer, FLOOR + "curves/theta_h", cache=small)
@@ -163,6 +164,7 @@ def test_two_curves_one_after_another(transfer, small):
     assert small.used_bytes <= small.budget_bytes
 
 
+@pytest.mark.slow
 def test_a_second_curve_of_the_same_term_waits_until_the_first_is_known(transfer, small):
     """A hand that moves on before it rests: neither curve's operator can say what the other does."""
     picture = opened(transfer, FLOOR + "curves/theta_h", cache=small)
