@@ -96,6 +96,8 @@ def test_panels_do_not_scroll_sideways(editor: Editor) -> None:
     for panel in (".inspector", ".outline"):
         style = editor.page.locator(panel).evaluate("element => getComputedStyle(element).overflowX")
         assert style == "hidden", panel
+        beyond = editor.page.locator(panel).evaluate("element => element.scrollWidth - element.clientWidth")
+        assert beyond == 0, f"{panel} could be scrolled sideways by a script"
 
 
 def test_keys_do_what_dragging_does(editor: Editor) -> None:
