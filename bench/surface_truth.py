@@ -4,7 +4,9 @@ The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cor
 bright whose sun is an eighth as wide, 0.5° from its middle to its edge (`hard_sun`); nothing but a Blinn–Phong
 highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
 Mitsuba follows every path, highlights that light other surfaces among them, ours by few functions. Edges and
-background belong to the pictures. Its own noise is taken off: `bench.standard_error.over_passes`.
+background belong to the pictures. The picture is a fine frame, as where the eye has just come to rest and as renders
+are; `while_it_moves` is the same of a frame under a moving eye, in percent. Mitsuba's own noise is taken off:
+`bench.standard_error.over_passes`.
 """
 
 from __future__ import annotations
@@ -16,16 +18,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
 from bench.mitsuba import bsdf, missing, passes_of, render
 from bench.standard_error import over_passes
 from relume.bake import Recipe
-from relume.look import complete, validate
+from relume.look import Look, complete, validate
 from relume.look.document import MAX_BOUNCES
 from relume.memory import Memory
+from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
+from relume.moving.fine_job import FineJob
+from relume.moving.picture import MovingPicture
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
 from relume.scene.cornell import sunny_sky
@@ -58,6 +64,17 @@ def _terms_of(kind: str) -> list[dict[str, Any]]:
     return [{"model": "blinn_phong", "color": [_GAIN] * 3, "params": {"exponent": exponent}, "texture": None}]
 
 
+def _while_it_moves(opened: MovingViews, view: str, look: Look) -> NDArray[np.float32]:
+    """What a moving eye sees, all light there."""
+    picture = MovingPicture(opened, view, is_watched=True)
+    picture.set_look(look)
+    picture.advance(None)
+    while (job := picture.next_job()) is not None and not isinstance(job, FineJob):
+        picture.install(job, job.make(lambda share: None, lambda: False))
+        picture.advance(None)
+    return picture.image()
+
+
 def _figure(kind: str, tiny: bool) -> Figure:
     name, size = _KINDS[kind]
     terms, scene = _terms_of(kind), built_in("cornell_box" if tiny else name)
@@ -70,11 +87,22 @@ def _figure(kind: str, tiny: bool) -> Figure:
         document = copy.deepcopy(complete({}, opened.default_look))
         for material in document["materials"].values():
             material["terms"] = copy.deepcopy(terms)
-        ours = render_image(opened, recipe.views[0], validate(document, opened.default_look))
+        look = validate(document, opened.default_look)
+        ours = render_image(opened, recipe.views[0], look)
+        assert isinstance(opened, MovingViews)
+        plain = _while_it_moves(opened, recipe.views[0], look)
         integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
         job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(terms)] * len(scene.meshes), "integrator": integrator}
         render(scene, size, job, Path(folder))
         theirs = passes_of(Path(folder))
     found = over_passes(ours.astype(np.float64), theirs)
-    context = {**found.context, "scene": scene.name, "size": list(size), "spp": PASSES * spp, "points": num_points}
+    moving = {"while_it_moves": 100 * over_passes(plain.astype(np.float64), theirs).error.value}
+    context = {
+        **found.context,
+        **moving,
+        "scene": scene.name,
+        "size": list(size),
+        "spp": PASSES * spp,
+        "points": num_points,
+    }
     return Figure(f"surface.rmse_{kind}", 100 * found.error.value, _UNIT, context, 100 * found.error.standard_error)
