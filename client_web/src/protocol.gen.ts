@@ -162,7 +162,7 @@ export interface RenderRequest {
   exact?: boolean;
 }
 
-/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. */
+/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name. */
 export interface ShareRequest {
   bake: string;
   view: string;
@@ -171,6 +171,7 @@ export interface ShareRequest {
   solo?: string | null;
   solo_light?: string | null;
   paths?: SharedPaths | null;
+  eyes?: Record<string, CameraFrame>;
 }
 
 /** Light paths that are looked at; as a look's `transport`. */
@@ -730,6 +731,7 @@ export interface ShareBody {
   solo: string | null;
   solo_light: string | null;
   paths: SharedPaths | null;
+  eyes: Record<string, CameraFrame>;
   id: string;
   created: string;
   scene: string;

@@ -4,7 +4,7 @@ import type { ShareBody, ShareRequest } from "../src/protocol";
 import { seenPaths } from "../src/seen/paths";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";
-import { shownViews, viewName } from "../src/state/views";
+import { shownViews, viewName, views } from "../src/state/views";
 import { LOOK } from "./look";
 
 vi.mock("../src/scene/open", () => ({
@@ -28,7 +28,7 @@ beforeEach(() => {
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
   vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {
     if (init?.method !== "POST") {
-      const body: ShareBody = { solo: null, solo_light: null, paths: null, ...saved, ...OF_THE_SERVER, look: LOOK };
+      const body: ShareBody = { solo: null, solo_light: null, paths: null, eyes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
       return Promise.resolve(Response.json(body));
     }
     saved = JSON.parse(init.body as string) as ShareRequest;
@@ -47,4 +47,15 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
     await openShare("a", { room: null, watch: null });
     expect(seenPaths.value).toEqual(sent);
   }
+});
+
+test("a link carries from where a view is seen whose eye moves", async () => {
+  const turned = { to_world: [0, 0, 1, 4, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1], yfov: Math.PI / 6 };
+  const info = { name: "front", width: 4, height: 3, camera: turned };
+  views.value = [{ ...info, eye: "free" }, { ...info, name: "left", eye: "fixed" }] as unknown as typeof views.value;
+  shownViews.value = ["front", "left"];
+  await share();
+  expect(Object.keys(saved.eyes ?? {})).toEqual(["front"]);
+  expect(saved.eyes?.front?.to_world).toEqual(turned.to_world);
+  expect(saved.eyes?.front?.yfov).toBeCloseTo(30);
 });

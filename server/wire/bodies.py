@@ -11,7 +11,7 @@ from relume.look.document import MAX_BOUNCES
 from relume.look.model import Show
 from relume.remarks import Effect
 from server.wire.body import Body, Id, Name
-from server.wire.cameras import CameraBody
+from server.wire.cameras import CameraBody, CameraFrame
 from server.wire.protocol import MAX_VIEWS_SHOWN
 from server.wire.renders import Side
 from worker.status import Phase
@@ -286,7 +286,7 @@ class ShareRequest(Body):
     """What a link shows: a look of a bake, the views beside each other and the one in hand.
 
     `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
-    paths that are looked at; null: those of the look.
+    paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name.
     """
 
     bake: Id
@@ -296,6 +296,7 @@ class ShareRequest(Body):
     solo: Name | None = None
     solo_light: Annotated[str, Field(max_length=256)] | None = None
     paths: SharedPaths | None = None
+    eyes: Annotated[dict[Name, CameraFrame], Field(default_factory=dict, max_length=MAX_VIEWS_SHOWN)]
 
 
 class ShareEntry(Body):

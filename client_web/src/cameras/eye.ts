@@ -141,6 +141,18 @@ export function eyeOf(name: string): Eye | null {
   return made;
 }
 
+/** From where a view is seen now; null where it was baked from one place. */
+export function cameraOf(name: string): Frame | null {
+  const view = views.peek().find((other) => other.name === name);
+  return view?.eye === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
+}
+
+/** See a view from there, if its eye moves. */
+export function lookFrom(name: string, camera: Frame): void {
+  const eye = eyeOf(name);
+  eye?.change(() => orbitOf(camera, eye.bounds));
+}
+
 effect(() => {
   if (connection.value !== "open" || bake.value === null) return;
   for (const name of shownViews.value) eyeOf(name)?.tellAgain();

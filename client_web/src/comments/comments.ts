@@ -1,7 +1,6 @@
 /** Writing, resolving and deleting comments; finding what one is about. */
 import { effect } from "@preact/signals";
-import { eyeOf } from "../cameras/eye";
-import { orbitOf } from "../cameras/orbit";
+import { cameraOf, lookFrom } from "../cameras/eye";
 import { whenCommented } from "../live/handlers";
 import { thumbnail } from "../looks/image";
 import * as api from "../net/api";
@@ -20,7 +19,6 @@ import { shownViews, showAlone, viewName, views, workIn } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 
 const PICTURE_WIDTH = 320;
-const DEGREES = 180 / Math.PI;
 
 /** Read the list again. */
 export async function refresh(): Promise<void> {
@@ -62,13 +60,6 @@ export function beginComment(): void {
 
 export function cancelComment(): void {
   pinning.value = null;
-}
-
-/** The camera of a view whose eye moves; null for others. */
-function cameraOf(view: string): CommentRequest["camera"] {
-  const info = views.peek().find(({ name }) => name === view);
-  if (info?.eye !== "free") return null;
-  return { to_world: info.camera.to_world, yfov: info.camera.yfov * DEGREES };
 }
 
 /** Keep the words, with the picture as it is now; whether that succeeded. */
@@ -120,8 +111,7 @@ export function pointOut(comment: CommentBody): void {
   if (!views.peek().some(({ name }) => name === view)) return note(`The view “${view}” is not in this bake.`);
   if (shownViews.peek().includes(view)) workIn(view);
   else showAlone(view);
-  const eye = eyeOf(view);
-  if (eye !== null && camera !== null) eye.change(() => orbitOf(camera, eye.bounds));
+  if (camera !== null) lookFrom(view, camera);
 }
 
 const SAME = 1e-3;

@@ -1,5 +1,7 @@
 /** Links that carry the look: saved on the server, never changed, opened as a step that can be undone. */
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
+import { cameraOf, lookFrom } from "../cameras/eye";
+import type { Frame } from "../cameras/orbit";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
 import { getShare, makeShare } from "../net/api";
@@ -11,11 +13,21 @@ import { solo, soloLight } from "../seen/solo";
 import { bake, bakes } from "../state/bakes";
 import { look } from "../state/look";
 import { mayEdit, watched } from "../state/me";
-import { shownViews, viewName } from "../state/views";
+import { shownViews, viewName, views } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 
 /** A link that the browser did not let us copy: it is shown to be copied by hand. */
 export const linkToCopy = signal<string | null>(null);
+
+/** Where the eyes of the shown views are; those that were baked from one place have none. */
+function eyesNow(): Record<string, Frame> {
+  const eyes: Record<string, Frame> = {};
+  for (const name of shownViews.value) {
+    const camera = cameraOf(name);
+    if (camera !== null) eyes[name] = camera;
+  }
+  return eyes;
+}
 
 /** Save what is seen now. */
 export async function saveShare(): Promise<ShareEntry> {
@@ -29,6 +41,7 @@ export async function saveShare(): Promise<ShareEntry> {
     solo: solo.value,
     solo_light: soloLight.value,
     paths: seenPaths.value,
+    eyes: eyesNow(),
   });
 }
 
@@ -60,6 +73,19 @@ function takeOver(shared: ShareBody): void {
   seenPaths.value = shared.paths;
 }
 
+/** See the views from where they were shared, once they are there: the look is, before. */
+function lookFromThere(eyes: ShareBody["eyes"]): void {
+  let waits = true;
+  const stop = effect(() => {
+    if (!waits || bake.value === null || !views.value.some(({ name }) => name in eyes)) return;
+    waits = false;
+    queueMicrotask(() => {
+      stop();
+      for (const [name, camera] of Object.entries(eyes)) lookFrom(name, camera);
+    });
+  });
+}
+
 /** Open what a link carries. In a room that it names it is what the room begins with. */
 export async function openShare(id: string, { room, watch }: Pick<Place, "room" | "watch">): Promise<void> {
   await attempt(async () => {
@@ -67,7 +93,10 @@ export async function openShare(id: string, { room, watch }: Pick<Place, "room" 
     if (shared.lacking.length > 0) throw new Error(shared.lacking.join(" "));
     const isAlone = room === null && watch === null;
     watched.value = mayEdit.value ? null : { scene: shared.scene, share: id };
-    const arrived = () => isAlone && mayEdit.value && takeOver(shared);
+    const arrived = () => {
+      if (isAlone && mayEdit.value) takeOver(shared);
+      lookFromThere(shared.eyes);
+    };
     await openScene(shared.scene, placeOf(shared, room, watch), undefined, arrived);
     if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
       note("The bake of this link is gone. Its look is shown in another bake of the scene.");
