@@ -28,6 +28,9 @@ QUICK_DEGREE = 4  # of those in which light is followed while a hand moves it
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
+AT_ONCE = 128  # rays that `add_light` takes; all columns of them stay in the first cache
+WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(AT_ONCE * k for k in (2, 5, 6, 7, 8, 9)), 10
+"""Where the columns of `add_light` begin, and how many there are."""
 
 
 class Ladder(NamedTuple):
@@ -105,26 +108,39 @@ def in_basis(wi: F64) -> F64:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def add_light(rungs, num, wi, light, scratch, out):  # type: ignore[no-untyped-def]
+def add_light(rungs, num, columns, out):  # type: ignore[no-untyped-def]
     """Add the light of rays to a point's light vector, t_k += Σ w h_k(ωi).
 
+    Columns lie in one flat array at constant places: of several arrays nobody could tell that they are not the same
+    memory, and loops would be of one ray at a time.
+
     Args:
-        rungs: the `ladder`. num: how many rays there are.
-        wi: their local directions. (≥ 2, ≥ num) float32. light: of each channel. (3, ≥ num) float32
-        scratch: (6, ≥ num) float32, written. out: added to. (3, K) float32
+        rungs: the `ladder`. num: how many rays there are, at most `AT_ONCE`.
+        columns: from `WI` on x and y of their local directions, from `LIGHT` on their light in each channel; the others
+            are written. (NUM_COLUMNS · AT_ONCE,) float32
+        out: added to. (3, K) float32
     """
-    x, re, im, before, last, value = scratch
-    _begin(num, wi, x)
+    for n in range(num):
+        x, y = columns[WI + n], columns[WI + AT_ONCE + n]
+        columns[_X + n] = np.float32(2) * (x * x + y * y) - np.float32(1)
+        columns[_RE + n], columns[_IM + n] = np.float32(1), np.float32(0)
     for rung in range(rungs.order.shape[0]):
-        _climb(rungs, rung, num, wi, x, re, im, before, last)
-        m, norm, cosine, sine = rungs.order[rung], rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
-        for n in range(num):
-            value[n] = norm * last[n] * re[n]
-        _add(num, value, light, cosine, out)
-        if m > 0:
+        a, b, c, m = rungs.a[rung], rungs.b[rung], rungs.c[rung], rungs.order[rung]
+        if a == 0:  # the first of its order
             for n in range(num):
-                value[n] = norm * last[n] * im[n]
-            _add(num, value, light, sine, out)
+                columns[_BEFORE + n], columns[_LAST + n] = np.float32(0), np.float32(1)
+            if m > 0:
+                for n in range(num):
+                    x, y, re, im = columns[WI + n], columns[WI + AT_ONCE + n], columns[_RE + n], columns[_IM + n]
+                    columns[_RE + n], columns[_IM + n] = re * x - im * y, re * y + im * x
+        else:
+            for n in range(num):
+                last = columns[_LAST + n]
+                columns[_LAST + n] = (a * columns[_X + n] + b) * last - c * columns[_BEFORE + n]
+                columns[_BEFORE + n] = last
+        _add(num, columns, _RE, rungs.norm[rung], rungs.cosine[rung], out)
+        if m > 0:
+            _add(num, columns, _IM, rungs.norm[rung], rungs.sine[rung], out)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -203,12 +219,15 @@ def _next_power(m, num, wi, re, im):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _add(num, value, light, k, out):  # type: ignore[no-untyped-def]
+def _add(num, columns, part, norm, k, out):  # type: ignore[no-untyped-def]
+    """Add what rays bring of function k. part: where the column of its real or imaginary power begins."""
     red = green = blue = np.float32(0)
     for n in range(num):
-        red += value[n] * light[0, n]
-        green += value[n] * light[1, n]
-        blue += value[n] * light[2, n]
+        value = columns[_LAST + n] * columns[part + n]
+        red += value * columns[LIGHT + n]
+        green += value * columns[LIGHT + AT_ONCE + n]
+        blue += value * columns[LIGHT + 2 * AT_ONCE + n]
+    red, green, blue = norm * red, norm * green, norm * blue
     out[0, k] += red
     out[1, k] += green
     out[2, k] += blue

@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREE, add_light, in_basis, ladder, num_functions
+from relume.basis.zernike import AT_ONCE, DEGREE, LIGHT, NUM_COLUMNS, WI, add_light, in_basis, ladder, num_functions
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
@@ -25,44 +25,45 @@ F64 = NDArray[np.float64]
 
 _POINTS_A_RANGE = 512
 _LISTED_A_RANGE = 128
-_AT_ONCE = 128  # lights whose functions are summed together; they stay in the cache
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _from_triangles(rungs, normal, tangent, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Add the light triangles that points [start, stop) see. out: (n, 3, K)"""
-    wi, light = np.empty((2, _AT_ONCE), np.float32), np.empty((3, _AT_ONCE), np.float32)
-    scratch = np.empty((6, _AT_ONCE), np.float32)
+    """Add the light triangles that points [start, stop) see. direction, irradiance: (3, M). out: (n, 3, K)"""
+    num_lights = direction.shape[1]
+    seen, columns = np.empty(num_lights + 1, np.int32), np.empty(NUM_COLUMNS * AT_ONCE, np.float32)
     for p in range(start, stop):
+        num_seen = 0
+        for m in range(num_lights):  # without branches, which nothing foretells
+            seen[num_seen] = m
+            num_seen += (visible[p, m >> 3] >> (m & 7)) & 1
         n, t = normal[p], tangent[p]
-        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-        waiting = 0
-        for m in range(direction.shape[0]):
-            if not (visible[p, m >> 3] >> (m & 7)) & 1:
-                continue
-            x, y, z = direction[m, 0], direction[m, 1], direction[m, 2]
-            cosine = n[0] * x + n[1] * y + n[2] * z
-            if cosine <= 0:
-                continue
-            wi[0, waiting] = t[0] * x + t[1] * y + t[2] * z
-            wi[1, waiting] = bx * x + by * y + bz * z
-            for channel in range(3):
-                light[channel, waiting] = cosine * irradiance[m, channel]
-            waiting += 1
-            if waiting == _AT_ONCE:
-                add_light(rungs, waiting, wi, light, scratch, out[p])
-                waiting = 0
-        if waiting:
-            add_light(rungs, waiting, wi, light, scratch, out[p])
+        nx, ny, nz, tx, ty, tz = n[0], n[1], n[2], t[0], t[1], t[2]
+        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        for first in range(0, num_seen, AT_ONCE):
+            num = min(AT_ONCE, num_seen - first)
+            for i in range(num):
+                m = seen[first + i]
+                x, y, z = direction[0, m], direction[1, m], direction[2, m]
+                cosine = max(nx * x + ny * y + nz * z, np.float32(0))
+                columns[WI + i], columns[WI + AT_ONCE + i] = tx * x + ty * y + tz * z, bx * x + by * y + bz * z
+                for channel in range(3):
+                    columns[LIGHT + channel * AT_ONCE + i] = cosine * irradiance[channel, m]
+            add_light(rungs, num, columns, out[p])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _from_listed(rungs, num_points, first, wi, irradiance, scratch, out):  # type: ignore[no-untyped-def]
+def _from_listed(rungs, num_points, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
     """Add listed rays, whose light has been weighed by the cosine, to their points. out: (num_points, 3, K)"""
+    columns = np.empty(NUM_COLUMNS * AT_ONCE, np.float32)
     for p in range(num_points):
-        begin, end = first[p], first[p + 1]
-        if end > begin:
-            add_light(rungs, end - begin, wi[:, begin:end], irradiance[:, begin:end], scratch, out[p])
+        for begin in range(first[p], first[p + 1], AT_ONCE):
+            num = min(AT_ONCE, first[p + 1] - begin)
+            for i in range(num):
+                columns[WI + i], columns[WI + AT_ONCE + i] = wi[0, begin + i], wi[1, begin + i]
+                for channel in range(3):
+                    columns[LIGHT + channel * AT_ONCE + i] = irradiance[channel, begin + i]
+            add_light(rungs, num, columns, out[p])
 
 
 def light_vectors(
@@ -80,7 +81,8 @@ def light_vectors(
     """
     out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     if lights.num_lights:
-        args = (ladder(degree), points.normal, points.tangent, visible, lights.direction, lights.irradiance)
+        direction, irradiance = np.ascontiguousarray(lights.direction.T), np.ascontiguousarray(lights.irradiance.T)
+        args = (ladder(degree), points.normal, points.tangent, visible, direction, irradiance)
         for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
     _add_rays(points, rays, degree, out)
     return out
@@ -115,8 +117,7 @@ def _list_and_add(rays: Rays, receivers: Receivers, degree: int, start: int, sto
     most = (stop - start) * rays.rays_a_point
     listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
     rays.list_into(listed, receivers, start, stop)
-    scratch = np.empty((6, rays.rays_a_point), np.float32)
-    _from_listed(ladder(degree), stop - start, listed.first, listed.wi, listed.irradiance, scratch, out[start:stop])
+    _from_listed(ladder(degree), stop - start, listed.first, listed.wi, listed.irradiance, out[start:stop])
 
 
 def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
@@ -135,22 +136,25 @@ def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: Tria
     return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), in_basis(wi)))
 
 
-def add_scaled(total: F32, part: F32, gain: F32, rows: NDArray[np.intp] | None = None) -> None:
+def add_scaled(
+    total: F32, part: F32, gain: F32, rows: NDArray[np.intp] | None = None, *, is_of_all: bool = False
+) -> None:
     """Add light vectors times a gain of each channel to others.
 
     Args:
         total: what they are added to. (n, 3, K) float32
         part: that is added, of as many functions or fewer. (m, 3, ≤ K) float32. gain: (3,) float32
-        rows: which of the n they are. (m,); None: all.
+        rows: which of the n they are. (m,); None: all. is_of_all: `part` has all n, of which `rows` are added.
     """
-    chosen = np.arange(len(total)) if rows is None else rows
-    for_shares(lambda start, stop: _add_scaled(part, gain, chosen, start, stop, total), len(part))
+    into = np.arange(len(total)) if rows is None else rows
+    of = into if is_of_all or rows is None else np.arange(len(part))
+    for_shares(lambda start, stop: _add_scaled(part, gain, of, into, start, stop, total), len(into))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_scaled(part, gain, rows, start, stop, out):  # type: ignore[no-untyped-def]
+def _add_scaled(part, gain, of, into, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
-        p = rows[i]
+        q, p = of[i], into[i]
         for channel in range(3):
             for k in range(part.shape[2]):
-                out[p, channel, k] += gain[channel] * part[i, channel, k]
+                out[p, channel, k] += gain[channel] * part[q, channel, k]

@@ -52,6 +52,7 @@ def summed(
     vectors_of: Callable[[Light], Found],
     beams: tuple[Beam, ...] = (),
     between: Sequence[tuple[Found, Rgb]] | None = None,
+    chosen: NDArray[np.intp] | None = None,
 ) -> Arriving:
     """Sum over sources: transport is linear in them.
 
@@ -60,21 +61,28 @@ def summed(
         vectors_of: finds those of one source and one kind of way, suns that are beams left out.
         beams: of the light.
         between: what surfaces send, with its gains, in place of what `vectors_of` finds of it.
+        chosen: points that are asked about, the others have anything; None: all.
     """
     total, others = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
     of_beams = {beam.key for beam in beams}
     for element, gain in vector_of(light).items():
         if element.paths.reflect and between is not None:
             continue
-        (part, rows), factor = vectors_of(element), np.array(gain, np.float32)
+        found = vectors_of(element)
         if not (element.paths.direct and any(lamp in of_beams for lamp, _ in element.local)):
-            add_scaled(total, part, factor, rows)
+            _add(total, found, gain, chosen)
         if not element.shows_sky:
-            add_scaled(others, part, factor, rows)
-    for (part, rows), gain in between or ():
+            _add(others, found, gain, chosen)
+    for found, gain in between or ():
         for into in (total, others):
-            add_scaled(into, part, np.array(gain, np.float32), rows)
+            _add(into, found, gain, chosen)
     return Arriving(total, others, beams)
+
+
+def _add(total: F32, found: Found, gain: Rgb, chosen: NDArray[np.intp] | None) -> None:
+    is_of_all = found.rows is None
+    rows = chosen if is_of_all else found.rows
+    add_scaled(total, found.vectors, np.array(gain, np.float32), rows, is_of_all=is_of_all)
 
 
 def wholly(transfer: MovingTransfer, light: Light, *, has_beams: bool = False) -> Arriving:

@@ -121,7 +121,8 @@ class LiveVectors:
                 return Found(transfer.vectors(element, has_beams))
             return Found(transfer.preview_vectors(element, chosen, has_beams), chosen)
 
-        return summed(transfer, light, found, transfer.beams(light, chosen) if has_beams else (), between.parts)
+        beams = transfer.beams(light, chosen) if has_beams else ()
+        return summed(transfer, light, found, beams, between.parts, chosen)
 
     def _last_between(self, light: Light, is_needed: NDArray[np.uint8]) -> Between:
         """What surfaces sent when that was found last, or now where it never was."""
