@@ -154,8 +154,8 @@ class MovingPicture:
 
     def _fine_job(self) -> FineJob | None:
         """Find highlights finely in what is shown, if they were not."""
-        drawn, wanted = self._drawn, (self._look, self._solo, self._num_eyes, self._vectors.version)
-        if drawn is None or drawn.has_rims or self._is_stale or self._is_rough or wanted != self._shown:
+        drawn = self._drawn
+        if drawn is None or drawn.has_rims or self._is_stale or self._is_rough or self._to_show != self._shown:
             return None
         # made beside frames, which go on with the relief that they have
         finely = drawn.wanted._replace(is_fine=True, relief=ReliefLight())
@@ -168,13 +168,18 @@ class MovingPicture:
 
         return FineJob(partial(fine_frame, *of), ("finer", self._num_eyes, id(drawn.wanted)), take)
 
+    @property
+    def _to_show(self) -> tuple[Any, ...]:
+        """What has been asked for; equal to `_shown` where that is shown."""
+        return self._look, self._solo, self._num_eyes, self._vectors.version
+
     def install(self, job: Any, made: Any) -> None:
         """Go on with what a job has made."""
         job.install(made)
 
     def advance(self, max_coefficients: int | None) -> Advance:
         """Bring the picture to its look and its eye."""
-        wanted = (self._look, self._solo, self._num_eyes, self._vectors.version)
+        wanted = self._to_show
         is_drawn = wanted == self._shown and self._is_rough == self._has_to_be_rough()
         if self._look is None or (is_drawn and self._is_corrected == self.is_corrected and not self._is_finer):
             return Advance([], exact=False, fidelity=self._fidelity, complete=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.operators.operator import Operator
-from relume.operators.stream import Columns, columns_of
+from relume.operators.stream import Columns, columns_of, within_tile
 from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
@@ -80,8 +80,7 @@ def _stream(transport, scale, bounds, index, change, count, image, start, stop):
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
         for level in range(count.shape[0]):
-            first = max(bounds[level] - tile * samples, 0)
-            last = min(bounds[level + 1] - tile * samples, samples)
+            first, last = within_tile(bounds, level, tile, samples)
             if first >= last:
                 continue
             weight, which, num = change[level, channel], index[level, channel], count[level, channel]

@@ -48,6 +48,16 @@ def columns_of(change: NDArray[np.float64]) -> Columns:
     return Columns(index, values, count.astype(np.int64))
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def within_tile(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
+    """Find where the samples of a level begin and end in a tile; there are none where they end before they begin.
+
+    Args:
+        bounds: see `stream`. level, tile: their numbers. samples: of a tile.
+    """
+    return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
@@ -58,8 +68,7 @@ def _stream(transport, bounds, index, change, count, image, start, stop):  # typ
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
         for level in range(count.shape[0]):
-            first = max(bounds[level] - tile * samples, 0)
-            last = min(bounds[level + 1] - tile * samples, samples)
+            first, last = within_tile(bounds, level, tile, samples)
             if first >= last:
                 continue
             sums = image[tile, channel, first:last]
