@@ -17,6 +17,8 @@ from relume.errors import SceneError
 from relume.images.reading import MAX_SIDE
 from relume.images.shelf import keep, records, texture_of
 from server.app import create_app
+from server.live.state.look_state import LookState
+from server.live.state.shown_views import ShownViews
 from server.settings import Settings
 from worker.scenes import register_scene
 
@@ -101,6 +103,21 @@ def test_one_that_a_saved_look_or_a_link_shows_stays(client, sent):
     assert "look 'painted'" in response.json()["detail"]
     assert client.delete("/api/looks/painted", headers={"If-Match": "*"}).status_code == 204
     assert client.get(f"{URL}/{sent['id']}").status_code == 200
+
+
+def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, sent):
+    resumes = client.app.state.services.live.resumes
+    default = {"materials": {"Ball": {"terms": []}}}
+    shows = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+    token = resumes.open("0123456789abcdef", LookState(default, shows, 0), ShownViews(["front"], "front"))
+    url = f"{URL}/{sent['id']}"
+    open_now = client.delete(url)
+    resumes.close(token, time.monotonic())
+    lost = client.delete(url)
+    assert (open_now.status_code, lost.status_code) == (409, 409)
+    assert "a session of bake 0123456789abcdef" in open_now.json()["detail"]
+    assert resumes.take(token, "0123456789abcdef", time.monotonic()) is not None
+    assert resumes.naming(sent["texture"], time.monotonic()) == []
 
 
 def wait(is_done):

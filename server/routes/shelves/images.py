@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated
 
@@ -14,7 +16,7 @@ from server.access.roles import Who
 from server.errors import InUseError
 from server.files.png import FOREVER, PngResponse
 from server.routes.shelves.sending import import_apart, take_in
-from server.services import Shared
+from server.services import Services, Shared
 from server.wire.bodies import ImageBody, moment
 from server.wire.body import Id
 from worker.paths import images_path
@@ -55,18 +57,26 @@ def get_image_thumbnail(image: Id, services: Shared) -> PngResponse:
 
 
 @router.delete("/{image}", status_code=204)
-def delete_image(image: Id, services: Shared) -> Response:
-    """Delete an image that no saved look and no link names."""
+async def delete_image(image: Id, services: Shared) -> Response:
+    """Delete an image that no saved look, no link and no session of this server names."""
+    sessions = partial(services.live.resumes.naming, now_s=time.monotonic())
+    await run_in_threadpool(_delete, image, services, sessions)
+    return Response(status_code=204)
+
+
+def _delete(image: str, services: Services, sessions: Callable[[str], list[str]]) -> None:
+    """Delete it unless it is in use; `sessions` finds the bakes of those that name a text."""
     record = get_record(images_path(services.settings.data), image)
-    looks = [f"look {name!r}" for name in services.looks.naming(f'"{record.texture}"')]
-    users = looks + [f"link {identity}" for identity in services.shares.naming(f'"{record.texture}"')]
+    said = f'"{record.texture}"'
+    users = [f"look {name!r}" for name in services.looks.naming(said)]
+    users += [f"link {identity}" for identity in services.shares.naming(said)]
+    users += [f"a session of bake {bake}" for bake in sessions(said)]
     if users:
         more = f" and {len(users) - _MOST_NAMED} more" if len(users) > _MOST_NAMED else ""
         shown = ", ".join(users[:_MOST_NAMED])
         raise InUseError(f"image {record.name!r} is shown by {shown}{more}; change or delete these first")
     IMAGES.remove(images_path(services.settings.data), image)
     services.access.quotas.disown("image", image)
-    return Response(status_code=204)
 
 
 def _body(record: ImageRecord) -> ImageBody:
