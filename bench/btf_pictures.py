@@ -55,7 +55,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
         plane, real = _scenes(tile, theta, phi)
         opened, look = covered(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
         ours = render_image(opened, "eye", look)[..., :3]
-        theirs = traced_by_peer(real, size, spp, [tile.terms], folder / f"peer{k}")
+        theirs = traced_by_peer(real, size, spp, [tile.materials[0]], folder / f"peer{k}")
         errors.append(over_passes(ours.astype(np.float64), theirs))
     worst = max(errors, key=lambda one: one.error.value)
     context: dict[str, Any] = {
@@ -165,7 +165,7 @@ def _scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
     radiance = np.array(studio().radiance)
     radiance[len(radiance) // 2 :] = 0  # a BTF knows no light from below, which holes of the geometry would let through
     sky = Environment("sky", radiance)
-    material = (Material("Cloth", tuple(tile.terms)),)
+    material = (Material("Cloth", tile.materials[0]),)
     return tuple(  # type: ignore[return-value]
         make_scene(name, [mesh], material, [camera], sky)
         for name, mesh in (("plane", _plane()), ("geometry", _real(tile)))

@@ -54,7 +54,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     smooth, real = _scenes()
     opened, look = covered(smooth, record, size, folder / "sphere.zarr", 60 if tiny else 2000)
     ours = render_image(opened, "eye", look)[..., :3].astype(np.float64)
-    theirs = traced_by_peer(real, size, spp, [GEOMETRIES["weave"]().terms, _BLACK], folder / "sphere")
+    theirs = traced_by_peer(real, size, spp, [GEOMETRIES["weave"]().materials[0], _BLACK], folder / "sphere")
     cosine = _cosines(real.cameras[0], size)
     parts = {"all": cosine > 0, "near": cosine > _NEAR, "rim": (cosine > 0) & (cosine <= _NEAR)}
     errors = {part: over_passes(ours[rows][None], theirs[:, rows][:, None]) for part, rows in parts.items()}
@@ -73,7 +73,7 @@ def _scenes() -> tuple[Scene, Scene]:
     towards = np.array([np.sin(_TURNED) * 0.8, np.sin(_TURNED) * 0.6, np.cos(_TURNED)])
     camera = look_at("eye", tuple(_FAR * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _ACROSS / _FAR)))
     sky = Environment("sky", np.array(studio().radiance))
-    cloth, black = Material("Cloth", tuple(map(dict, tile.terms))), Material("Black", _BLACK)
+    cloth, black = Material("Cloth", tuple(map(dict, tile.materials[0]))), Material("Black", _BLACK)
     lowest = _RADIUS + float(tile.positions[:, 2].min())
     return (
         make_scene("smooth", [_ball(_RADIUS, 0)], (cloth,), [camera], sky),

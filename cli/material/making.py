@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,10 +11,20 @@ from cli.options import Data
 
 
 def material_make_btf(
-    geometry: Annotated[str, typer.Argument(metavar="weave|pebbles|corduroy", help="Small geometry to render.")],
+    geometry: Annotated[
+        str,
+        typer.Argument(
+            metavar="weave|pebbles|corduroy|FILE",
+            help="Small geometry to render; a .glb, .obj or .ply file holds one period of yours, seen from above (+Y).",
+        ),
+    ],
     size: Annotated[int, typer.Option(help="Texels along each side.")] = 128,
     grid: Annotated[int, typer.Option(help="Places along each side of a texel that are looked at.")] = 3,
     error: Annotated[float, typer.Option(help="Relative RMS that compression may miss.")] = 0.05,
+    period: Annotated[
+        float | None,
+        typer.Option(help="Of a file: side of the square that repeats along x and z, metres; else the box about it."),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="What to call it.")] = None,
     data: Data = None,
 ) -> None:
@@ -25,12 +36,13 @@ def material_make_btf(
     from cli.interrupts import until_interrupted
     from cli.material.words import tell
     from relume.asset_store import check_name
-    from relume.synthetic.make import Made, make_btf
+    from relume.synthetic.make import GEOMETRIES, MESH, Made, make_btf
     from worker.paths import btfs_path
 
-    wanted = Made(geometry, size, grid, error)
+    file = None if geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)
+    wanted = Made(geometry if file is None else MESH, size, grid, error, file, period)
     wanted.check()
-    called = check_name(name or f"{geometry.capitalize()} (synthetic)")
+    called = check_name(name or f"{geometry.capitalize() if file is None else file.stem} (synthetic)")
     folder = btfs_path(open_settings(data).data)
     record = until_interrupted(
         f"{geometry}, {size}×{size} texels",

@@ -5,12 +5,13 @@ What is rendered stays in a folder until it is compressed, so that a run that wa
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from relume.btf.begun import Begun
 from relume.btf.compress import MOST_TEXELS, compress
@@ -20,11 +21,15 @@ from relume.btf.shelf import BtfRecord, keep
 from relume.btf.values import Values
 from relume.errors import ParameterError
 from relume.synthetic.corduroy import corduroy
+from relume.synthetic.mesh import tile_of
 from relume.synthetic.pebbles import pebbles
 from relume.synthetic.render import SmallGeometry
+from relume.synthetic.tile import Tile
 from relume.synthetic.weave import weave
 
 GEOMETRIES = {"weave": weave, "pebbles": pebbles, "corduroy": corduroy}
+MESH = "mesh"
+"""Geometry that a file holds."""
 LEAST_SIZE = 8
 MOST_GRID = 8
 _SEED = 1
@@ -35,20 +40,23 @@ class Made(NamedTuple):
     """What is to be made.
 
     Attributes:
-        geometry: one of `GEOMETRIES`. size: texels along each side.
+        geometry: one of `GEOMETRIES`, or `MESH`. size: texels along each side.
         grid: places along each side of a texel, each seen by another part of the lens, in light of another part of
             the lamps.
         bound: relative RMS that compression may miss.
+        file: of a mesh. period: of it, see `tile_of`.
     """
 
     geometry: str
     size: int
     grid: int
     bound: float
+    file: Path | None = None
+    period: float | None = None
 
     def check(self) -> None:
         """Raise ParameterError where it cannot be made."""
-        if self.geometry not in GEOMETRIES:
+        if self.geometry not in GEOMETRIES and self.file is None:
             raise ParameterError("geometry", self.geometry, f"one of {', '.join(GEOMETRIES)}")
         if not (self.size >= LEAST_SIZE and self.size**2 <= MOST_TEXELS):
             raise ParameterError("--size", self.size, f"{LEAST_SIZE} to {int(MOST_TEXELS**0.5)} texels")
@@ -56,6 +64,20 @@ class Made(NamedTuple):
             raise ParameterError("--grid", self.grid, f"1 to {MOST_GRID}")
         if not 1e-4 <= self.bound <= 0.5:
             raise ParameterError("--error", self.bound, "0.0001 to 0.5")
+
+    def tile(self) -> Tile:
+        """The geometry. Raises SceneError, ParameterError where a file holds none."""
+        return GEOMETRIES[self.geometry]() if self.file is None else tile_of(self.file, self.period)
+
+    def recipe(self, tile: Tile) -> dict[str, Any]:
+        """What it is made from, all of it: the same is the same BTF."""
+        made = {name: getattr(self, name) for name in ("geometry", "size", "grid", "bound")}
+        if self.file is not None:
+            hashed = hashlib.sha256(json.dumps(tile.materials, sort_keys=True).encode())
+            for array in tile[:-1]:
+                hashed.update(array.tobytes())
+            made["tile"] = hashed.hexdigest()
+        return {"synthetic": made, "seed": _SEED}
 
 
 def make_btf(
@@ -74,18 +96,21 @@ def make_btf(
         making: folder of what was rendered so far; by default in `folder`, by what is wanted.
     Raises:
         ParameterError: it cannot be made. CancelledError: `cancelled` said so; what was rendered stays.
-        MaterialError: the store is full.
+        MaterialError: the store is full. SceneError: the mesh cannot be used.
     """
     wanted.check()
-    making = making or folder / "making" / "-".join(str(part) for part in wanted[:3])
+    tile = wanted.tile()
+    from_all = wanted.recipe(tile)
+    parts = *wanted[:3], from_all["synthetic"].get("tile", "")[:16]
+    making = making or folder / "making" / "-".join(str(part) for part in parts if part)
     making.mkdir(parents=True, exist_ok=True)
     recipe = making / "recipe.json"
-    recipe.write_text(json.dumps({"synthetic": wanted._asdict(), "seed": _SEED}, sort_keys=True))
+    recipe.write_text(json.dumps(from_all, sort_keys=True))
 
     def make() -> EigenBtf:
         size = wanted.size, wanted.size
         values = Values(making, ubo_rings(), size)
-        small = SmallGeometry(GEOMETRIES[wanted.geometry](), ubo_rings(), size, wanted.grid, _SEED)
+        small = SmallGeometry(tile, ubo_rings(), size, wanted.grid, _SEED)
         values.fill(small.seen_from, lambda share: progress(_OF_RENDERING * share), cancelled)
         rest = 1 - _OF_RENDERING
         begun = Begun(making / "compressed", {"bound": wanted.bound})

@@ -39,7 +39,7 @@ def pebbles() -> Tile:
     stones = place[:, None] + radii[:, None, None] * shape * unit
     plane = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float64)
     numbers, num = np.arange(len(radii)), len(radii)
-    return Tile(
+    return Tile.of_one(
         np.concatenate([stones.reshape(-1, 3), plane]),
         np.concatenate([np.tile(normal, (num, 1)), np.tile([0.0, 0, 1], (4, 1))]),
         np.concatenate(

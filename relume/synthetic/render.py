@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from relume.brdf.albedo import reflectance
 from relume.brdf.evaluate import eval_brdf
 from relume.btf.rings import Rings, directions
-from relume.synthetic.tile import Tile, levelled, repeated
+from relume.synthetic.tile import I64, Tile, levelled, repeated
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import Hits, trace_from
 from relume.trace.surface import any_tangent
@@ -41,10 +41,14 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class _Places(NamedTuple):
-    """Places on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32"""
+    """Places on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
 
     position: F32
     normal: F32
+    material: I64
+
+    def rows(self, rows: slice) -> _Places:
+        return _Places(self.position[rows], self.normal[rows], self.material[rows])
 
 
 class SmallGeometry:
@@ -58,10 +62,13 @@ class SmallGeometry:
 
     def __init__(self, tile: Tile, rings: Rings, size: tuple[int, int], grid: int, seed: int) -> None:
         self.rings, self.size, self._grid, self._seed = rings, size, grid, seed
-        self._terms = [{"params": {}, "curves": {}, "texture": None, **term} for term in tile.terms]
-        self._num_faces = len(tile.faces)
+        self._materials = [
+            [{"params": {}, "curves": {}, "texture": None, **term} for term in terms] for terms in tile.materials
+        ]
+        self._num_faces, self._material = len(tile.faces), tile.material
         flat = levelled(tile)
-        self._times = int(np.ceil(np.ptp(flat.positions[:, 2]) * np.tan(_GRAZING)))  # that rays pass on their way
+        # that rays pass on their way, and what reaches over the square's sides
+        self._times = max(1, int(np.ceil(np.ptp(flat.positions[:, 2]) * np.tan(_GRAZING))))
         self._around = repeated(flat, self._times)
         self._positions = self._around.positions.astype(np.float32)
         self._embree = EmbreeScene.build(self._positions, self._around.faces.astype(np.uint32))
@@ -104,9 +111,10 @@ class SmallGeometry:
         step = max(1, _PAIRS_AT_ONCE // self.rings.num_directions)
         rows = np.flatnonzero(found)
         for start in range(0, len(rows), step):
-            chosen = _Places(places.position[start : start + step], places.normal[start : start + step])
+            chosen = places.rows(slice(start, start + step))
             seen[:, rows[start : start + step]] = self._direct(chosen, wo, lights).transpose(1, 0, 2)
-        seen[:, rows] += self._reflectance / np.pi * self._irradiance[some.face % self._num_faces].transpose(1, 0, 2)
+        face = some.face % self._num_faces
+        seen[:, rows] += (self._reflectance[face, None] / np.pi * self._irradiance[face]).transpose(1, 0, 2)
         return seen
 
     def _direct(self, places: _Places, wo: F64, lights: F64) -> F64:
@@ -119,7 +127,9 @@ class SmallGeometry:
         local = np.einsum("nij,nj->ni", frame[place], lights[light])
         towards = np.einsum("pij,j->pi", frame, wo)[place]
         out = np.zeros((*cosine.shape, 3))
-        out[place, light] = sum(eval_brdf(term, local, towards) for term in self._terms)
+        for number, terms in enumerate(self._materials):
+            mine = places.material[place] == number
+            out[place[mine], light[mine]] = sum(eval_brdf(term, local[mine], towards[mine]) for term in terms)
         return np.asarray(out * cosine[..., None])
 
     def _visible(self, places: _Places, lights: F64) -> F64:
@@ -140,12 +150,13 @@ class SmallGeometry:
         normal += lacking * wo
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         position = (p * b).sum(axis=1) + _OFF * face_normal
-        return _Places(position.astype(np.float32), normal.astype(np.float32))
+        return _Places(position.astype(np.float32), normal.astype(np.float32), self._around.material[hits.face])
 
     @cached_property
     def _reflectance(self) -> F64:
-        """ρ. (3,)"""
-        return np.asarray(sum(reflectance(term) for term in self._terms), np.float64)
+        """ρ of each face of the tile. (faces, 3)"""
+        of = [sum((reflectance(term) for term in terms), np.zeros(3)) for terms in self._materials]
+        return np.asarray(of, np.float64)[self._material]
 
     @cached_property
     def _irradiance(self) -> F64:
@@ -162,7 +173,7 @@ class SmallGeometry:
         num, lights = straight.shape[:2]
         arriving, sent_on = straight, np.zeros_like(straight)
         for _ in range(_BOUNCES):
-            arriving = (between @ (self._reflectance * arriving).reshape(num, -1)).reshape(num, lights, 3)
+            arriving = (between @ (self._reflectance[:, None] * arriving).reshape(num, -1)).reshape(num, lights, 3)
             sent_on += arriving
         return np.asarray(sent_on)
 

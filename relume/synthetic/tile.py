@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
+Terms = tuple[Mapping[str, Any], ...]
 
 
 class Tile(NamedTuple):
@@ -19,13 +20,20 @@ class Tile(NamedTuple):
 
     Attributes:
         positions: (n, 3). normals: unit. (n, 3). faces: counter-clockwise seen from outside. (m, 3)
-        terms: of its one material, in the form of look documents; isotropic.
+        material: of each face. (m,)
+        materials: terms of each, in the form of look documents; isotropic.
     """
 
     positions: F64
     normals: F64
     faces: I64
-    terms: tuple[Mapping[str, Any], ...]
+    material: I64
+    materials: tuple[Terms, ...]
+
+    @classmethod
+    def of_one(cls, positions: F64, normals: F64, faces: I64, terms: Terms) -> Self:
+        """One whose faces all have the same material."""
+        return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
 
 
 def levelled(tile: Tile) -> Tile:
@@ -43,6 +51,7 @@ def repeated(tile: Tile, times: int) -> Tile:
         positions=np.concatenate([tile.positions + offset for offset in offsets]),
         normals=np.tile(tile.normals, (len(offsets), 1)),
         faces=np.concatenate([tile.faces + k * count for k in range(len(offsets))]),
+        material=np.tile(tile.material, len(offsets)),
     )
 
 

@@ -35,4 +35,4 @@ def weave() -> Tile:
     counts = np.cumsum([0, *(len(part[0]) for part in parts)])
     positions, normals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     faces = np.concatenate([part[2] + start for part, start in zip(parts, counts, strict=False)])
-    return Tile(positions, normals, faces, TERMS)
+    return Tile.of_one(positions, normals, faces, TERMS)

@@ -1,0 +1,81 @@
+"""Small geometries that files hold."""
+
+import numpy as np
+import pytest
+
+from relume.btf.rings import directions, ubo_rings
+from relume.errors import ParameterError, SceneError
+from relume.synthetic.corduroy import corduroy
+from relume.synthetic.make import MESH, Made, make_btf
+from relume.synthetic.mesh import tile_of
+from relume.synthetic.render import SmallGeometry
+
+LIBRARY = "newmtl red\nKd 0.6 0.1 0.1\nKs 0 0 0\nillum 1\nnewmtl green\nKd 0.1 0.5 0.2\nKs 0 0 0\nillum 1\n"
+
+
+def quad(first, low, high, depth, material):
+    """A piece of the plane y = 0, seen from above."""
+    corners = [(low, depth), (high, depth), (high, -depth), (low, -depth)]
+    places = "".join(f"v {x} 0 {z}\n" for x, z in corners)
+    return f"{places}usemtl {material}\nf {first} {first + 1} {first + 2} {first + 3}\n"
+
+
+@pytest.fixture
+def striped(tmp_path):
+    """Two metres of it, red on the left, green on the right."""
+    (tmp_path / "m.mtl").write_text(LIBRARY)
+    path = tmp_path / "striped.obj"
+    path.write_text("mtllib m.mtl\n" + quad(1, -1, 0, 1, "red") + quad(5, 0, 1, 1, "green"))
+    return path
+
+
+def test_every_material_of_a_flat_mesh_sends_what_it_would_alone(striped):
+    tile = tile_of(striped, None)
+    seen = SmallGeometry(tile, ubo_rings(), (8, 8), 1, 1).seen_from(30).reshape(81, 8, 8, 3)
+    sums = [sum(np.array(term["color"]) for term in terms if term["model"] == "lambert") for terms in tile.materials]
+    for half, matt in zip((seen[:, :, :4], seen[:, :, 4:]), sums, strict=True):
+        assert matt.max() > 0.3
+        expected = matt / np.pi * directions(ubo_rings())[:, None, None, 2:]
+        # lamps are wide, and a mirror's share of what is not matt comes on top
+        np.testing.assert_allclose(half.mean(axis=(1, 2)), expected[:, 0, 0], rtol=0.15, atol=0.02)
+    assert seen[:, :, :4, 0].mean() > 2 * seen[:, :, 4:, 0].mean()
+
+
+def test_a_file_holds_the_same_period(tmp_path):
+    tile = corduroy()
+    rows = [f"v {3 * x} {3 * z} {-3 * y}\n" for x, y, z in tile.positions]
+    rows += [f"vn {x} {z} {-y}\n" for x, y, z in tile.normals]
+    rows += ["f " + " ".join(f"{k}//{k}" for k in face + 1) + "\n" for face in tile.faces]
+    path = tmp_path / "cords.obj"
+    path.write_text("".join(rows))
+    found = tile_of(path, 3.0)
+    for name in ("positions", "normals"):
+        one, other = (getattr(each, name)[each.faces] for each in (found, tile))
+        np.testing.assert_allclose(one, other, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "period", "error", "said"),
+    [
+        (quad(1, 0, 2, 1, "x") + quad(5, 2, 3, 1, "x"), None, ParameterError, "3 × 2 metres"),
+        (quad(1, 0, 2, 1, "x"), 0.5, ParameterError, "half its width, 1"),
+        (quad(1, 0, 2, 1, "x"), float("nan"), ParameterError, "period"),
+        ("v 0 0 0\nv 1 0 0\nv 0 5 1\nf 1 2 3\n", None, ParameterError, "height of the mesh, 5"),
+        ("mtllib none.mtl\n", None, SceneError, "triangles"),
+        ("", None, SceneError, "empty"),
+    ],
+)
+def test_meshes_that_are_no_period_are_refused(tmp_path, text, period, error, said):
+    path = tmp_path / "bad.obj"
+    path.write_text(text)
+    with pytest.raises(error, match=said):
+        make_btf(tmp_path / "kept", Made(MESH, 8, 1, 0.1, path, period), "x", lambda share: None, lambda: False)
+    assert not (tmp_path / "kept").exists()
+
+
+def test_other_colours_are_another_btf(striped):
+    wanted = Made(MESH, 8, 1, 0.1, striped)
+    first = wanted.recipe(wanted.tile())
+    assert first == wanted.recipe(wanted.tile())
+    (striped.parent / "m.mtl").write_text(LIBRARY.replace("0.6", "0.7"))
+    assert wanted.recipe(wanted.tile()) != first
