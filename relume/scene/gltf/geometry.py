@@ -24,13 +24,25 @@ MAX_COORDINATE = 1e7
 
 @dataclass(frozen=True)
 class Geometry:
-    """A primitive before its node's transform; arrays as in `relume.scene.model.Mesh`."""
+    """A primitive before its node's transform; arrays as in `relume.scene.model.Mesh`.
+
+    Attributes:
+        colors: of vertices, linear RGB and alpha, within [0, 1]; None where there are none. (num_vertices, 4)
+    """
 
     positions: F32
     normals: F32
     tangents: F32
     uvs: tuple[F32, ...]
     faces: U32
+    colors: F32 | None = None
+
+    def with_own_corners(self, uvs: F32) -> Geometry:
+        """The same with vertices for each triangle alone, and these places in textures. (num_faces, 3, 2)"""
+        order = self.faces.reshape(-1)
+        own_faces = np.arange(len(order), dtype=np.uint32).reshape(-1, 3)
+        parts = (self.positions[order], self.normals[order], self.tangents[order], (uvs.reshape(-1, 2),), own_faces)
+        return Geometry(*parts, None if self.colors is None else self.colors[order])
 
 
 def num_corners(document: Document, primitive: Primitive) -> int:
@@ -83,10 +95,10 @@ def _with_attributes(
     what: str,
     warnings: list[Remark],
 ) -> Geometry:
-    def attribute(name: str, width: int) -> F32 | None:
+    def attribute(name: str, *widths: int) -> F32 | None:
         if name not in primitive.attributes:
             return None
-        values = reader.floats(primitive.attributes[name], (width,), f"{name} of {what}")
+        values = reader.floats(primitive.attributes[name], widths, f"{name} of {what}")
         if len(values) != len(positions):
             raise SceneError(f"{name} of {what} are not as many as its positions; export the scene again")
         if not usable(values[used]):
@@ -96,13 +108,15 @@ def _with_attributes(
 
     normals, tangents = attribute("NORMAL", 3), attribute("TANGENT", 4)
     uvs = tuple(uv for uv in (attribute("TEXCOORD_0", 2), attribute("TEXCOORD_1", 2)) if uv is not None)
-    if any(name.startswith("COLOR_") for name in primitive.attributes):
-        warnings.append(wrong(f"vertex colours of {what} are not used"))
+    colors = attribute("COLOR_0", 3, 4)
+    if colors is not None:
+        opaque = np.ones((len(colors), 4 - colors.shape[1]), np.float32)
+        colors = np.concatenate([np.clip(colors, 0, 1), opaque], axis=1)
     if primitive.targets:
         warnings.append(simplified(f"morph targets of {what} are not used; it has its basic shape"))
     points = positions[used]
     if normals is None:
-        return _flat(points, uvs, faces)
+        return _flat(points, uvs, faces, colors)
     missing = np.linalg.norm(normals, axis=1) < 1e-6
     if missing.any():
         warnings.append(
@@ -110,7 +124,7 @@ def _with_attributes(
         )
         normals = np.where(missing[:, None], _smooth_normals(points, faces), normals)
     tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
-    return Geometry(points, normals, tangents, uvs, faces.astype(np.uint32))
+    return Geometry(points, normals, tangents, uvs, faces.astype(np.uint32), colors)
 
 
 def _unroll(corners: NDArray[Any], mode: int) -> I64:
@@ -170,7 +184,7 @@ def _smooth_normals(points: F32, faces: I64) -> F32:
     return np.where(length > 1e-12, total / np.maximum(length, 1e-12), (0.0, 1.0, 0.0)).astype(np.float32)
 
 
-def _flat(points: F32, uvs: tuple[F32, ...], faces: I64) -> Geometry:
+def _flat(points: F32, uvs: tuple[F32, ...], faces: I64, colors: F32 | None) -> Geometry:
     """Every triangle with its own corners and its own normal, as glTF asks where normals are missing."""
     corners = points[faces]
     cross = np.cross((corners[:, 1] - corners[:, 0]).astype(np.float64), corners[:, 2] - corners[:, 0])
@@ -178,4 +192,5 @@ def _flat(points: F32, uvs: tuple[F32, ...], faces: I64) -> Geometry:
     order = faces.reshape(-1)
     tangents = np.zeros((len(order), 4), np.float32)
     own_faces = np.arange(len(order), dtype=np.uint32).reshape(-1, 3)
-    return Geometry(points[order], normals, tangents, tuple(uv[order] for uv in uvs), own_faces)
+    own_colors = None if colors is None else colors[order]
+    return Geometry(points[order], normals, tangents, tuple(uv[order] for uv in uvs), own_faces, own_colors)

@@ -18,14 +18,14 @@ from relume.scene.finish import finished_scene
 from relume.scene.gltf.accessors import AccessorReader
 from relume.scene.gltf.cameras import framing_camera, rigid, slug
 from relume.scene.gltf.container import READ_EXTENSIONS, Container, read_container
+from relume.scene.gltf.document import Document, Node, Primitive
 from relume.scene.gltf.document import Material as GltfMaterial
-from relume.scene.gltf.document import Node, Primitive
 from relume.scene.gltf.flattened import cofactors, dimensions, plane_normal, with_area
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.instances import instances_of
 from relume.scene.gltf.lights import LightReader
-from relume.scene.gltf.materials import MaterialReader, Understood
+from relume.scene.gltf.materials import WHITE, MaterialReader, Understood, VertexColors, has_textures
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.nodes import placed_nodes
 from relume.scene.gltf.uvs import made_tangents, turned_tangents
@@ -33,8 +33,10 @@ from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_
 from relume.scene.joined import joined
 from relume.scene.lights import LightCollector
 from relume.scene.model import Camera, Mesh, Scene
+from relume.scene.vertex_colors import MAX_COLORED, are_alike, colors_as_image
 
 F64 = NDArray[np.float64]
+Key = tuple[int, int]  # a mesh and a primitive of it
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
 MAX_PLACED = 100_000  # primitives times the nodes and the instances that show them
 _MANY = 2_000  # meshes; more of one material are joined, for each is a handful of arrays in files and in memory
@@ -74,8 +76,9 @@ class _Reading:
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
         self._collector = LightCollector(self.warnings)
         self._light_reader = LightReader(container.document, self._collector, self.warnings)
-        self._geometry: dict[tuple[int, int], Geometry | None] = {}
+        self._geometry: dict[Key, Geometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
+        self._wearing = _wearing(container.document)
         self._mesh_names: dict[str, int] = {}
         self._flattened: list[str] = []
         self._camera_names: dict[str, int] = {}
@@ -123,21 +126,25 @@ class _Reading:
                 name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
                 self._place_primitive((node.mesh, i), primitive, name, to_world @ instance)
 
-    def _place_primitive(self, key: tuple[int, int], primitive: Primitive, name: str, to_world: F64) -> None:
+    def _read_geometry(self, key: Key, primitive: Primitive, name: str) -> Geometry | None:
         if key not in self._geometry:
             self._corners_left -= num_corners(self._document, primitive)
             if self._corners_left < 0:
                 raise SceneError(f"the file describes more than {MAX_TRIANGLES:,} triangles; simplify it")
             self._accessors.unpack(primitive, f"mesh {name!r}")
             self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
-        geometry = self._geometry[key]
-        if geometry is None:
+        return self._geometry[key]
+
+    def _place_primitive(self, key: Key, primitive: Primitive, name: str, to_world: F64) -> None:
+        if self._read_geometry(key, primitive, name) is None:
             return
+        material = self._material(primitive)
+        geometry = self._geometry[key]
+        assert geometry is not None
         self._triangles_left -= len(geometry.faces)
         self._vertices_left -= len(geometry.positions)
         if min(self._triangles_left, self._vertices_left) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
-        material = self._material(primitive)
         num_dimensions = dimensions(to_world[:3, :3])
         placed = _placed(geometry, self.materials[material], to_world, num_dimensions, name, material)
         if placed is not None and num_dimensions == 2:
@@ -153,14 +160,53 @@ class _Reading:
         key = (primitive.material, exchanges)
         if key not in self._material_index:
             self._material_index[key] = len(self.materials)
-            self.materials.append(self._read_material(primitive.material))
+            colors = self._vertex_colors(primitive.material, exchanges)
+            self.materials.append(self._read_material(primitive.material, colors))
         return self._material_index[key]
 
-    def _read_material(self, index: int | None) -> Understood:
+    def _vertex_colors(self, index: int | None, exchanges: Choices) -> VertexColors:
+        """The colours of all vertices that wear a material; where they become an image, geometries get places in it."""
+        wearing = self._wearing[index, exchanges]
+        if not any("COLOR_0" in primitive.attributes for _, primitive in wearing):
+            return WHITE
+        read = {key: self._read_geometry(key, primitive, f"of {key[0]}") for key, primitive in wearing}
+        worn = {key: geometry for key, geometry in read.items() if geometry is not None}
+        colored = {key: geometry.colors for key, geometry in worn.items() if geometry.colors is not None}
+        if not colored:
+            return WHITE
+        white = [np.ones((1, 4), np.float32)] if len(colored) < len(worn) else []
+        colors = np.concatenate([*colored.values(), *white])
+        red, green, blue, alpha = colors.mean(axis=0, dtype=np.float64).tolist()
+        material = self._gltf_material(index)
+        if are_alike(colors):
+            return VertexColors((red, green, blue, alpha))
+        num_triangles = sum(len(worn[key].faces) for key in colored)
+        if has_textures(material) or num_triangles > MAX_COLORED:
+            why = "has textures" if has_textures(material) else f"colours more than {MAX_COLORED:,} triangles"
+            told = f"vertex colours of material {material.name[:80]!r}, which {why}, are replaced by their mean"
+            self.warnings.append(simplified(told))
+            return VertexColors((red, green, blue, alpha))
+        return VertexColors(image=self._drawn(worn))
+
+    def _drawn(self, worn: dict[Key, Geometry]) -> NDArray[np.uint8]:
+        """Draw the colours of geometries, and place these in the image."""
+        has = {key: geometry.colors for key, geometry in worn.items() if geometry.colors is not None}
+        corners = [colors[worn[key].faces] for key, colors in has.items()]
+        image, places, white = colors_as_image(np.concatenate(corners))
+        parts = np.split(places, np.cumsum([len(part) for part in corners])[:-1])
+        self._geometry |= {key: worn[key].with_own_corners(part) for key, part in zip(has, parts, strict=True)}
+        for key in worn.keys() - has.keys():
+            nowhere = np.tile(white, (len(worn[key].positions), 1))
+            self._geometry[key] = replace(worn[key], uvs=(nowhere,))
+        return image
+
+    def _read_material(self, index: int | None, colors: VertexColors = WHITE) -> Understood:
+        return self._material_reader.read(self._gltf_material(index), colors)
+
+    def _gltf_material(self, index: int | None) -> GltfMaterial:
         if index is not None and index >= len(self._document.materials):
             raise SceneError(f"material {index} does not exist; export the scene again")
-        material = GltfMaterial(name="default") if index is None else self._document.materials[index]
-        return self._material_reader.read(material)
+        return GltfMaterial(name="default") if index is None else self._document.materials[index]
 
     def _read_variants(self) -> dict[str, dict[str, Any]]:
         known = {index: self.materials[number] for (index, _), number in self._material_index.items()}
@@ -193,6 +239,15 @@ class _Reading:
                 self.warnings.append(
                     wrong(f"the file requires {extension[:60]!r}, which is not understood; it may look wrong")
                 )
+
+
+def _wearing(document: Document) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
+    """The primitives that wear each material, and exchange it alike."""
+    found: dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]] = {}
+    for m, mesh in enumerate(document.meshes):
+        for i, primitive in enumerate(mesh.primitives):
+            found.setdefault((primitive.material, choices(primitive)), []).append(((m, i), primitive))
+    return found
 
 
 def _placed(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.remarks import Remark, simplified, unused, wrong
@@ -27,9 +28,23 @@ from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
 from relume.scene.gltf.uvs import UvUse, uv_use
 from relume.scene.model import Coding, Glass, Material, Opacity, Texture
 from relume.scene.opacity import make_opacity
+from relume.scene.vertex_colors import WRAP
 
 _CLEAR = 0.1  # roughness of glass that blurs nothing to speak of
 MAX_TEXTURE_TEXELS = 700_000_000  # kept for the materials of one scene, 3 bytes each
+
+
+@dataclass(frozen=True)
+class VertexColors:
+    """What colours of vertices are to a material.
+
+    Attributes:
+        factor: RGB and alpha that multiply the base colour.
+        image: that stands for its texture; None where it has none, or the colours are all alike. (height, width, 4)
+    """
+
+    factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    image: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,9 @@ class Understood:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+WHITE = VertexColors()
+
+
 class MaterialReader:
     """Turns the materials of one file into relume's, counting the texels it makes."""
 
@@ -56,9 +74,11 @@ class MaterialReader:
         self._names: dict[str, int] = {}
         self._texels_left = MAX_TEXTURE_TEXELS
 
-    def read(self, material: GltfMaterial) -> Understood:
+    def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> Understood:
         """One material under a name of its own.
 
+        Args:
+            material: as the file has it. colors: of the vertices that wear it.
         Raises:
             SceneError: a texture cannot be used or there are too many texels.
         """
@@ -67,7 +87,8 @@ class MaterialReader:
         layers = read_layers(material.extensions, what, self._warnings)
         self._warn_of_the_rest(material, what)
         use = uv_use([info for info in _infos(material, layers) if info is not None], what, self._warnings)
-        surface = self._surface(material, layers, what)
+        material = _times(material, colors.factor)
+        surface = self._surface(material, layers, self._raster(material, layers, colors.image, what))
         strength, turn = self._anisotropy(layers, what)
         transmission = self._transmission(layers, what)
         glass = self._glass(surface, layers, transmission, what) if transmission > 0 else None
@@ -87,7 +108,7 @@ class MaterialReader:
             surface.textures | shining,
             normal_map,
             material.doubleSided,
-            opacity=self._opacity(material, what),
+            opacity=self._opacity(material, colors.image, what),
             glass=glass,
         )
         return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
@@ -114,7 +135,7 @@ class MaterialReader:
         r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
         return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
 
-    def _opacity(self, material: GltfMaterial, what: str) -> Opacity | None:
+    def _opacity(self, material: GltfMaterial, colors: NDArray[np.uint8] | None, what: str) -> Opacity | None:
         """Where the material has holes; alpha that is not asked for is not looked at."""
         if material.alphaMode not in ("MASK", "BLEND"):
             if material.alphaMode != "OPAQUE":
@@ -126,6 +147,8 @@ class MaterialReader:
         if pbr.baseColorTexture is not None:
             pixels, wrap = self._images.texture(pbr.baseColorTexture.index, f"the base colour texture of {what}")
             alpha = pixels[..., 3]
+        elif colors is not None:
+            alpha, wrap = colors[..., 3], WRAP
         cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
         return make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff, what, self._warnings)
 
@@ -141,12 +164,11 @@ class MaterialReader:
         pixels, wrap = self._images.texture(material.emissiveTexture.index, f"the emission texture of {what}")
         return {"emission": self._kept(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, Coding("srgb")))}
 
-    def _surface(self, material: GltfMaterial, layers: Layers, what: str) -> Surface:
+    def _surface(self, material: GltfMaterial, layers: Layers, raster: Raster) -> Surface:
         """The base layer; images only where a texture says more than one value."""
         pbr, specular = material.pbrMetallicRoughness, layers.specular
         factor = np.array(pbr.baseColorFactor[:3])
         dielectric = _f0(layers.ior.ior) * np.array(specular.specularColorFactor)
-        raster = self._raster(material, layers, what)
         roughness = raster.mean("packed", 1) * pbr.roughnessFactor
         reflected = dielectric_share(
             float(np.minimum(dielectric, 1).max()) * specular.specularFactor, specular.specularFactor
@@ -166,8 +188,10 @@ class MaterialReader:
         textures["specular"] = self._kept(blend.f0_over(mean_f0, highest))
         return Surface(factor, mean_f0, f90, roughness, reflected, textures)
 
-    def _raster(self, material: GltfMaterial, layers: Layers, what: str) -> Raster:
+    def _raster(self, material: GltfMaterial, layers: Layers, colors: NDArray[np.uint8] | None, what: str) -> Raster:
         """The images that the base layer is made of, all in the size of the first."""
+        if colors is not None:
+            return Raster({"base": (colors, WRAP)})
         pbr = material.pbrMetallicRoughness
         infos = {
             "base": (pbr.baseColorTexture, "base colour"),
@@ -266,6 +290,23 @@ def _infos(material: GltfMaterial, layers: Layers) -> list[TextureInfo | None]:
     pbr, specular = material.pbrMetallicRoughness, layers.specular
     images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
     return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
+
+
+def has_textures(material: GltfMaterial) -> bool:
+    """Whether a material names any image."""
+    pbr = material.pbrMetallicRoughness
+    named = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture, material.emissiveTexture]
+    of_extensions = (of for of in material.extensions.values() if isinstance(of, dict))
+    return any(info is not None for info in named) or any(
+        key.endswith("Texture") for extension in of_extensions for key in extension
+    )
+
+
+def _times(material: GltfMaterial, factor: tuple[float, float, float, float]) -> GltfMaterial:
+    """A material whose base colour is multiplied."""
+    pbr = material.pbrMetallicRoughness
+    times = [one * other for one, other in zip(pbr.baseColorFactor, factor, strict=True)]
+    return material.model_copy(update={"pbrMetallicRoughness": pbr.model_copy(update={"baseColorFactor": times})})
 
 
 def _over_mean(raster: Raster) -> Texture:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import posixpath
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from relume.environments.model import Environment
 from relume.environments.studio import studio
@@ -14,11 +17,12 @@ from relume.scene.finish import finished_scene
 from relume.scene.gltf.cameras import framing_camera
 from relume.scene.gltf.names import unique_name
 from relume.scene.lights import F64, LightCollector
-from relume.scene.mesh_files.corners import make_mesh
+from relume.scene.mesh_files.corners import Corners, make_mesh
 from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
 from relume.scene.mesh_files.obj import Obj, read_obj
 from relume.scene.mesh_files.ply import read_ply
-from relume.scene.model import Light, Material, Mesh, Scene
+from relume.scene.model import F32, Coding, Light, Material, Mesh, Scene, Texture
+from relume.scene.vertex_colors import MAX_COLORED, WRAP, are_alike, colors_as_image
 
 MAX_LIBRARIES = 100
 
@@ -71,14 +75,40 @@ def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene
         SceneError: it is damaged, too large, or has no triangles.
     """
     warnings: list[Remark] = []
-    corners, color = read_ply(data)
-    described = Described()
-    if color is not None:
-        warnings.append(simplified("vertex colours are replaced by their mean"))
-        described.numbers = {"Kd": [round(float(value), 6) for value in color], "Pr": [0.5]}
-    material = MaterialMaker(Alone(), warnings).make("material", described if color is not None else None)
+    corners, colors = read_ply(data)
+    corners, material = _colored(corners, colors, MaterialMaker(Alone(), warnings), warnings)
     mesh = make_mesh(corners, "mesh", 0, material, "the mesh", warnings)
     return _scene(name, [] if mesh is None else [mesh], [material], environment, warnings)
+
+
+def _colored(
+    corners: Corners, colors: F32 | None, maker: MaterialMaker, warnings: list[Remark]
+) -> tuple[Corners, Material]:
+    """A material with the colours of vertices (num_positions, 3), in an image where they differ; corners with places
+    in it."""
+    if colors is None:
+        return corners, maker.make("material", None)
+    opaque = np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
+    vertices = corners.triangles[..., 0]
+    is_drawn = not are_alike(opaque) and 0 < len(vertices) <= MAX_COLORED and vertices.max() < len(colors)
+    if not is_drawn and not are_alike(opaque):
+        warnings.append(simplified(f"vertex colours of more than {MAX_COLORED:,} triangles are replaced by their mean"))
+    base = np.ones(3) if is_drawn else colors.mean(axis=0, dtype=np.float64)
+    described = Described()
+    described.numbers = {"Kd": [round(float(value), 6) for value in base], "Pr": [0.5]}
+    material = maker.make("material", described)
+    if not is_drawn or vertices.min() < 0:
+        return corners, material
+    image, places, _ = colors_as_image(opaque[vertices])
+    own = np.arange(3 * len(vertices)).reshape(-1, 3)
+    placed = replace(
+        corners,
+        uvs=places.reshape(-1, 2).astype(np.float64),
+        triangles=np.stack([vertices, own, corners.triangles[..., 2]], axis=-1),
+    )
+    texture = Texture(np.ascontiguousarray(image[..., :3]), WRAP, Coding("srgb"))
+    terms = ({**material.terms[0], "texture": "diffuse"}, *material.terms[1:])
+    return placed, replace(material, terms=terms, textures={"diffuse": texture})
 
 
 def _library(obj: Obj, companions: Companions, warnings: list[Remark]) -> dict[str, Described]:

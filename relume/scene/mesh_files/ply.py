@@ -16,6 +16,7 @@ from relume.scene.checks import MAX_TRIANGLES
 from relume.scene.mesh_files.corners import Corners
 from relume.scene.mesh_files.ply_body import BinaryRows, Columns, Element, Property, TextRows, read_body
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 MAX_HEADER_BYTES = 64 << 10
 MAX_PROPERTIES = 200
@@ -27,8 +28,8 @@ UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 COLORS = ("red", "green", "blue")
 
 
-def read_ply(data: bytes) -> tuple[Corners, F64 | None]:
-    """The triangles of a file, and the mean vertex colour, linear, where it has one. (3,)
+def read_ply(data: bytes) -> tuple[Corners, F32 | None]:
+    """The triangles of a file, and the colours of its vertices, linear, where it has them. (num_positions, 3)
 
     Raises:
         SceneError: the header is odd, the file has fewer rows than it claims, or it has no faces.
@@ -49,7 +50,7 @@ def read_ply(data: bytes) -> tuple[Corners, F64 | None]:
     uvs = uvs * [1, -1] + [0, 1]
     missing = np.full_like(indices, -1)
     triangles = np.stack([indices if len(values) else missing for values in (positions, uvs, normals)], axis=-1)
-    return Corners(positions, uvs, normals, triangles), _mean_color(vertex, elements)
+    return Corners(positions, uvs, normals, triangles), _colors(vertex, elements)
 
 
 def read_header(data: bytes) -> tuple[str, list[Element], int]:
@@ -111,11 +112,10 @@ def _fans(lengths: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.i
     return np.asarray(values[np.stack([hub, hub + step + 1, hub + step + 2], axis=-1)])
 
 
-def _mean_color(vertex: Columns, elements: list[Element]) -> F64 | None:
-    """Mean of the vertex colours, linear; sRGB bytes or numbers in [0, 1]. (3,)"""
+def _colors(vertex: Columns, elements: list[Element]) -> F32 | None:
+    """The vertex colours, linear; sRGB bytes or numbers in [0, 1]. (rows, 3)"""
     colors = _columns(vertex, COLORS)
     if len(colors) == 0 or not np.isfinite(colors).all():
         return None
     types = {p.name: p.type for element in elements if element.name == "vertex" for p in element.properties}
-    srgb = np.clip(colors / (1 if types["red"].startswith("f") else 255), 0, 1).astype(np.float32)
-    return np.asarray(srgb_decode(srgb).mean(axis=0, dtype=np.float64))
+    return srgb_decode(np.clip(colors / (1 if types["red"].startswith("f") else 255), 0, 1).astype(np.float32))

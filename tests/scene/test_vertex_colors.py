@@ -1,0 +1,86 @@
+"""Colours of vertices: an image says them to within a byte, for glTF and PLY, and alike ones are no image."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from glb_builder import Glb
+
+from relume.environments.model import Environment
+from relume.scene.gltf import import_gltf
+from relume.scene.mesh_files import import_ply
+from relume.scene.model import Coding, Scene, Texture
+from relume.scene.vertex_colors import WRAP, colors_as_image
+from relume.trace.texture import MipMap
+
+LIGHT = Environment("grey", np.ones((2, 4, 3), np.float32))
+
+
+def test_look_ups_between_corners_are_what_is_between_their_colours() -> None:
+    rng = np.random.default_rng(3)
+    calm = 0.5 + 0.15 * rng.random((50, 3, 4))
+    gaudy = rng.random((50, 3, 4))
+    for corners, most in ((calm, 0.006), (gaudy, 0.1)):
+        image, places, white = colors_as_image(corners.astype(np.float32))
+        pyramid = MipMap(Texture(np.ascontiguousarray(image[..., :3]), WRAP, Coding("srgb")))
+        share = rng.dirichlet([1, 1, 1], (50, 40))
+        uv = np.einsum("nkc,ncd->nkd", share, places).reshape(-1, 2).astype(np.float32)
+        found = pyramid.sample(uv, np.zeros(len(uv), np.float32))
+        expected = np.einsum("nkc,ncd->nkd", share, corners[..., :3]).reshape(-1, 3)
+        assert np.abs(found - expected).max() < most
+        assert np.sqrt(np.mean((found - expected) ** 2)) < 0.012
+        np.testing.assert_array_equal(pyramid.sample(white[None], np.zeros(1, np.float32)), [[1, 1, 1]])
+
+
+def quad(colors: np.ndarray, **pbr: object) -> Scene:
+    glb = Glb().quad({"name": "Paint", "pbrMetallicRoughness": pbr}, COLOR_0=colors.astype(np.float32))
+    return import_gltf(glb.bytes(), "quad", LIGHT)
+
+
+COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 0.5]], np.float32)
+
+
+def test_they_are_the_diffuse_image_and_the_opacity_of_a_glass_like_paint() -> None:
+    scene = quad(COLORS, metallicFactor=0)
+    (material,), (mesh,) = scene.materials, scene.meshes
+    assert scene.warnings == ()
+    assert material.terms[0]["texture"] == "diffuse"
+    assert mesh.positions.shape == (6, 3)
+    shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(6, np.float32))
+    expected = {tuple(position): color for position, color in zip(quad_corners(), COLORS[:, :3], strict=True)}
+    for position, color in zip(mesh.positions, shown, strict=True):
+        np.testing.assert_allclose(color, expected[tuple(position)], atol=0.005)
+
+
+def quad_corners() -> np.ndarray:
+    glb = Glb().quad({"name": "Plain"})
+    return import_gltf(glb.bytes(), "quad", LIGHT).meshes[0].positions
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.5])
+def test_alike_ones_multiply_the_colour(alpha: float) -> None:
+    scene = quad(np.tile([0.25, 0.5, 1.0, alpha], (4, 1)), metallicFactor=0)
+    (material,) = scene.materials
+    assert not material.textures
+    color = np.array(material.terms[0]["color"])
+    np.testing.assert_allclose(color / color[2], [0.25, 0.5, 1], atol=1e-4)
+
+
+def test_of_a_material_with_textures_they_are_their_mean_and_it_says_so() -> None:
+    glb = Glb()
+    texture = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
+    glb.quad({"name": "Wood", "pbrMetallicRoughness": {"baseColorTexture": texture}}, COLOR_0=COLORS)
+    scene = import_gltf(glb.bytes(), "quad", LIGHT)
+    assert len([warning for warning in scene.warnings if "replaced by their mean" in warning]) == 1
+
+
+def test_a_ply_file_shows_them() -> None:
+    header = "ply\nformat ascii 1.0\nelement vertex 3\n"
+    header += "".join(f"property float {name}\n" for name in ("x", "y", "z"))
+    header += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    header += "element face 1\nproperty list uchar uint vertex_index\nend_header\n"
+    scene = import_ply((header + "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n").encode(), "x", LIGHT)
+    (material,), (mesh,) = scene.materials, scene.meshes
+    shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))
+    np.testing.assert_allclose(shown, np.eye(3), atol=0.005)
+    assert scene.warnings == ()
