@@ -5,6 +5,7 @@ import type { SessionHandlers } from "../src/net/session";
 import { stage } from "../src/picture/stage";
 import type { HelloMessage } from "../src/protocol";
 import { bake } from "../src/state/bakes";
+import { placeEye } from "../src/state/eyes";
 import { look } from "../src/state/look";
 import { shownViews, viewName } from "../src/state/views";
 import { onePixel } from "./frames";
@@ -19,6 +20,7 @@ const opened = vi.hoisted((): FakeSession[] => {
 interface FakeSession {
   bake: string;
   handlers: SessionHandlers;
+  sent: { type: string }[];
 }
 
 vi.mock("../src/net/session", () => ({
@@ -34,7 +36,8 @@ vi.mock("../src/net/session", () => ({
     connect = () => undefined;
     close = () => undefined;
     want = () => undefined;
-    send = () => true;
+    send = (message: { type: string }) => (this.sent.push(message), true);
+    sent: { type: string }[] = [];
     ask = () => true;
   },
 }));
@@ -66,6 +69,16 @@ beforeEach(() => {
   look.value = LOOK;
   shownViews.value = ["front", "left"];
   viewName.value = "front";
+});
+
+test("a new bake is seen at once from where a hand has put the eye", async () => {
+  const camera = { to_world: [1], yfov: 0.5 };
+  placeEye("front", { camera, size: [8, 6] });
+  VIEWS[0] = { ...VIEWS[0], eye: "free" } as never;
+  const session = await newBake();
+  const eyes = session.sent.filter(({ type }) => type === "eye");
+  expect(eyes).toMatchObject([{ view: "front", ...camera, size: [8, 6], rest: "exact" }]);
+  placeEye("front", null);
 });
 
 test("a new bake takes over when the view in hand is whole", async () => {

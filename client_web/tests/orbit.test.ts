@@ -1,5 +1,7 @@
-import { describe, expect, it } from "vitest";
+import { describe, expect, it, vi } from "vitest";
 import { freeName } from "../src/cameras/calls";
+import { Fingers } from "../src/cameras/fingers";
+import { keepAs } from "../src/cameras/keeping";
 import { Pictures } from "../src/cameras/pictures";
 import { approached, between, frameOf, isNear, orbitOf, panned, turned, withAngle, type Orbit } from "../src/cameras/orbit";
 
@@ -108,5 +110,40 @@ describe("names of new cameras", () => {
   it("are the first that is free", () => {
     expect(freeName([])).toBe("View 1");
     expect(freeName(["front", "View 1", "View 3"])).toBe("View 2");
+  });
+});
+
+describe("fingers", () => {
+  const at = (pointerId: number, clientX: number, clientY: number) => ({ pointerId, clientX, clientY });
+
+  it("pull what they hold, and two of them spread it", () => {
+    const fingers = new Fingers();
+    expect(fingers.move(at(1, 0, 0))).toBeNull();
+    fingers.press(at(1, 0, 0));
+    expect(fingers.move(at(1, 10, 4))).toMatchObject({ count: 1, across: 10, down: 4, spread: 1 });
+    fingers.press(at(2, 30, 4));
+    expect(fingers.move(at(2, 50, 4))).toMatchObject({ count: 2, across: 10, down: 0, spread: 2, middle: { x: 30, y: 4 } });
+    expect(fingers.only).toBeNull();
+    expect(fingers.lift(at(1, 0, 0))).toBe(true);
+    expect(fingers.lift(at(1, 0, 0))).toBe(false);
+    expect(fingers.only).toEqual({ x: 50, y: 4 });
+  });
+});
+
+describe("cameras that are kept", () => {
+  const calls: string[] = [];
+  const frame = frameOf(orbit);
+  vi.stubGlobal("fetch", async (path: string, { method = "GET" } = {}) => {
+    calls.push(`${method} ${path.split("/").at(-1)}`);
+    return new Response(method === "DELETE" ? null : JSON.stringify([{ name: "A", is_placed: true }, { name: "B", is_placed: true }]), { status: method === "DELETE" ? 204 : 200 });
+  });
+
+  it("leave their old name behind, and take nobody else's", async () => {
+    await keepAs("s", "C", frame, "A");
+    expect(calls.splice(0)).toEqual(["GET cameras", "PUT C", "DELETE A"]);
+    await keepAs("s", "A", frame, "A");
+    expect(calls.splice(0)).toEqual(["PUT A"]);
+    await expect(keepAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
+    expect(calls.splice(0)).toEqual(["GET cameras"]);
   });
 });

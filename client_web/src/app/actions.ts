@@ -88,7 +88,8 @@ export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
   ["Handle of a light: move", "← → ↑ ↓"],
   ["Handle of a light: away, near", "Shift ↑ ↓"],
   ["Pin of a new comment: move, by ten", "← → ↑ ↓  Shift"],
-  ["Picture: pan", "← → ↑ ↓"],
+  ["Picture: pan, or turn its eye", "← → ↑ ↓"],
+  ["Eye: slide, nearer and farther, back", "Shift ← → ↑ ↓  + −  Home"],
   ["One of several views: show it alone", "Enter, double-click"],
 ];
 

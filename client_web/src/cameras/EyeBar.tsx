@@ -1,25 +1,13 @@
-/** Over a picture whose eye moves: what hands can do, as buttons, and keeping the camera. */
+/** Over a picture whose eye moves: what hands can do, as buttons, who draws, and the camera. */
 import { useState } from "preact/hooks";
 import { chooseDrawnBy, drawnBy, drawsHere, type Draws } from "../live/drawing";
 import { hasTexels } from "../state/look";
 import { scene } from "../state/scene";
 import { viewName, views } from "../state/views";
-import { attempt, note } from "../ui/toasts";
-import { freeName, keepCamera, listCameras } from "./calls";
-import { eyeOf, type Eye } from "./eye";
-import { frameOf } from "./orbit";
+import { CameraMenu } from "./CameraMenu";
+import { eyeOf } from "./eye";
 import { STEPS } from "./steps";
 import { step } from "./useHand";
-
-async function keep(eye: Eye): Promise<void> {
-  const of = scene.peek();
-  if (of === null) return;
-  await attempt(async () => {
-    const name = freeName([...of.views, ...(await listCameras(of.id))].map((camera) => camera.name));
-    await keepCamera(of.id, name, eye.isFirst ? eye.first : frameOf(eye.orbit));
-    note(`The camera is kept as “${name}”. Choose it under Bake to have its exact picture.`);
-  });
-}
 
 const HERE = "This browser draws while the eye moves: nothing goes over the network for it. Bright rims a pixel thin are smoothed where the server draws";
 const SENT = "The server draws while the eye moves, and sends each picture";
@@ -48,6 +36,7 @@ export function EyeBar() {
   const name = viewName.value;
   const moves = views.value.find((view) => view.name === name)?.eye === "free";
   const eye = moves ? eyeOf(name) : null;
+  const of = scene.value?.id ?? null;
   if (eye === null) return null;
   return (
     <div class="eye-bar" role="group" aria-label="Move the eye">
@@ -65,9 +54,7 @@ export function EyeBar() {
             Back
           </button>
           <DrawnBy />
-          <button title="Keep this camera with the scene" onClick={() => void keep(eye)}>
-            Keep camera
-          </button>
+          {of !== null && <CameraMenu scene={of} eye={eye} name={name} />}
         </>
       )}
     </div>

@@ -4,7 +4,8 @@ import type { SceneBody, Triple } from "../protocol";
 import type { Size } from "../scene/recipe";
 import { IconButton } from "../ui/Button";
 import { LabelledSlider } from "../ui/LabelledSlider";
-import { finderPicture, freeName, getFinder, keepCamera, listCameras, placeAt } from "./calls";
+import { finderPicture, freeName, getFinder, listCameras, MAX_NAME, placeAt } from "./calls";
+import { keepAs } from "./keeping";
 import { Motion } from "./motion";
 import { frameOf, MAX_YFOV, MIN_YFOV, orbitOf, withAngle, type Bounds, type Frame, type Orbit } from "./orbit";
 import { Pictures } from "./pictures";
@@ -14,13 +15,12 @@ import "./cameras.css";
 
 const MOVING: Size = [400, 300];
 const RESTING: Size = [960, 720];
-const MAX_NAME = 80;
 
 interface Props {
   scene: SceneBody;
   /** Where it begins; null: where the scene's first camera is. */
   from: Frame | null;
-  /** The camera that is moved; null: a new one. */
+  /** The camera that is moved, and may be renamed; null: a new one. */
   name: string | null;
   onKept(name: string): void;
   onClose(): void;
@@ -130,7 +130,7 @@ function Placing({ scene, bounds, first, whole, name, onKept }: PlacingProps) {
     event.preventDefault();
     setRefused("");
     try {
-      await keepCamera(scene.id, called.trim(), frameOf(orbit));
+      await keepAs(scene.id, called.trim(), frameOf(orbit), name);
       onKept(called.trim());
     } catch (error) {
       setRefused((error as Error).message);

@@ -4,6 +4,8 @@ import type { CameraEntry, FinderBody, PlaceBody, Triple } from "../protocol";
 import type { Size } from "../scene/recipe";
 import type { Frame } from "./orbit";
 
+export const MAX_NAME = 80;
+
 const of = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}`;
 const named = (scene: string, name: string) => `${of(scene)}/cameras/${encodeURIComponent(name)}`;
 

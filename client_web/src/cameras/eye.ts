@@ -6,6 +6,8 @@ import { askProbe } from "../live/probing";
 import type { HelloMessage, Triple } from "../protocol";
 import { bake } from "../state/bakes";
 import { connection } from "../state/connection";
+import { placeEye } from "../state/eyes";
+import { scene } from "../state/scene";
 import { shownViews, views } from "../state/views";
 import { Motion } from "./motion";
 import { frameOf, isNear, orbitOf, type Bounds, type Frame, type Orbit } from "./orbit";
@@ -13,6 +15,8 @@ import { frameOf, isNear, orbitOf, type Bounds, type Frame, type Orbit } from ".
 type View = HelloMessage["views"][number];
 
 const DEGREES = 180 / Math.PI;
+
+type Size = [width: number, height: number];
 
 /** Of one view of one bake. */
 export class Eye {
@@ -22,6 +26,8 @@ export class Eye {
   private motion: Motion;
   private number = 0;
   private hasMoved = false;
+  /** Of its pictures; null: as large as was baked. */
+  private chosenSize: Size | null = null;
 
   constructor(
     readonly bake: string,
@@ -34,18 +40,25 @@ export class Eye {
     this.bounds = { lowest: lowest as Triple, highest: highest as Triple };
     this.first = { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES };
     this.begun = orbitOf(this.first, this.bounds);
-    const kept = this.read();
-    this.hasMoved = kept !== null;
-    this.motion = this.from(kept ?? this.begun);
+    const { orbit, size } = this.read();
+    this.hasMoved = orbit !== null;
+    this.chosenSize = size;
+    this.motion = this.from(orbit ?? this.begun);
   }
 
   get orbit(): Orbit {
     return this.motion.target;
   }
 
-  /** Whether it is where it began. */
-  get isFirst(): boolean {
-    return !this.hasMoved;
+  get size(): Size {
+    return this.chosenSize ?? [this.view.width, this.view.height];
+  }
+
+  /** Make pictures of this size, or, of null, as large as was baked. */
+  resize(size: Size | null): void {
+    this.chosenSize = size;
+    this.keep();
+    this.tell(this.frame);
   }
 
   change = (by: (orbit: Orbit) => Orbit): void => {
@@ -56,8 +69,8 @@ export class Eye {
 
   /** From now on turn about what the middle of the picture shows. */
   async grasp(): Promise<void> {
-    const { width, height, name } = this.view;
-    const { position } = await askProbe(name, Math.floor(width / 2), Math.floor(height / 2));
+    const [width, height] = eyeSize(...this.size);
+    const { position } = await askProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
     if (position !== null) this.motion.restate((orbit) => orbitOf(frameOf(orbit), this.bounds, position as Triple));
   }
 
@@ -71,13 +84,18 @@ export class Eye {
     this.motion.end();
     this.motion = this.from(this.begun);
     this.hasMoved = false;
-    sessionStorage.removeItem(this.key);
+    this.keep();
     this.tell(this.first);
   }
 
   /** Tell the server again, which may know nothing of it. */
   tellAgain(): void {
-    if (this.hasMoved) this.tell(frameOf(this.motion.target));
+    if (this.hasMoved || this.chosenSize !== null) this.tell(this.frame);
+  }
+
+  /** What it sees, or will when it has come to rest. */
+  get frame(): Frame {
+    return this.hasMoved ? frameOf(this.motion.target) : this.first;
   }
 
   end(): void {
@@ -92,8 +110,11 @@ export class Eye {
   private tell({ to_world, yfov }: Frame, isLast = true): void {
     const { name } = this.view;
     const camera = { to_world, yfov: yfov / DEGREES };
+    const [width, height] = this.size;
     // what is laid over the picture, as the handles of lights are, follows
-    views.value = views.peek().map((other) => (other.name === name ? { ...other, camera } : other));
+    views.value = views.peek().map((other) => (other.name === name ? { ...other, camera, width, height } : other));
+    const isPlaced = this.hasMoved || this.chosenSize !== null;
+    placeEye(name, isPlaced ? { camera, size: eyeSize(width, height) } : null);
     const isHere = !isLast && drawHere(name);
     if (!isHere) this.say(camera, "exact");
     else if (!isAway(name)) this.say(camera, "stay"); // nothing is to be traced of where it is passing
@@ -102,28 +123,39 @@ export class Eye {
   }
 
   private say(camera: View["camera"], rest: "exact" | "stay"): void {
-    const { name, width, height } = this.view;
+    const { name } = this.view;
     this.number = Math.max(this.number + 1, Date.now());
     told(name, this.number);
-    send({ type: "eye", view: name, eye: this.number, ...camera, size: eyeSize(width, height), hand: null, rest });
+    send({ type: "eye", view: name, eye: this.number, ...camera, size: eyeSize(...this.size), hand: null, rest });
   }
 
   private get key(): string {
-    return `relume.eye.${this.bake}.${this.view.name}`;
+    return `relume.eye.${scene.peek()?.id}.${this.view.name}`; // other bakes of the scene are seen from there, too
   }
 
   private keep(): void {
-    sessionStorage.setItem(this.key, JSON.stringify(this.motion.target));
-  }
-
-  private read(): Orbit | null {
+    const kept: Kept = { orbit: this.hasMoved ? this.motion.target : null, size: this.chosenSize };
     try {
-      const kept = JSON.parse(sessionStorage.getItem(this.key) ?? "null") as Orbit | null;
-      return kept !== null && isNear(kept, kept) ? kept : null;
+      sessionStorage.setItem(this.key, JSON.stringify(kept));
     } catch {
-      return null;
+      // storage is full or forbidden: a reload then goes back to where it began
     }
   }
+
+  private read(): Kept {
+    try {
+      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as Partial<Kept>;
+      const isSize = Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
+      return { orbit: orbit && isNear(orbit, orbit) ? orbit : null, size: isSize ? size : null };
+    } catch {
+      return { orbit: null, size: null };
+    }
+  }
+}
+
+interface Kept {
+  orbit: Orbit | null;
+  size: Size | null;
 }
 
 const eyes = new Map<string, Eye>();

@@ -1,5 +1,6 @@
 /** What hands do to the finder's picture: drag, slide, wheel, pinch, click and keys. */
 import { useRef } from "preact/hooks";
+import { Fingers } from "./fingers";
 import { approached, panned, turned, type Bounds, type Orbit } from "./orbit";
 
 type Pulled = PointerEvent & { readonly currentTarget: HTMLElement };
@@ -38,45 +39,31 @@ export function step(change: Change, bounds: Bounds, key: string, slides: boolea
 export const nearer = (event: WheelEvent): number =>
   Math.exp(WHEEL * event.deltaY * (event.deltaMode === 1 ? LINE_PX : 1));
 
-const middle = (points: { x: number; y: number }[]) => ({
-  x: points.reduce((sum, { x }) => sum + x, 0) / points.length,
-  y: points.reduce((sum, { y }) => sum + y, 0) / points.length,
-});
-
-const spread = ([a, b]: { x: number; y: number }[]) =>
-  a === undefined || b === undefined ? 0 : Math.hypot(a.x - b.x, a.y - b.y);
-
 /** Properties of the element that shows the picture. `click` gets fractions of its sides. */
 export function useHand(change: Change, bounds: Bounds, click: (u: number, v: number) => void) {
-  const fingers = useRef(new Map<number, { x: number; y: number }>());
+  const fingers = useRef(new Fingers());
   const travelled = useRef(0);
 
   const move = (event: Pulled) => {
-    const known = fingers.current.get(event.pointerId);
-    if (known === undefined) return;
+    const pull = fingers.current.move(event);
+    if (pull === null) return;
     const { height } = event.currentTarget.getBoundingClientRect();
-    const before = [...fingers.current.values()];
-    fingers.current.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    const after = [...fingers.current.values()];
-    const across = (middle(after).x - middle(before).x) / height;
-    const down = (middle(after).y - middle(before).y) / height;
-    travelled.current += Math.hypot(event.clientX - known.x, event.clientY - known.y);
-    if (after.length > 1 || event.shiftKey || (event.buttons & 6) !== 0) change((orbit) => panned(orbit, across, down));
+    const [across, down] = [pull.across / height, pull.down / height];
+    travelled.current += Math.hypot(pull.across, pull.down) * pull.count;
+    if (pull.count > 1 || event.shiftKey || (event.buttons & 6) !== 0) change((orbit) => panned(orbit, across, down));
     else change((orbit) => turned(orbit, -TURN * across, TURN * down));
-    if (after.length > 1 && spread(after) > 0) {
-      change((orbit) => approached(orbit, spread(before) / spread(after), bounds));
-    }
+    if (pull.count > 1) change((orbit) => approached(orbit, 1 / pull.spread, bounds));
   };
   const over = (event: Pulled) => {
-    if (!fingers.current.delete(event.pointerId) || event.type !== "pointerup") return;
+    if (!fingers.current.lift(event) || event.type !== "pointerup") return;
     const box = event.currentTarget.getBoundingClientRect();
-    if (fingers.current.size > 0 || event.button !== 0 || travelled.current > CLICK_PX) return;
+    if (fingers.current.count > 0 || event.button !== 0 || travelled.current > CLICK_PX) return;
     click((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
   };
   return {
     onPointerDown(event: Pulled) {
-      if (fingers.current.size === 0) travelled.current = 0;
-      fingers.current.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      if (fingers.current.count === 0) travelled.current = 0;
+      fingers.current.press(event);
       event.currentTarget.setPointerCapture(event.pointerId);
       event.currentTarget.focus();
     },

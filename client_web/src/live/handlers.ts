@@ -22,7 +22,7 @@ import { connections, type BakeConnection } from "./connections";
 import { take } from "./drawing";
 import { answered } from "./probing";
 import { showBake } from "./swap";
-import { shownOf, tellViews } from "./tellViews";
+import { shownOf, tellEyes, tellViews } from "./tellViews";
 import { comeIn, followShared } from "./together";
 import { want } from "./want";
 
@@ -54,6 +54,7 @@ function welcome(of: BakeConnection, hello: HelloMessage): void {
   defaultLook.value ??= (hello.room?.default ?? hello.look) as unknown as Look;
   if (!comeIn(of, hello)) want(of, takeUp(hello.look as unknown as Look), performance.now());
   tellViews(of, shownOf(hello), focusedView.peek());
+  tellEyes(of, hello);
   if (of === connections.shown) {
     freezing.value = null;
     showBake(of);

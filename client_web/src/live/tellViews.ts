@@ -1,5 +1,6 @@
-/** Which views a server is asked to show. */
+/** Which views a server is asked to show, and from where. */
 import type { HelloMessage } from "../protocol";
+import { placedEye } from "../state/eyes";
 import { availableOf, shownViews, viewName } from "../state/views";
 import { connections, type BakeConnection } from "./connections";
 import { nothingIsExact } from "./exactness";
@@ -26,4 +27,15 @@ export function tellViews(of: BakeConnection, shown: string[], focus: string): v
     if (of === connections.shown) nothingIsExact(shown); // they are sent whole again
   }
   if (shown.length > 1 && shown.includes(focus)) of.session.send({ type: "focus", view: focus });
+}
+
+/** Say where hands have put the eyes of views that move: a bake that is on its way is seen from there at once. */
+export function tellEyes(of: BakeConnection, hello: HelloMessage): void {
+  const shown = shownOf(hello);
+  for (const { name, eye } of hello.views) {
+    const placed = eye === "free" && shown.includes(name) ? placedEye(name) : null;
+    if (placed === null) continue;
+    const { camera, size } = placed;
+    of.session.send({ type: "eye", view: name, eye: Date.now(), ...camera, size, hand: null, rest: "exact" });
+  }
 }

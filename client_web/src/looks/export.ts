@@ -2,7 +2,8 @@
  * that is shown: one source alone, or some of its paths. */
 import { signal } from "@preact/signals";
 import { eyeOf } from "../cameras/eye";
-import { frameOf } from "../cameras/orbit";
+import type { Frame } from "../cameras/orbit";
+import { eyeSize } from "../live/drawing";
 import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
@@ -68,10 +69,12 @@ async function finished(what: string, render: RenderBody): Promise<RenderBody | 
 }
 
 /** Where the view in hand is seen from, if its eye moves. */
-export function eyeNow(): { to_world: number[]; yfov: number } | null {
+export const eyeNow = (): Frame | null => eyeOf(viewName.peek())?.frame ?? null;
+
+/** How large the pictures of the view in hand are, if its eye moves. */
+function sizeNow(): [number, number] | null {
   const eye = eyeOf(viewName.peek());
-  if (eye === null) return null;
-  return eye.isFirst ? eye.first : frameOf(eye.orbit);
+  return eye === null ? null : eyeSize(...eye.size);
 }
 
 /** Have the server render the look that is seen, or others in the same light; `fetchFrom` is the file of the finished batch. */
@@ -82,7 +85,7 @@ export async function render(what: string, fetchFrom: string, more: Pick<RenderR
     const looks = (more.looks as Look[] | undefined) ?? [current];
     note(`Rendering the ${what} on the server${lightLimitWords()}…`);
     const seen = looks.map((of) => ({ ...seenOf(of) }));
-    const asked = await startRender({ bake: id, view: viewName.value, name: fileStem(), ...more, looks: seen });
+    const asked = await startRender({ bake: id, view: viewName.value, name: fileStem(), size: sizeNow(), ...more, looks: seen });
     const done = await finished(what, asked);
     if (done !== null) download(`/api/renders/${encodeURIComponent(done.id)}/${fetchFrom}`, "");
   }).finally(() => (exporting.value = null));

@@ -1,12 +1,13 @@
 /** Which views are baked; cameras that people place stand among them, and are moved and deleted here. */
 import { useEffect, useState } from "preact/hooks";
-import { deleteCamera, keepCamera, listCameras } from "../cameras/calls";
+import { listCameras } from "../cameras/calls";
 import { Finder } from "../cameras/Finder";
+import { removeCamera } from "../cameras/keeping";
 import type { Frame } from "../cameras/orbit";
 import { getScene } from "../net/api";
 import { MAX_VIEWS_SHOWN, type SceneBody, type SceneView } from "../protocol";
 import { IconButton } from "../ui/Button";
-import { attempt, note } from "../ui/toasts";
+import { attempt } from "../ui/toasts";
 
 interface Props {
   scene: SceneBody;
@@ -49,17 +50,12 @@ export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
     });
   const remove = (name: string) =>
     attempt(async () => {
-      const gone = (await listCameras(scene.id)).find((each) => each.name === name);
-      await deleteCamera(scene.id, name);
+      const camera = (await listCameras(scene.id)).find((each) => each.name === name);
+      if (camera !== undefined) await removeCamera(scene.id, camera, (back) => void kept(back));
       const left = await read();
       onChoose((now) => {
         const rest = inOrder(now, left);
         return rest.length > 0 ? rest : left.slice(0, 1).map((view) => view.name);
-      });
-      if (gone === undefined) return;
-      note(`The camera “${name}” is deleted.`, {
-        label: "Undo",
-        run: () => void keepCamera(scene.id, name, gone).then(() => kept(name)),
       });
     });
   const isLast = (name: string) => chosen.length === 1 && chosen[0] === name;
@@ -74,7 +70,7 @@ export function ViewChoice({ scene, from, chosen, onChoose }: Props) {
             <input type="checkbox" checked={chosen.includes(name)} disabled={isLast(name)} onChange={() => toggle(name)} />
             {name}
           </label>
-          {is_placed && <IconButton icon="handles" label={`Move ${name}`} onClick={() => void move(name)} />}
+          {is_placed && <IconButton icon="handles" label={`Move or rename ${name}`} onClick={() => void move(name)} />}
           {is_placed && <IconButton icon="trash" label={`Delete ${name}`} onClick={() => void remove(name)} />}
         </span>
       ))}

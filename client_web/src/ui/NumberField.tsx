@@ -9,6 +9,8 @@ interface Props {
   minimum: number;
   maximum: number;
   step: number;
+  /** Shown, and taken, without what follows the point. */
+  whole?: boolean;
   autoFocus?: boolean;
   /** What has been typed already, before the field was there. */
   begun?: string;
@@ -16,7 +18,7 @@ interface Props {
   onDone?(): void;
 }
 
-export function NumberField({ value, label, minimum, maximum, step, autoFocus, begun, onChange, onDone }: Props) {
+export function NumberField({ value, label, minimum, maximum, step, whole = false, autoFocus, begun, onChange, onDone }: Props) {
   const input = useRef<HTMLInputElement>(null);
   const [draft, setDraft] = useState<string | null>(begun ?? null);
   const refused = useRef(false);
@@ -27,9 +29,10 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, b
     if (begun === undefined) input.current?.select();
   }, [autoFocus]);
 
-  const put = (next: number) => onChange(Math.min(maximum, Math.max(minimum, next)));
+  const shown = whole ? String(Math.round(value)) : formatNumber(value);
+  const put = (next: number) => onChange(Math.min(maximum, Math.max(minimum, whole ? Math.round(next) : next)));
   const take = () => {
-    const typed = draft !== null && draft !== formatNumber(value) && !refused.current;
+    const typed = draft !== null && draft !== shown && !refused.current;
     const next = typed ? parseNumber(draft) : null;
     if (next !== null) {
       // a number that was typed is a step by itself
@@ -63,7 +66,7 @@ export function NumberField({ value, label, minimum, maximum, step, autoFocus, b
       aria-label={label}
       aria-invalid={wrong}
       title={wrong ? `A number from ${minimum} to ${maximum}` : undefined}
-      value={draft ?? formatNumber(value)}
+      value={draft ?? shown}
       onFocus={(event) => draft === null && event.currentTarget.select()}
       onInput={(event) => setDraft(event.currentTarget.value)}
       onBlur={() => {

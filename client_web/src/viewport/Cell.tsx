@@ -1,39 +1,28 @@
 /** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { eyeOf } from "../cameras/eye";
-import { approached, panned, turned } from "../cameras/orbit";
-import { nearer, step, TURN } from "../cameras/useHand";
-import { pinAt } from "../comments/comments";
+import { approached } from "../cameras/orbit";
+import { nearer, step } from "../cameras/useHand";
 import { Pins } from "../comments/Pins";
 import { acceptImages } from "../images/drop";
 import { acceptMaterials } from "../library/drop";
 import { LightHandles } from "../lights/LightHandles";
-import { placeAt, placing } from "../lights/placing";
 import { askProbe } from "../live/probing";
 import { hitAt } from "../picture/hit";
 import { Screen } from "../picture/screen";
 import { stage } from "../picture/stage";
-import { pan, zoomAt } from "../picture/transform";
+import { zoomAt } from "../picture/transform";
 import { moveTo, transformOf } from "../picture/viewTransforms";
 import type { Triple } from "../protocol";
-import { pinning } from "../state/comments";
 import { wipe } from "../state/display";
 import { scene } from "../state/scene";
-import { hoveredMaterial, select } from "../state/selection";
-import { pointedView, showAlone, sideBySide, viewName, views, workIn } from "../state/views";
-import { useDrag } from "../ui/drag";
+import { showAlone, sideBySide, viewName, views, workIn } from "../state/views";
 import { attempt, showError } from "../ui/toasts";
 import { Waiting } from "./Waiting";
 import { WipeHandle } from "./WipeHandle";
-import { leavePicture, probeAt } from "./probe";
+import { panBy, usePointer } from "./usePointer";
 
-const CLICK_PX = 4;
 const PAN_PX = 48;
-
-function panBy(screen: Screen, dx: number, dy: number): void {
-  const { view } = screen.picture;
-  moveTo(view, pan(transformOf(view), screen.size(), dx, dy));
-}
 
 function onWheel(screen: Screen, event: WheelEvent): void {
   event.preventDefault();
@@ -93,12 +82,6 @@ function useScreen(view: string) {
   return { canvas, screen, failure };
 }
 
-/** Select what a pixel shows: where the eye moves, the server knows. */
-async function selectAt(view: string, x: number, y: number): Promise<void> {
-  const { material } = await askProbe(view, x, y);
-  if (material !== null) select(material);
-}
-
 /** Look at what a pixel shows; beside others, the view is shown alone first. */
 async function onDoubleClick(screen: Screen, view: string, event: MouseEvent): Promise<void> {
   const eye = eyeOf(view);
@@ -106,50 +89,6 @@ async function onDoubleClick(screen: Screen, view: string, event: MouseEvent): P
   const { px, py } = hitAt(screen, event);
   const { position } = await askProbe(view, px, py);
   if (position !== null) eye.lookAt(position as Triple);
-}
-
-function usePointer(screen: Screen | null, view: string) {
-  const drag = useRef({ x: 0, y: 0, moved: false });
-  const begin = (event: PointerEvent) => {
-    drag.current = { x: event.clientX, y: event.clientY, moved: false };
-    const eye = eyeOf(view);
-    if (eye !== null) void attempt(() => eye.grasp());
-    return event.button <= (eye === null ? 1 : 2);
-  };
-  const move = (event: PointerEvent) => {
-    if (screen === null) return;
-    pointedView.value = view;
-    const { x, y, moved } = drag.current;
-    const [dx, dy] = [event.clientX - x, event.clientY - y];
-    if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
-    drag.current = { x: event.clientX, y: event.clientY, moved: true };
-    const eye = eyeOf(view);
-    if (eye === null) return panBy(screen, dx, dy);
-    leavePicture(); // what was probed has moved away from the pointer
-    const { height } = screen.size();
-    if (event.shiftKey || (event.buttons & 6) !== 0) eye.change((orbit) => panned(orbit, dx / height, dy / height));
-    else eye.change((orbit) => turned(orbit, (-TURN * dx) / height, (TURN * dy) / height));
-  };
-  const hover = (event: PointerEvent) => {
-    if (screen === null) return;
-    pointedView.value = view; // not when it enters: the view under a resting pointer may become another
-    const { px, py, material } = hitAt(screen, event);
-    probeAt(screen.picture, px, py);
-    hoveredMaterial.value = material;
-  };
-  const end = (event: PointerEvent, released: boolean) => {
-    if (screen === null || !released || drag.current.moved || event.button !== 0) return;
-    const { px, py, material } = hitAt(screen, event);
-    if (placing.peek() !== null) void placeAt(view, px, py);
-    else if (pinning.peek() !== null) pinAt(view, px, py);
-    else if (eyeOf(view) !== null) void selectAt(view, px, py);
-    else if (material !== null) select(material);
-  };
-  const leave = () => {
-    pointedView.value = hoveredMaterial.value = null;
-    leavePicture();
-  };
-  return { ...useDrag({ begin, move, hover, end }), onPointerLeave: leave };
 }
 
 function onKey(screen: Screen, event: KeyboardEvent): void {

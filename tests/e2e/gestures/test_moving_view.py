@@ -16,6 +16,7 @@ from PIL import Image
 from playwright.sync_api import Browser, expect
 
 MOVED_S = 30.0
+MENU_PX = 310  # beside the camera's menu
 
 
 @pytest.fixture
@@ -57,6 +58,22 @@ def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
         moving.canvas.focus()
         page.keyboard.press(name)
 
+    touch = page.context.new_cdp_session(page)
+    touch.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+
+    def fingers(*ways: tuple[float, float, float, float]) -> None:
+        """Each from (x, y) by (across, down), from the middle of the picture."""
+
+        def tell(kind: str, share: float | None) -> None:
+            at = [] if share is None else [(x + a + share * c, y + b + share * d) for a, b, c, d in ways]
+            points = [{"x": px, "y": py, "id": k} for k, (px, py) in enumerate(at)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        tell("touchStart", 0.0)
+        for k in range(1, 9):
+            tell("touchMove", k / 8)
+        tell("touchEnd", None)
+
     gestures = {
         "turn": lambda: drag(60, 20),
         "slide": lambda: drag(30, 10, "right"),
@@ -65,6 +82,9 @@ def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
         "key slides": lambda: key("Shift+ArrowUp"),
         "key goes back": lambda: key("-"),
         "button": lambda: page.get_by_role("button", name="Turn right").click(),
+        "one finger turns": lambda: fingers((0, 0, -50, 0)),
+        "two fingers slide": lambda: fingers((-40, 0, 0, 20), (40, 0, 0, 20)),
+        "two fingers spread": lambda: fingers((-40, 0, -10, 0), (40, 0, 10, 0)),
     }
     for gesture in gestures.values():
         for _ in range(2):
@@ -112,11 +132,42 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     differs(moving, edited)
 
 
-def test_a_camera_is_kept_with_the_scene(moving: Editor, server: Server, moving_scene: str) -> None:
-    moving.page.get_by_role("button", name="Keep camera").click()
-    expect(moving.page.get_by_text("The camera is kept as “View 1”")).to_be_visible()
-    kept = server.call(f"/api/scenes/{moving_scene}/cameras")
-    assert [camera["name"] for camera in kept if camera["name"] == "View 1"] == ["View 1"]
+def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server, moving_scene: str) -> None:
+    page, first = moving.page, moving.pixels_now()
+    page.get_by_role("button", name="Camera ▾").click()
+    menu = page.get_by_role("dialog", name="Camera")
+    menu.get_by_role("slider", name="Angle").focus()
+    page.keyboard.press("PageDown")
+    differs(moving, first)
+    for side, pixels in (("Width", "90"), ("Height", "160")):
+        menu.get_by_label(f"{side} of the picture, pixels").fill(pixels)
+        page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="90×160, moving")).to_be_visible()
+    moving.wait_until_exact()
+    there = moving.pixels_now()
+    menu.get_by_role("button", name="Keep this camera").click()
+    menu.get_by_role("button", name="View 1: rename").click()
+    page.keyboard.type("Near")
+    page.keyboard.press("Enter")
+    expect(menu.get_by_role("button", name="Near: rename")).to_be_visible()
+    moving.canvas.focus()
+    page.keyboard.press("ArrowLeft")
+    differs(moving, there)
+    aside = moving.pixels_now()
+    menu.get_by_role("button", name="Look from Near").click()
+    differs(moving, aside)
+    assert changed(there[:, MENU_PX:], moving.pixels_now()[:, MENU_PX:]) < 0.02
+
+    def names() -> list[str]:
+        return [camera["name"] for camera in server.call(f"/api/scenes/{moving_scene}/cameras") if camera["is_placed"]]
+
+    assert names() == ["Near"]
+    menu.get_by_role("button", name="Delete Near").click()
+    expect(menu.get_by_role("button", name="Look from Near")).to_have_count(0)
+    page.get_by_role("button", name="Undo", exact=True).last.click()
+    page.get_by_role("button", name="Camera ▾").click()
+    expect(menu.get_by_role("button", name="Look from Near")).to_be_visible()
+    assert names() == ["Near"]
 
 
 @pytest.mark.slow

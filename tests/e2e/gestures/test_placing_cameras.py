@@ -91,28 +91,29 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     expect(views.get_by_label("Aside", exact=True)).to_be_checked()
     before = placed(server.call(url))
 
-    views.get_by_role("button", name="Move Aside").click()
+    views.get_by_role("button", name="Move or rename Aside").click()
     seen = moved(page, "")
     canvas.press("ArrowUp")
     moved(page, seen)
+    dialog.get_by_label("Name").fill("Beside")
     dialog.get_by_role("button", name="Keep camera").click()
     expect(dialog).to_be_hidden()
     views.get_by_label("front", exact=True).uncheck()  # at once: what is chosen meanwhile stays chosen
     after = placed(server.call(url))
     assert after["to_world"] != before["to_world"]
 
-    views.get_by_role("button", name="Delete Aside").click()
-    expect(views.get_by_label("Aside", exact=True)).to_have_count(0)
+    views.get_by_role("button", name="Delete Beside").click()
+    expect(views.get_by_label("Beside", exact=True)).to_have_count(0)
     expect(views.get_by_label("front", exact=True)).to_be_checked()
     page.get_by_role("button", name="Undo", exact=True).click()
-    expect(views.get_by_label("Aside", exact=True)).to_be_checked()
+    expect(views.get_by_label("Beside", exact=True)).to_be_checked()
     assert placed(server.call(url)) == after
 
     views.get_by_label("front", exact=True).uncheck()
     page.get_by_role("button", name="Open and bake").first.click()
     Editor(page).wait_until_exact()
     (bake,) = server.call(f"/api/bakes?scene={scene}")
-    assert bake["recipe"]["views"] == ["Aside"]
+    assert bake["recipe"]["views"] == ["Beside"]
     assert bake["recipe"]["cameras"] == [{key: after[key] for key in ("name", "to_world", "yfov")}]
 
 
