@@ -55,7 +55,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     message.PatchOperation,
     *CLIENT_MESSAGES,
     bodies.BakeRequest,
-    renders.Keyframes,
+    renders.LooksRequest,
     renders.RenderRequest,
     models.TermsRequest,
     bodies.TruthRequest,

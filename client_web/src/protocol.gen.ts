@@ -115,12 +115,14 @@ export interface FocusMessage {
   view: string;
 }
 
-/** Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is between goes from one to the next. `between`: from parameter to parameter, or across the material map (GET /api/materials/map) where both are of its kind. */
-export interface Keyframes {
+/** What each frame of an animation shows; `view`: of which `path` is a way. */
+export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
   between?: "parameters" | "map";
+  path?: Turntable | EyePath | null;
+  view?: string | null;
 }
 
 /** One operation of a JSON Patch (RFC 6902) on the look. */
@@ -145,19 +147,19 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the values. Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the values. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
   between?: "parameters" | "map";
+  path?: Turntable | EyePath | null;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
   size?: [number, number] | null;
   name?: string | null;
   layers?: boolean | "light_groups";
   precision?: "half" | "float";
-  path?: Turntable | EyePath | null;
   fps?: number;
   exact?: boolean;
 }
@@ -500,9 +502,10 @@ export interface LookEntry {
   bytes: number;
 }
 
-/** The complete look of each frame. */
+/** The complete look of each frame, and from where it is seen; null where no `path` was given. */
 export interface LooksBody {
   looks: Record<string, unknown>[];
+  cameras: CameraFrame[] | null;
 }
 
 /** A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry. */

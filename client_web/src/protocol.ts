@@ -23,7 +23,7 @@ export type {
   HelloMessage,
   AlbedoBody,
   InOutBody,
-  Keyframes,
+  LooksRequest,
   LookEntry,
   LooksBody,
   MaterialMapBody,

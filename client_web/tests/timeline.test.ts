@@ -4,12 +4,24 @@ import type { Change } from "../src/document/change";
 import { edit, keepPassing, leavePassing, onChange, passing, showPassing } from "../src/edit/edit";
 import { history } from "../src/edit/history";
 import { fromText, toText } from "../src/edit/journal";
-import { addKeyframe, freeKeyframeName, keyframes, loops, moveKeyframe, removeKeyframe, seconds } from "../src/looks/keyframes";
+import {
+  addKeyframe,
+  eyeWay,
+  freeKeyframeName,
+  keyframes,
+  loops,
+  moveKeyframe,
+  removeKeyframe,
+  seconds,
+  seeKeyframeFrom,
+} from "../src/looks/keyframes";
 import { redo, undo } from "../src/looks/undo";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";
+import { placedEye } from "../src/state/eyes";
 import { timelineOpen } from "../src/state/panels";
-import { at, frames, numFrames, play, playing, seek } from "../src/timeline/play";
+import { shownViews, viewName, views } from "../src/state/views";
+import { at as place, frames, numFrames, pathOf, play, playing, seek } from "../src/timeline/play";
 import { LOOK, lookWith } from "./look";
 
 const EXPOSURE = "/display/exposure";
@@ -39,10 +51,10 @@ async function press(key: () => void): Promise<void> {
   await vi.waitFor(() => expect(history.heading).toBe(history.cursor.value));
 }
 
-/** A time line from dark to bright whose frames the server has told. */
-async function prepared(): Promise<void> {
+/** A time line from dark to bright whose frames the server has told, and from where they are seen. */
+async function prepared(cameras: { to_world: number[]; yfov: number }[] | null = null): Promise<void> {
   const told = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
-  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told })));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told, cameras })));
   bake.value = "b";
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: DARK });
@@ -121,7 +133,7 @@ test("a place on the way shows the frame that is nearest, and closing shows what
   seek(0.25);
   expect(exposure()).toBeCloseTo(-1, 9);
   seek(7);
-  expect([at.value, exposure()]).toEqual([1, 2]);
+  expect([place.value, exposure()]).toEqual([1, 2]);
   timelineOpen.value = false;
   expect(look.value).toEqual(LOOK);
 });
@@ -133,9 +145,9 @@ test.each([true, false])("playing goes on with the clock and %s: again from the 
   play();
   const start = performance.now();
   ticks.at(-1)?.(start + 250 * seconds.value);
-  expect(at.value).toBeCloseTo(0.25, 1);
+  expect(place.value).toBeCloseTo(0.25, 1);
   ticks.at(-1)?.(start + 1100 * seconds.value);
-  expect(at.value).toBeCloseTo(again ? 0.1 : 1, 1);
+  expect(place.value).toBeCloseTo(again ? 0.1 : 1, 1);
   expect(playing.value).toBe(again);
   edit("Rotation", "/environment/rotation", 45);
   expect(playing.value).toBe(false);
@@ -149,7 +161,31 @@ test("a pause and a play within one frame do not play twice as fast", async () =
   play();
   const now = performance.now() + 100 * seconds.value;
   for (const tick of [...ticks]) tick(now);
-  expect(at.value).toBeCloseTo(0.1, 1);
+  expect(place.value).toBeCloseTo(0.1, 1);
   const due = ticks.filter((tick) => tick.name === "tick");
   expect(due.length).toBe(1);
+});
+
+test("the eye goes from where one key is seen to where the other is, and rests where the playing ends", async () => {
+  const at = (x: number, yfov = 40) => ({ to_world: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1], yfov });
+  const bounds = [[-1, -1, -1], [1, 1, 1]];
+  views.value = [{ name: "front", width: 4, height: 3, eye: "free", bounds, camera: at(0, 0.5) } as never];
+  [shownViews.value, viewName.value, eyeWay.value] = [["front"], "front", "along"];
+  const way = Array.from({ length: numFrames.value }, (_, k) => at(k));
+  await prepared(way);
+  seeKeyframeFrom(1, at(100));
+  expect(pathOf("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
+  expect(pathOf("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
+  expect(pathOf("still", 9)).toBeNull();
+  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+  const x = () => views.value[0]?.camera.to_world[3];
+  seek(1);
+  expect(x()).toBe(numFrames.value - 1);
+  seek(0);
+  play();
+  ticks.at(-1)?.(performance.now() + 500 * seconds.value);
+  expect(x()).toBeCloseTo((numFrames.value - 1) / 2, -1);
+  playing.value = false;
+  expect(placedEye("front")?.camera.to_world[3]).toBe(x());
+  [views.value, viewName.value, eyeWay.value] = [[], "", "still"];
 });

@@ -12,15 +12,15 @@ from relume.look.morph import morph, neighbours
 from relume.picture.transfer import Eyes, Opened
 from relume.scene.placed_camera import placed_camera
 from server.wire.cameras import CameraFrame
-from server.wire.renders import Keyframes, RenderRequest, Turntable
+from server.wire.renders import Animation, Keyframes, Turntable
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
     from relume.scene.model import Camera
 
 
-def check_animation(request: RenderRequest, transfer: Opened) -> None:
-    """Whether a bake can follow a batch.
+def check_animation(request: Animation, view: str, transfer: Opened) -> Sequence[Camera | None]:
+    """Whether a bake can follow a batch, and where each frame is seen from; None where it was baked.
 
     Raises:
         ParameterError: what cannot be, and what can.
@@ -33,16 +33,16 @@ def check_animation(request: RenderRequest, transfer: Opened) -> None:
     num_eyes = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
     if num_eyes > num:
         raise ParameterError("path/eyes", f"{num_eyes} keyframes", f"at most as many as frames, {num}")
-    eyes_of(request, transfer)
+    return eyes_of(request, view, transfer)
 
 
-def eyes_of(request: RenderRequest, transfer: Opened) -> Sequence[Camera | None]:
+def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera | None]:
     """Where each frame is seen from; None where it was baked. Raises ParameterError for bad cameras."""
     from relume.moving.paths import along, turntable  # SciPy, which a process that describes its API does without
 
     if transfer.eyes is not Eyes.FREE:
         return [None] * request.num_frames
-    view = cast("FreeView", transfer.views[request.view])
+    view = cast("FreeView", transfer.views[name])
     if request.path is None:
         return [view.camera] * request.num_frames
 

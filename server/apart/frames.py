@@ -47,7 +47,7 @@ def paint_frame(
     asked, target = RenderRequest.model_validate(request), Path(path)
     _tidy(target.parent)
     transfer = shop.transfer(asked.bake)
-    camera = eyes_of(asked, transfer)[index]
+    camera = eyes_of(asked, asked.view, transfer)[index]
     view = transfer.views[asked.view]
     eye = None if camera is None else (camera, asked.size or (view.width, view.height))
 

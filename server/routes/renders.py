@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
@@ -21,6 +22,7 @@ from server.queues.renders import Render, planned_bytes
 from server.routes.bakes import ready_bake
 from server.services import Services, Shared
 from server.wire.body import MAX_NAME, Id
+from server.wire.cameras import CameraFrame
 from server.wire.protocol import MAX_EYE_PIXELS
 from server.wire.renders import (
     MAX_FRAMES,
@@ -28,6 +30,7 @@ from server.wire.renders import (
     MAX_TOLD_BYTES,
     Keyframes,
     LooksBody,
+    LooksRequest,
     RenderBody,
     RenderRequest,
 )
@@ -62,8 +65,8 @@ def _queue(request: RenderRequest, most_bytes: int, caller: Caller, services: Se
 
 
 @router.post("/looks")
-async def frame_looks(request: Keyframes, services: Shared) -> LooksBody:
-    """What each frame of a batch with these keyframes shows: an editor plays them as they will be rendered."""
+async def frame_looks(request: LooksRequest, services: Shared) -> LooksBody:
+    """What each frame of a batch with these keyframes shows, and from where: an editor plays it as it will be rendered."""
     if request.num_frames > MAX_TOLD:
         raise ParameterError("frames", request.num_frames, f"at most {MAX_TOLD} to be looked at")
     await run_in_threadpool(ready_bake, services, request.bake)
@@ -71,15 +74,25 @@ async def frame_looks(request: Keyframes, services: Shared) -> LooksBody:
         return await run_in_threadpool(_frame_looks, request, transfer)
 
 
-def _frame_looks(request: Keyframes, transfer: Opened) -> LooksBody:
+def _frame_looks(request: LooksRequest, transfer: Opened) -> LooksBody:
     _check_looks(request, transfer)
+    cameras = None if request.path is None else _told_way(request, transfer)
     size, found = 0, []
     for index in range(request.num_frames):
         found.append(dict(document_of(request, transfer.default_look, index)))
         size += len(json.dumps(found[-1]))
         if size > MAX_TOLD_BYTES:
             raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
-    return LooksBody(looks=found)
+    return LooksBody(looks=found, cameras=cameras)
+
+
+def _told_way(request: LooksRequest, transfer: Opened) -> list[CameraFrame]:
+    """Where each frame is seen from. Raises ParameterError where no eye can go there."""
+    if request.view is None:
+        raise ParameterError("view", None, "the view that the path is a way of")
+    baked_view(request.view, transfer)
+    eyes = [eye for eye in check_animation(request, request.view, transfer) if eye is not None]
+    return [CameraFrame(to_world=eye.to_world.ravel().tolist(), yfov=math.degrees(eye.yfov)) for eye in eyes]
 
 
 def _check_looks(request: Keyframes, transfer: Opened) -> None:
@@ -124,7 +137,7 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
     _check_looks(request, transfer)
-    check_animation(request, transfer)
+    check_animation(request, request.view, transfer)
     look = look_of(request, transfer.default_look, 0)
     layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
     return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))

@@ -62,35 +62,10 @@ class Keyframes(Body):
         return len(self.looks) if self.frames is None else self.frames
 
 
-class LooksBody(Body):
-    """The complete look of each frame."""
+class Animation(Keyframes):
+    """Keyframes that may be seen from elsewhere in each frame: `path`, which a bake whose eye moves can follow."""
 
-    looks: list[dict[str, Any]]
-
-
-class RenderRequest(Keyframes):
-    """A batch of exact pictures; looks may be partial.
-
-    `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
-    default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light
-    path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the
-    values.
-
-    Of an animation: `path`, which a bake whose eye moves can follow, and `frames`, of which `looks` are keyframes at
-    even shares; `between`: how what is between them goes from one to the next, see POST /api/renders/looks. `format`
-    "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the
-    eye moves, a hundred times sooner.
-    """
-
-    view: Name
-    format: ImageFormat | Literal["mp4"]
-    size: tuple[Side, Side] | None = None
-    name: Name | None = None
-    layers: Layering = False
-    precision: Literal["half", "float"] = "half"
     path: Path | None = None
-    fps: Annotated[int, Field(ge=1, le=120)] = 25
-    exact: bool = True
 
     @property
     def num_frames(self) -> int:
@@ -100,6 +75,41 @@ class RenderRequest(Keyframes):
         if self.frames is not None:
             return self.frames
         return max(len(self.looks), len(self.path.eyes) if self.path is not None else 1)
+
+
+class LooksRequest(Animation):
+    """What each frame of an animation shows; `view`: of which `path` is a way."""
+
+    view: Name | None = None
+
+
+class LooksBody(Body):
+    """The complete look of each frame, and from where it is seen; null where no `path` was given."""
+
+    looks: list[dict[str, Any]]
+    cameras: list[CameraFrame] | None
+
+
+class RenderRequest(Animation):
+    """A batch of exact pictures; looks may be partial.
+
+    `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
+    default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light
+    path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the
+    values.
+
+    Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the
+    eye moves, a hundred times sooner.
+    """
+
+    view: Name
+    format: ImageFormat | Literal["mp4"]
+    size: tuple[Side, Side] | None = None
+    name: Name | None = None
+    layers: Layering = False
+    precision: Literal["half", "float"] = "half"
+    fps: Annotated[int, Field(ge=1, le=120)] = 25
+    exact: bool = True
 
     @property
     def picture_format(self) -> ImageFormat:

@@ -161,9 +161,29 @@ def test_looks_of_frames_are_told_as_they_will_be_rendered(
         np.testing.assert_array_equal(one, other)
 
 
+def test_places_of_frames_are_told_as_they_will_be_rendered(
+    client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
+) -> None:
+    eyes = [{"to_world": placed["to_world"], "yfov": 40.0} for placed in (eye(view, 1, 0.0), eye(view, 1, 0.4))]
+    keys = {"bake": bake, "looks": [{}, {}], "frames": 3, "view": view["name"]}
+    for path in ({"eyes": eyes}, {"turntable": 3, "start": eyes[1]}):
+        answer = client.post("/api/renders/looks", json={**keys, "path": path})
+        assert answer.status_code == 200, answer.text
+        told = answer.json()["cameras"]
+        assert len(told) == 3
+        small = {"bake": bake, "view": view["name"], "size": [20, 15], "exact": False}
+        rendered = frames_of(client, {**small, "looks": [{}], "path": path, "frames": 3}, tmp_path)
+        alone = frames_of(client, {**small, "looks": [{}, {}, {}], "path": {"eyes": told}}, tmp_path)
+        np.testing.assert_allclose(alone, rendered, atol=1e-5)
+        assert np.abs(rendered[1] - rendered[0]).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("fields", "word"),
     [
+        ({"path": {"turntable": 3}}, "view"),
+        ({"path": {"turntable": 4}, "view": "front", "frames": 3}, "turntable"),
+        ({"path": {"turntable": 3}, "view": "nowhere"}, "view"),
         ({"frames": 601}, "frames"),
         ({"frames": 1}, "looks"),
         ({"looks": [{"materials": {"Nothing": {}}}]}, "/looks/0"),

@@ -26,6 +26,8 @@ export class Eye {
   private motion: Motion;
   private number = 0;
   private hasMoved = false;
+  /** Where it is on a way that no hand makes. */
+  private passing: Frame | null = null;
   /** Of its pictures; null: as large as was baked. */
   private chosenSize: Size | null = null;
 
@@ -63,6 +65,7 @@ export class Eye {
 
   change = (by: (orbit: Orbit) => Orbit): void => {
     this.hasMoved = true;
+    this.passing = null;
     this.motion.change(by);
     this.keep();
   };
@@ -86,6 +89,23 @@ export class Eye {
     this.hasMoved = false;
     this.keep();
     this.tell(this.first);
+  }
+
+  /** Be on a way that no hand makes. */
+  pass(frame: Frame): void {
+    this.motion.end();
+    this.motion = this.from(orbitOf(frame, this.bounds));
+    this.hasMoved = true;
+    this.passing = frame;
+    this.tell(frame, false);
+  }
+
+  /** That way has ended. */
+  rest(): void {
+    if (this.passing === null) return;
+    this.keep();
+    this.tell(this.passing);
+    this.passing = null;
   }
 
   /** Tell the server again, which may know nothing of it. */

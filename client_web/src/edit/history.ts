@@ -17,6 +17,11 @@ export interface NamedLook {
   look: Partial<Look>;
 }
 
+/** One on the time line; `eye`: from where it is seen on a way from key to key. Angles in degrees. */
+export interface Keyframe extends NamedLook {
+  eye?: { to_world: number[]; yfov: number } | null;
+}
+
 /** What became of a saved look; null where there is none. */
 export interface ShelfStep {
   of: "shelf";
@@ -29,8 +34,8 @@ export interface ShelfStep {
 export interface TimelineStep {
   of: "timeline";
   label: string;
-  before: readonly NamedLook[];
-  after: readonly NamedLook[];
+  before: readonly Keyframe[];
+  after: readonly Keyframe[];
 }
 
 export type Step = LookStep | ShelfStep | TimelineStep;

@@ -1,7 +1,7 @@
 /** Saved looks, and the steps of this visit: click one to return to it. */
 import { useEffect, useRef } from "preact/hooks";
 import { isSame } from "../document/difference";
-import { replaceLook } from "../edit/edit";
+import { passing, replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
 import { stepWords } from "../edit/step";
 import { connect } from "../live/connect";
@@ -16,7 +16,7 @@ import { IconButton } from "../ui/Button";
 import { EditableName } from "../ui/EditableName";
 import { Icon } from "../ui/Icon";
 import { completed, justSaved, markLook, saveLook, sideA } from "./compare";
-import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, type SavedLook } from "./shelf";
+import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, variantKey, type SavedLook } from "./shelf";
 import { goTo } from "./undo";
 
 const MAX_STEPS = 40;
@@ -88,6 +88,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
 
 /** A look that came with the scene's file: to show, to compare with, not to change. */
 function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
+  thumbnailsMade.value;
   const whole = completed(partial);
   const shown = isSame(whole, look.value);
   return (
@@ -98,7 +99,7 @@ function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }
         aria-pressed={shown}
         onClick={() => replaceLook(`Show ${name}`, whole)}
       >
-        <Picture image={null} text={name} />
+        <Picture image={thumbnailOf(variantKey(name))} text={name} />
         {sideA.value?.label === name && <span class="mark">A</span>}
       </button>
       <span class="tile-actions">
@@ -173,7 +174,7 @@ function Steps() {
     return () => observer.disconnect();
   }, []);
   const first = Math.max(0, steps.length - MAX_STEPS);
-  const opened = steps.find((step) => step.of === "look")?.before ?? look.value ?? undefined;
+  const opened = steps.find((step) => step.of === "look")?.before ?? passing.value?.before ?? look.value ?? undefined;
   // steps that are not of the look (one was deleted) show the picture before them
   let last = opened;
   const tiles = steps.map((step, i) => {

@@ -1,28 +1,30 @@
 /** Looks on the time line, which is kept for this tab. What becomes of them is a step of the history. */
 import { effect, signal } from "@preact/signals";
-import { history, type NamedLook } from "../edit/history";
-import type { Keyframes } from "../protocol";
+import { history, type Keyframe } from "../edit/history";
+import type { LooksRequest } from "../protocol";
 import { scene } from "../state/scene";
 
 export const MAX_KEYFRAMES = 24;
 export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
 
-export const keyframes = signal<readonly NamedLook[]>([]);
+export const keyframes = signal<readonly Keyframe[]>([]);
 export const seconds = signal(4);
 /** How materials go from one look to the next. */
-export const between = signal<NonNullable<Keyframes["between"]>>("parameters");
+export const between = signal<NonNullable<LooksRequest["between"]>>("parameters");
 export const loops = signal(true);
-/** Views that move go once around meanwhile. */
-export const turns = signal(false);
+/** What the eye of a view that moves does meanwhile: it stays, goes once around from where the first look is seen, or from
+ * key to key. */
+export type EyeWay = "still" | "around" | "along";
+export const eyeWay = signal<EyeWay>("still");
 
-function put(label: string, after: readonly NamedLook[]): void {
+function put(label: string, after: readonly Keyframe[]): void {
   const before = keyframes.peek();
   keyframes.value = after;
   history.record({ of: "timeline", label, before, after });
   history.seal();
 }
 
-export function addKeyframe(of: NamedLook): void {
+export function addKeyframe(of: Keyframe): void {
   if (keyframes.peek().length < MAX_KEYFRAMES) put(`${of.name} to the time line`, [...keyframes.peek(), of]);
 }
 
@@ -38,6 +40,12 @@ export function moveKeyframe(index: number, by: -1 | 1): void {
   put(`${moved.name} ${by < 0 ? "earlier" : "later"}`, keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved));
 }
 
+/** See one from somewhere else on a way from key to key. */
+export function seeKeyframeFrom(index: number, eye: NonNullable<Keyframe["eye"]>): void {
+  const moved = keyframes.peek()[index];
+  if (moved !== undefined) put(`${moved.name} from elsewhere`, keyframes.peek().with(index, { ...moved, eye }));
+}
+
 /** A name for a look that has none: keyframes are told apart. */
 export function freeKeyframeName(): string {
   const taken = new Set(keyframes.peek().map(({ name }) => name));
@@ -47,9 +55,10 @@ export function freeKeyframeName(): string {
 }
 
 interface Kept {
-  keyframes: readonly NamedLook[];
+  keyframes: readonly Keyframe[];
   seconds: number;
   between: typeof between.value;
+  eyeWay?: EyeWay;
 }
 
 const keptKey = (id: string) => `relume.timeline.${id}`;
@@ -64,6 +73,7 @@ function recall(id: string): void {
   keyframes.value = kept?.keyframes ?? [];
   seconds.value = kept?.seconds ?? 4;
   between.value = kept?.between ?? "parameters";
+  eyeWay.value = kept?.eyeWay ?? "still";
 }
 
 /** Keep the time line of each scene for a reload. */
@@ -71,7 +81,8 @@ export function followTimeline(): void {
   let shown: string | null = null;
   effect(() => {
     const id = scene.value?.id ?? null;
-    const kept: Kept = { keyframes: keyframes.value, seconds: seconds.value, between: between.value };
+    const [shownKeys, way] = [keyframes.value, eyeWay.value];
+    const kept: Kept = { keyframes: shownKeys, seconds: seconds.value, between: between.value, eyeWay: way };
     if (id === null) return;
     if (id !== shown) {
       shown = id;

@@ -21,6 +21,9 @@ export function thumbnailOf(name: string): string | null {
   return localStorage.getItem(thumbnailKey(name));
 }
 
+/** What a variant's thumbnail is kept under: no saved look has such a name. */
+export const variantKey = (name: string): string => `${scene.value?.id}/${name}`;
+
 export function keepThumbnail(name: string, image: string): void {
   try {
     localStorage.setItem(thumbnailKey(name), image);

@@ -1,5 +1,6 @@
 /** Thumbnails of the looks that were shown: of the picture as it is when the hand rests, and again when it is exact. */
 import { effect } from "@preact/signals";
+import { isSame } from "../document/difference";
 import { isDrawn } from "../live/exactness";
 import { stage } from "../picture/stage";
 import type { Look } from "../protocol";
@@ -8,10 +9,11 @@ import { connection } from "../state/connection";
 import { drawn, held } from "../state/display";
 import { exact } from "../state/fidelity";
 import { look } from "../state/look";
+import { scene } from "../state/scene";
 import { giveThumbnail, hasThumbnail, thumbnailsMade } from "../state/thumbnails";
 import { completed } from "./compare";
 import { thumbnail } from "./image";
-import { keepThumbnail, shelf, thumbnailOf } from "./shelf";
+import { keepThumbnail, shelf, thumbnailOf, variantKey } from "./shelf";
 
 const REST_MS = 350;
 const REST_INEXACT_MS = 700;
@@ -19,12 +21,12 @@ const REST_INEXACT_MS = 700;
 const inexact = new WeakSet<Look>();
 let timer = 0;
 
-/** A saved look that was made elsewhere gets its picture when it is first shown here. */
-function giveToSaved(of: Look, image: string): void {
-  const text = JSON.stringify(of);
-  for (const saved of shelf.peek()) {
-    if (thumbnailOf(saved.name) === null && JSON.stringify(completed(saved.look)) === text)
-      keepThumbnail(saved.name, image);
+/** A saved look that was made elsewhere, or a variant of the scene's file, gets its picture when it is first shown here. */
+export function giveToNamed(of: Look, image: string): void {
+  const saved = shelf.peek().map(({ name, look: partial }) => ({ key: name, partial }));
+  const variants = (scene.peek()?.variants ?? []).map(({ name, look: partial }) => ({ key: variantKey(name), partial }));
+  for (const { key, partial } of [...saved, ...variants]) {
+    if (thumbnailOf(key) === null && isSame(completed(partial as Partial<Look>), of)) keepThumbnail(key, image);
   }
 }
 
@@ -36,7 +38,7 @@ function take(current: Look): void {
   giveThumbnail(current, image);
   if (exact.peek()) {
     inexact.delete(current);
-    giveToSaved(current, image);
+    giveToNamed(current, image);
   } else inexact.add(current);
   thumbnailsMade.value += 1;
 }

@@ -10,9 +10,8 @@ import type {
   EnvironmentBody,
   ImageBody,
   InOutBody,
-  Keyframes,
-  Look,
   LooksBody,
+  LooksRequest,
   MaterialBody,
   MaterialMapBody,
   BtfBody,
@@ -172,8 +171,8 @@ export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
 }
 /** The complete look of each frame of an animation. */
-export async function frameLooks(body: Keyframes): Promise<readonly Look[]> {
-  return ((await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody).looks as unknown as Look[];
+export async function frameLooks(body: LooksRequest): Promise<LooksBody> {
+  return (await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody;
 }
 export async function deleteRender(id: string): Promise<void> {
   await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });

@@ -1,7 +1,7 @@
 /** Looks as keyframes: played in the picture, gone through by hand, rendered as numbered frames or a video. */
 import { passing } from "../edit/edit";
 import { completed } from "../looks/compare";
-import { exporting } from "../looks/export";
+import { exporting, eyeNow } from "../looks/export";
 import { shelf } from "../looks/shelf";
 import { look } from "../state/look";
 import { timelineOpen } from "../state/panels";
@@ -16,6 +16,7 @@ import { Switch } from "../ui/Switch";
 import {
   addKeyframe,
   between,
+  eyeWay,
   freeKeyframeName,
   keyframes,
   loops,
@@ -25,7 +26,8 @@ import {
   moveKeyframe,
   removeKeyframe,
   seconds,
-  turns,
+  seeKeyframeFrom,
+  type EyeWay,
 } from "../looks/keyframes";
 import { exportAnimation } from "./export";
 import { at, FPS, frames, keepShown, numFrames, playing, seek, togglePlay } from "./play";
@@ -34,6 +36,26 @@ const WAYS = [
   { value: "parameters", label: "Parameters", title: "From parameter to parameter; roughness evenly in its logarithm" },
   { value: "map", label: "Material map", title: "Cook–Torrance materials go across the map, through what lies between" },
 ] as const;
+
+const EYE_WAYS: Record<EyeWay, string> = { still: "Eye stays", around: "Once around", along: "From key to key" };
+
+/** What the eye of a view that moves does meanwhile. */
+function EyeMeanwhile() {
+  return (
+    <select
+      aria-label="The eye meanwhile"
+      title="Once around from where the first look is seen, or from where each look is seen to the next"
+      value={eyeWay.value}
+      onChange={(event) => (eyeWay.value = event.currentTarget.value as EyeWay)}
+    >
+      {Object.entries(EYE_WAYS).map(([way, words]) => (
+        <option key={way} value={way}>
+          {words}
+        </option>
+      ))}
+    </select>
+  );
+}
 
 /** What is said where nothing plays yet. */
 function hint(): string | null {
@@ -88,7 +110,7 @@ function Transport() {
         s in all
       </label>
       <Switch icon="loop" label="Again from the beginning" of={loops} />
-      {moves.value && <Switch icon="turn" label="Once around meanwhile" of={turns} />}
+      {moves.value && <EyeMeanwhile />}
     </div>
   );
 }
@@ -107,6 +129,16 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
       >
         {name}
       </button>
+      {moves.value && (
+        <IconButton
+          icon="eye"
+          label={`See ${name} from where the eye is now`}
+          onClick={() => {
+            const eye = eyeNow();
+            if (eye !== null) seeKeyframeFrom(index, eye);
+          }}
+        />
+      )}
       <IconButton icon="earlier" label={`${name} earlier`} disabled={index === 0} onClick={() => moveKeyframe(index, -1)} />
       <IconButton icon="later" label={`${name} later`} disabled={index === last} onClick={() => moveKeyframe(index, 1)} />
       <IconButton icon="close" label={`Take ${name} off`} onClick={() => removeKeyframe(index)} />
@@ -124,9 +156,9 @@ function AddKeyframe() {
   const known = choices();
   const add = (chosen: string) => {
     const live = look.peek();
-    if (chosen === "live" && live !== null) addKeyframe({ name: freeKeyframeName(), look: live });
+    if (chosen === "live" && live !== null) addKeyframe({ name: freeKeyframeName(), look: live, eye: eyeNow() });
     const saved = known.get(chosen);
-    if (saved !== undefined) addKeyframe({ name: saved.name, look: completed(saved.look) });
+    if (saved !== undefined) addKeyframe({ name: saved.name, look: completed(saved.look), eye: eyeNow() });
   };
   return (
     <select

@@ -1,15 +1,15 @@
 /** Playing the time line: the server says what each frame shows, as it would render it, and frames are shown in passing. */
 import { computed, effect, signal } from "@preact/signals";
 import { eyeOf } from "../cameras/eye";
-import { turned } from "../cameras/orbit";
+import type { Frame } from "../cameras/orbit";
 import { keepPassing, leavePassing, passing, showPassing } from "../edit/edit";
 import { frameLooks } from "../net/api";
-import type { Look } from "../protocol";
+import type { Look, LooksBody, RenderRequest } from "../protocol";
 import { bake } from "../state/bakes";
 import { timelineOpen } from "../state/panels";
-import { viewName } from "../state/views";
+import { moves, viewName } from "../state/views";
 import { attempt } from "../ui/toasts";
-import { between, keyframes, loops, seconds, turns } from "../looks/keyframes";
+import { between, eyeWay, keyframes, loops, seconds, type EyeWay } from "../looks/keyframes";
 
 export const FPS = 25;
 const ASK_MS = 120; // after the last change of the time line
@@ -19,14 +19,29 @@ export const at = signal(0);
 export const playing = signal(false);
 /** The look of each frame; null while there are none, or they are on their way. */
 export const frames = signal<readonly Look[] | null>(null);
+/** From where each frame is seen; null where the eye stays. */
+const cameras = signal<LooksBody["cameras"]>(null);
 export const numFrames = computed(() => Math.max(2, Math.round(seconds.value * FPS) + 1));
 
 const words = (share: number) => `The time line at ${(share * seconds.peek()).toFixed(1)} s`;
 
+/** The way that the eye goes while `num` frames are shown; null where it stays, or has been baked from one place. */
+export function pathOf(way: EyeWay, num: number): NonNullable<RenderRequest["path"]> | null {
+  const eye = eyeOf(viewName.peek());
+  if (eye === null || way === "still") return null;
+  const eyes = keyframes.peek().map((key): Frame => key.eye ?? eye.first);
+  return way === "around" ? { turntable: num, start: eyes[0] ?? eye.first } : { eyes };
+}
+
 function show(): void {
   const looks = frames.peek();
-  const shown = looks?.[Math.round(at.peek() * (looks.length - 1))];
+  if (looks === null) return;
+  const index = Math.round(at.peek() * (looks.length - 1));
+  const [shown, camera] = [looks[index], cameras.peek()?.[index]];
   if (shown !== undefined) showPassing(words(at.peek()), shown);
+  const eye = eyeOf(viewName.peek());
+  if (camera !== undefined) eye?.pass(camera);
+  if (!playing.peek()) eye?.rest();
 }
 
 /** Go to a place; it stays there. */
@@ -51,7 +66,6 @@ function tick(now: number): void {
   const ends = next >= 1 && !loops.peek();
   if (ends) playing.value = false;
   seek(ends ? 1 : next % 1);
-  if (turns.peek()) eyeOf(viewName.peek())?.change((orbit) => turned(orbit, 2 * Math.PI * step, 0));
   goOn();
 }
 
@@ -85,10 +99,16 @@ effect(() => {
   if (passing.value === null) playing.value = false;
 });
 
+// where the playing ends, the eye has come to rest
+effect(() => {
+  if (!playing.value) eyeOf(viewName.peek())?.rest();
+});
+
 let newest = 0;
 effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
-  const body = { frames: Math.max(numFrames.value, looks.length), between: between.value };
+  const body = { frames: Math.max(numFrames.value, looks.length), between: between.value, view: viewName.value };
+  const way = moves.value ? eyeWay.value : "still";
   const asked = ++newest;
   frames.value = null;
   if (!timelineOpen.value || id === null || looks.length < 2) {
@@ -98,9 +118,11 @@ effect(() => {
   window.setTimeout(() => {
     if (asked !== newest) return;
     void attempt(async () => {
-      const found = await frameLooks({ bake: id, looks: looks.map((look) => ({ ...look })), ...body });
+      const path = pathOf(way, body.frames);
+      const found = await frameLooks({ bake: id, looks: looks.map((look) => ({ ...look })), path, ...body });
       if (asked !== newest) return;
-      frames.value = found;
+      cameras.value = found.cameras;
+      frames.value = found.looks as unknown as Look[];
       if (passing.peek() !== null) show();
     });
   }, ASK_MS);
