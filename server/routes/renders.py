@@ -66,7 +66,7 @@ def _queue(request: RenderRequest, most_bytes: int, caller: Caller, services: Se
 
 @router.post("/looks")
 async def frame_looks(request: LooksRequest, services: Shared) -> LooksBody:
-    """What each frame of a batch with these keyframes shows, and from where: an editor plays it as it will be rendered."""
+    """What each frame of a batch with these keyframes shows, and from where: an editor plays what will be rendered."""
     if request.num_frames > MAX_TOLD:
         raise ParameterError("frames", request.num_frames, f"at most {MAX_TOLD} to be looked at")
     await run_in_threadpool(ready_bake, services, request.bake)

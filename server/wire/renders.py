@@ -98,8 +98,8 @@ class RenderRequest(Animation):
     path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the
     values.
 
-    Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the
-    eye moves, a hundred times sooner.
+    Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps`
+    frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner.
     """
 
     view: Name
