@@ -14,8 +14,8 @@ from relume.brdf.fresnel import schlick
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
-from relume.scene.gltf.sheen import MIN_ALPHA, sheen_curve
-from relume.scene.gltf.terms import COAT_ALBEDO, dielectric_share
+from relume.scene.gltf.sheen import hidden, sheen_albedo, sheen_alpha, sheen_term
+from relume.scene.gltf.terms import dielectric_share
 from relume.scene.model import Glass, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -87,12 +87,11 @@ def test_a_coat_is_a_second_highlight_that_dims_what_is_below() -> None:
     assert coat["model"] == "ggx"
     assert coat["color"] == [0.5, 0.5, 0.5]
     assert coat["params"] == {"roughness": 0.1, "f0": 0.04}
-    # mean of Schlick's curve over the cosine: ∫ schlick(c) 2c dc
-    cosine = (np.arange(4_000) + 0.5) / 4_000
-    assert float((schlick(cosine, 0.04) * 2 * cosine).mean()) == pytest.approx(COAT_ALBEDO, rel=1e-6)
-    keep = 1 - 0.5 * COAT_ALBEDO
-    np.testing.assert_allclose(lambert["color"], np.array(bare[0]["color"]) * keep, atol=1e-6)
-    np.testing.assert_allclose(below["color"], np.array(bare[1]["color"]) * keep, atol=1e-6)
+    for under, plain in ((lambert, bare[0]), (below, bare[1])):
+        assert under["color"] == plain["color"]
+        kept = np.array(under["curves"]["theta_o"]["factors"])
+        middle = np.cos((np.arange(len(kept)) + 0.5) * np.pi / 2 / len(kept))
+        np.testing.assert_allclose(kept, 1 - 0.5 * schlick(middle, 0.04), atol=2e-3)
 
 
 def test_anisotropy_stretches_along_the_turned_tangent() -> None:
@@ -131,34 +130,39 @@ def test_anisotropy_in_all_directions_is_a_round_highlight() -> None:
     assert any("all directions" in warning for warning in scene.warnings)
 
 
-def test_sheen_is_a_drawn_curve_over_the_half_angle() -> None:
-    scene = imported({"sheen": {"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.5}})
-    lambert, _, sheen = scene.materials[0].terms
+def test_sheen_is_drawn_curves_that_a_look_can_say() -> None:
+    extensions = {"sheen": {"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.5}}
+    scene = imported(extensions | {"clearcoat": {"clearcoatFactor": 1}})
+    lambert, _, sheen, _ = scene.materials[0].terms
     assert sheen["color"] == [1, 0.5, 0]
     points = np.array(sheen["curves"]["theta_h"]["points"])
     assert points[0].tolist() == [0, 0]
     assert (np.diff(points[:, 1]) >= 0).all()
-    assert lambert["color"][0] < 0.5
+    assert lambert["curves"]["theta_o"]["factors"][-1] < 0.5  # of the sheen, and of the coat
     for number, term in enumerate(scene.materials[0].terms):
         complete_term((number,), term, None)  # raises where a look could not say it
 
 
-@pytest.mark.parametrize("roughness", [0.0, 0.3, 1.0])
-def test_sheen_keeps_the_energy_of_the_formula(roughness: float) -> None:
-    # Σ D V (n·wi)(n·wo) over all pairs of directions, by Monte Carlo; the curve's albedo is the same sum
-    rng = np.random.default_rng(4)
-    wi, wo = rng.normal(size=(2, 400_000, 3))
-    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) * np.sign(w[:, 2:]) for w in (wi, wo))
-    h = wi + wo
-    cos_h = np.clip(h[:, 2] / np.linalg.norm(h, axis=1), 0, 1)
-    exponent = 1 / max(roughness**2, MIN_ALPHA)
-    d = (2 + exponent) * np.sqrt(1 - cos_h**2) ** exponent / (2 * np.pi)
-    i, o = wi[:, 2], wo[:, 2]
-    values = d / (4 * (i + o - i * o)) * i * o * (2 * np.pi) ** 2 / np.pi
-    error = values.std() / np.sqrt(len(values))
-    points, albedo = sheen_curve(roughness)
-    assert np.isfinite(points).all()
-    assert albedo == pytest.approx(values.mean(), abs=4 * error + 0.02 * values.mean())
+@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
+@pytest.mark.parametrize("theta_o", [0.35, 0.9, 1.3])
+def test_sheen_reflects_what_the_formula_does(roughness: float, theta_o: float) -> None:
+    # ∫ D V (n·wi) over all light, by quadrature, as the formula has it and as the terms' curves do
+    theta_i, phi = np.meshgrid((np.arange(300) + 0.5) * np.pi / 600, (np.arange(200) + 0.5) * np.pi / 100)
+    cos_i, cos_o, alpha = np.cos(theta_i), np.cos(theta_o), sheen_alpha(roughness)
+    across = np.hypot(np.sin(theta_i) * np.cos(phi) + np.sin(theta_o), np.sin(theta_i) * np.sin(phi))
+    theta_h = np.arctan2(across, cos_i + cos_o)
+    exponent = 1 / roughness**2
+    shadowed = 1 + hidden(cos_i, alpha) + hidden(np.array(cos_o), alpha)
+    formula = (2 + exponent) * np.sin(theta_h) ** exponent / (2 * np.pi) / (4 * cos_o * shadowed)
+    directions = np.sin(theta_i) * (np.pi / 600) * (np.pi / 100)
+    curves = sheen_term([1, 1, 1], roughness)["curves"]
+    shown = np.interp(theta_o, (np.arange(64) + 0.5) * np.pi / 128, curves["theta_o"]["bands"]) / (4 * cos_o)
+    for name, angle in (("theta_h", theta_h), ("theta_i", theta_i)):
+        degrees, values = np.transpose(curves[name]["points"])
+        shown = shown * np.interp(np.degrees(angle), degrees, values)
+    expected = float((formula * directions).sum())
+    assert float((shown * directions).sum()) == pytest.approx(expected, rel=0.03)
+    assert float(sheen_albedo(np.array(theta_o), roughness)) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -221,7 +221,7 @@ class MaterialReader:
         r, g, b = (round(float(value), 6) for value in tint)
         if r + g + b > 0:
             self._warnings.append(
-                simplified(f"the sheen of {what} is a curve over the half angle; its masking is averaged")
+                simplified(f"the sheen of {what} is four drawn curves; its masking is a product of two of them")
             )
         return Over(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
 

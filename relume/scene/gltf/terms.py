@@ -2,27 +2,29 @@
 
 Base: lambert times the mean of (1 - F) of what is not metal, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
 ashikhmin_shirley instead of ggx, its exponents from the widths of the facet distribution, n = 2/α² - 2 (Walter 2007,
-section 5.2). Clearcoat: a second ggx; sheen: a drawn curve. What lies under a coat or sheen is dimmed by its mean
-albedo: the look's colours know no direction.
+section 5.2). Clearcoat: a second ggx; sheen: drawn curves. What lies under a coat or sheen is dimmed by what these
+reflect towards the viewer, by a factor on its curve of θo.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.bands import band_averages
+from relume.brdf.fresnel import schlick
 from relume.brdf.mirror import SOFT
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
-from relume.scene.gltf.sheen import sheen_curve
+from relume.scene.gltf.sheen import sheen_albedo, sheen_term
 from relume.scene.model import Texture
 
 F64 = NDArray[np.float64]
 COAT_F0 = 0.04
-COAT_ALBEDO = COAT_F0 + (1 - COAT_F0) / 21  # mean of schlick(0.04), weighted by the cosine
 _MEAN_RISE = 0.0036845  # of (1 - cos θd)^5 over both hemispheres, each weighted by its cosine
 Terms = tuple[dict[str, Any], ...]
 
@@ -71,13 +73,11 @@ def make_terms(surface: Surface, over: Over) -> Terms:
         _highlight(surface, over.anisotropy) | {"texture": textures["specular"]},
     ]
     if any(over.sheen):
-        points, albedo = sheen_curve(over.sheen_roughness)
-        layers = _dimmed(layers, max(over.sheen) * albedo)
-        curves = {"theta_h": {"points": points, "channels": "rgb"}}
-        layers.append({"model": "blinn_phong", "color": list(over.sheen), "texture": None, "curves": curves})
+        layers = _under(layers, lambda theta: max(over.sheen) * sheen_albedo(theta, over.sheen_roughness))
+        layers.append(sheen_term(over.sheen, over.sheen_roughness))
     if over.coat > 0:
         params = _within(TERMS["ggx"], roughness=over.coat_roughness, f0=COAT_F0)
-        layers = _dimmed(layers, over.coat * COAT_ALBEDO)
+        layers = _under(layers, lambda theta: over.coat * schlick(np.cos(theta), COAT_F0))
         layers.append({"model": "ggx", "color": [over.coat] * 3, "params": params, "texture": None})
     return tuple(layers)
 
@@ -111,9 +111,19 @@ def _within(term: Term, **values: Any) -> dict[str, Any]:
     return held
 
 
-def _dimmed(layers: list[dict[str, Any]], reflected: float) -> list[dict[str, Any]]:
-    keep = max(1 - reflected, 0.0)
-    return [layer | {"color": _rounded(np.array(layer["color"]) * keep)} for layer in layers]
+def _under(layers: list[dict[str, Any]], reflected: Callable[[F64], F64]) -> list[dict[str, Any]]:
+    """Layers below one that reflects this share of the light towards a viewer, by θo."""
+    return [layer | {"curves": _dimmed(layer, reflected)} for layer in layers]
+
+
+def _dimmed(layer: dict[str, Any], reflected: Callable[[F64], F64]) -> dict[str, Any]:
+    """The curves of a layer, its curve of θo dimmed."""
+    num_bands = TERMS[layer["model"]].curve("theta_o").num_bands
+    keep = band_averages(lambda theta: np.clip(1 - reflected(theta), 0, 1), num_bands)
+    curves = layer.get("curves", {})
+    drawn = curves.get("theta_o", {"factors": [1.0] * num_bands, "channels": "rgb"})
+    kind = "bands" if "bands" in drawn else "factors"
+    return {**curves, "theta_o": {**drawn, kind: np.round(np.array(drawn[kind]) * keep, 6).tolist()}}
 
 
 def _rounded(color: Any) -> list[float]:
