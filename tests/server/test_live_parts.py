@@ -3,18 +3,21 @@
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from relume.errors import ParameterError, ProtocolError, StoreError
 from server.library.transfers import MAX_IDLE, TransferPool
+from server.live.sending.bake_news import POLL_S, BakeNews
 from server.live.sending.coefficient_budget import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, CoefficientBudget
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
 from server.live.state.pointers import check_hand, check_held, find_curve
 from server.live.state.resume import MAX_KEPT, ResumeStore
 from server.live.state.shown_views import ShownViews
+from worker.status import BakeStatus
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
@@ -209,3 +212,26 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
     with ThreadPoolExecutor(1) as thread:
         thread.submit(asyncio.run, run()).result()
     assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
+
+
+def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
+    asked: list[str] = []
+
+    def bakes(scene: str) -> list[BakeStatus]:
+        asked.append(scene)
+        return []
+
+    async def scenario() -> None:
+        news = BakeNews(bakes)
+        socket: Any = SimpleNamespace()
+        telling = [asyncio.create_task(news.tell(socket, "b", scene)) for scene in ("one", "one", "other", "one")]
+        await asyncio.sleep(0.1)
+        telling[0].cancel()  # whoever asked first and goes takes nothing from others
+        await asyncio.sleep(3.2 * POLL_S)
+        assert not any(task.done() for task in telling[1:])
+        for task in telling:
+            task.cancel()
+
+    asyncio.run(scenario())
+    assert set(asked) == {"one", "other"}
+    assert 2 <= asked.count("one") <= 5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Sequence
 
 from server.live.state.client_socket import ClientSocket
@@ -16,10 +17,11 @@ POLL_S = 0.5
 
 
 class BakeNews:
-    """Looks into the ledger, which other processes write too."""
+    """Looks into the ledger, which other processes write too: once for all sessions on a scene."""
 
     def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]]) -> None:
         self._list_bakes = list_bakes
+        self._looks: dict[str, tuple[float, asyncio.Task[Sequence[BakeStatus]]]] = {}
         self._complaint = Complaint(log, "sessions are not told of finer bakes")
 
     async def tell(self, socket: ClientSocket, bake: str, scene: str) -> None:
@@ -33,6 +35,14 @@ class BakeNews:
             await asyncio.sleep(POLL_S)
 
     async def _look_up(self, scene: str) -> Sequence[BakeStatus]:
+        """What one of the sessions has found lately, or finds now."""
+        now_s = time.monotonic()
+        self._looks = {of: look for of, look in self._looks.items() if now_s < look[0] + POLL_S or not look[1].done()}
+        if scene not in self._looks:
+            self._looks[scene] = now_s, asyncio.create_task(self._ask(scene))
+        return await asyncio.shield(self._looks[scene][1])  # a session that ends does not end it for others
+
+    async def _ask(self, scene: str) -> Sequence[BakeStatus]:
         try:
             found = await asyncio.to_thread(self._list_bakes, scene)
         except AWAY as error:  # for a while; the picture needs it not
