@@ -3,7 +3,8 @@
 Kernels release the interpreter lock and work on ranges; they are split here and nowhere else, so that two layers of
 threads never fight over the same cores. A freeze hands out hundreds of ranges at once, which a frame's few must not
 queue behind: who calls decides whose threads work, and where both want a core the system gives frames most of it.
-`RELUME_THREADS` bounds each pool; worker processes set it to 1.
+Where as many frames are made at once as there are threads, each is made by its own: handing out ranges, and waiting for
+them, would only cost. `RELUME_THREADS` bounds each pool; worker processes set it to 1.
 """
 
 from __future__ import annotations
@@ -14,8 +15,12 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from typing import ParamSpec, TypeVar
 
 from relume.errors import CancelledError
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 # two shares even out a core that is busy with something else; more cost more to hand out than they win
 _SHARES_A_THREAD = 2
@@ -28,6 +33,7 @@ _NICE = 5  # of threads of long work: frames get three quarters of a core that b
 _lock = threading.Lock()
 _here = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
 _pools: dict[str, ThreadPoolExecutor] = {}
+_frames_under_way: list[int] = []  # threads that make them
 _FRAME, _BESIDE, _LONG = "frame", "beside", "long"
 
 
@@ -67,14 +73,35 @@ def beside_frames() -> Iterator[None]:
         _here.pool = before
 
 
+def make_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """Call what makes a frame in this thread; while many do, each keeps to its own core.
+
+    Args:
+        work: is called. args, kwargs: with these.
+    Returns:
+        What it returns.
+    """
+    _frames_under_way.append(threading.get_ident())
+    try:
+        return work(*args, **kwargs)
+    finally:
+        _frames_under_way.remove(threading.get_ident())
+
+
+def _is_crowded(pool: str) -> bool:
+    """Whether all cores have frames of their own to make."""
+    return pool == _FRAME and len(_frames_under_way) >= max(2, num_threads())
+
+
 def _run(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
     # a thread of a pool that waited for its own pool would wait for itself
-    if num_threads() == 1 or len(ranges) == 1 or getattr(_here, "is_of_pool", False):
+    name = getattr(_here, "pool", _FRAME)
+    if num_threads() == 1 or len(ranges) == 1 or getattr(_here, "is_of_pool", False) or _is_crowded(name):
         for start, stop in ranges:
             kernel(start, stop)
         return
-    pool = _pool(getattr(_here, "pool", _FRAME))
+    pool = _pool(name)
     futures = [pool.submit(kernel, start, stop) for start, stop in ranges]
     errors = [error for future in futures if (error := future.exception()) is not None]
     if errors:

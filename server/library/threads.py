@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from typing import Any, ParamSpec, TypeVar
 
-from relume.parallel import do_long_work
+from relume.parallel import do_long_work, make_frame
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -16,11 +17,16 @@ NUM_LONG = 8  # more than cores: a view that is opened must not wait until other
 
 
 class Threads:
-    """The two pools of an app."""
+    """The two pools of an app.
+
+    Attributes:
+        turns: of sessions at the pool for quick steps, in the order in which they asked.
+    """
 
     def __init__(self) -> None:
-        num_cores = os.cpu_count() or 1
-        self.quick = ThreadPoolExecutor(max(2, num_cores), "relume-frame")
+        num_quick = max(2, os.cpu_count() or 1)
+        self.quick = ThreadPoolExecutor(num_quick, "relume-frame")
+        self.turns = asyncio.Semaphore(num_quick)
         self.long = ThreadPoolExecutor(NUM_LONG, "relume-long", do_long_work)
 
     def close(self) -> None:
@@ -36,10 +42,21 @@ class OneAtATime:
         self._threads = threads
         self._running: Future[Any] | None = None
 
-    async def quick(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Run a short step."""
-        self._running = future = self._threads.quick.submit(work, *args, **kwargs)
+    @asynccontextmanager
+    async def turn(self) -> AsyncIterator[None]:
+        """Wait for a thread for short steps. What is asked of it is best said inside: until then it grows old."""
+        async with self._threads.turns:
+            yield
+
+    async def in_turn(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run a short step inside `turn`."""
+        self._running = future = self._threads.quick.submit(lambda: make_frame(work, *args, **kwargs))
         return await asyncio.wrap_future(future)
+
+    async def quick(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Wait for a turn, and run a short step."""
+        async with self.turn():
+            return await self.in_turn(work, *args, **kwargs)
 
     def long(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> asyncio.Future[T]:
         """Start something that takes its time."""

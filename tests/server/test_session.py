@@ -83,6 +83,25 @@ def test_edits_without_acknowledgement_are_merged_into_the_newest(
         assert control.num_looks == num_looks + 1
 
 
+def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    assert client.portal is not None
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        while not turns.locked():
+            client.portal.call(turns.acquire)
+        num_looks = control.num_looks
+        for revision in range(1, 9):
+            session.edit(revision, SIGMA, 0.3 + revision / 1000)
+        session.edit(9, SIGMA, 5.0)
+        assert session.text("problem")["revision"] == 9
+        client.portal.call(turns.release)
+        assert session.frame().header["revision"] == 8
+        assert control.num_looks == num_looks + 1
+
+
 @impatient
 def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:

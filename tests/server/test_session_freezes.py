@@ -105,6 +105,24 @@ def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
         assert not control.freezing.is_set()
 
 
+def test_a_hand_whose_newest_edit_waits_for_room_does_not_rest(
+    client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.sending.frame_loop.SETTLE_S", 0.5)
+    control.refines = True
+    with open_session(client, baked.bake, acknowledges=False) as session:
+        session.frame()
+        session.edit(1, IOR, 2.0)
+        session.edit(2, SIGMA, 0.3)
+        second = session.frame()
+        session.edit(3, SIGMA, 0.4)
+        assert not control.freezing.wait(0.8)
+        session.send(type="ack", frame=second.header["frame"])
+        assert session.frame().header["revision"] == 3
+        assert control.freezing.wait(60)
+        control.may_freeze.set()
+
+
 def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked, control: Control) -> None:
     control.refines = True
     control.may_freeze.set()

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relume.parallel import beside_frames, do_long_work, for_ranges, for_shares
+from relume.parallel import beside_frames, do_long_work, for_ranges, for_shares, make_frame
 
 
 @pytest.fixture(autouse=True)
@@ -48,6 +48,25 @@ def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
 
         assert long.submit(follows).result() == {"kernels-beside"}
         assert long.submit(names_of, run).result() == {"kernels-long"}
+
+
+@pytest.mark.parametrize("run", [shares, ranges])
+def test_frames_that_are_made_at_once_keep_to_their_own_threads(run):
+    assert make_frame(names_of, run) == {"kernels-frame"}
+    both = threading.Barrier(2)
+
+    def crowded():
+        both.wait(30)
+        found = names_of(run)
+        both.wait(30)
+        return found
+
+    with ThreadPoolExecutor(2, "hand") as hands:
+        found = [hands.submit(make_frame, crowded) for _ in range(2)]
+        assert [names.result() for names in found] == [{"hand"}, {"hand"}]
+    with pytest.raises(ZeroDivisionError):
+        make_frame(lambda: 1 / 0)
+    assert make_frame(names_of, run) == {"kernels-frame"}
 
 
 def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():

@@ -191,7 +191,9 @@ class FrameLoop:
             if self._is_stale(*running):
                 self._freezer.cancel()
             return
-        is_resting = time.perf_counter() >= self._settle_at_s
+        newest = self._pending.target
+        is_still = not any(viewport.is_behind(newest) for viewport in self._viewports.values())
+        is_resting = is_still and time.perf_counter() >= self._settle_at_s
         for viewport in self._by_urgency():
             if viewport.job is not None and (is_resting or not viewport.job.refines):
                 self._freezer.start(viewport, viewport.job)
@@ -225,13 +227,17 @@ class FrameLoop:
 
     async def _paint(self, viewport: Viewport) -> None:
         """Paint the newest look, or go on with it; a look that the bake cannot follow is taken back."""
-        target = self._pending.target
-        accepting = self._pictures() if target is not self._accepted else []
-        request = viewport.request(target, self._pending, self._window, accepting)
-        try:
-            painted = await self._work.quick(painter.paint, viewport.picture, request)
-        except RelumeError as error:
-            await self._take_back(target, error)
+        painted: Painted | RelumeError
+        async with self._work.turn():
+            target = self._pending.target
+            accepting = self._pictures() if target is not self._accepted else []
+            request = viewport.request(target, self._pending, self._window, accepting)
+            try:
+                painted = await self._work.in_turn(painter.paint, viewport.picture, request)
+            except RelumeError as error:
+                painted = error
+        if isinstance(painted, RelumeError):
+            await self._take_back(target, painted)
             return
         self._accepted, viewport.served_s = target, time.perf_counter()
         is_moved = viewport.is_behind(target) and target.received_s is not None
