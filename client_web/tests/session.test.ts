@@ -76,6 +76,17 @@ function greet(): void {
   animate();
 }
 
+/** A frame without tiles, number 7. */
+function frameOf(revision: number): ArrayBuffer {
+  const header = new TextEncoder().encode(
+    JSON.stringify({ frame: 7, revision, view: "v", width: 1, height: 1, tiles: [], format: "rgb9e5", kind: "picture" }),
+  );
+  const bytes = new Uint8Array(4 + header.length);
+  new DataView(bytes.buffer).setUint32(0, header.length, true);
+  bytes.set(header, 4);
+  return bytes.buffer;
+}
+
 /** Edit a look, as a hand on this pointer does. */
 function edit(look: Look, path: string, value: unknown): Look {
   const change = changeAt(look, path, value);
@@ -118,6 +129,30 @@ test("the first edit goes at once, more of them once in an animation frame", () 
   ]);
   animate();
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
+});
+
+test("while two edits wait for a frame the next grows newer, until one comes or a tenth of a second has passed", () => {
+  greet();
+  let look = LOOK;
+  const drag = (...values: number[]): void => {
+    for (const value of values) {
+      look = edit(look, SIGMA, value);
+      animate();
+    }
+  };
+  const sent = () => socket().edits.map(({ patch }) => patch[0]?.value);
+  drag(0.3, 0.4, 0.5, 0.6);
+  expect(sent()).toEqual([0.3, 0.4]);
+  socket().onmessage({ data: frameOf(1) });
+  animate();
+  expect(sent()).toEqual([0.3, 0.4, 0.6]);
+  drag(0.7);
+  expect(session.ask({ type: "probe", x: 1, y: 2 })).toBe(true);
+  expect(sent()).toEqual([0.3, 0.4, 0.6, 0.7]);
+  drag(0.8);
+  vi.advanceTimersByTime(100);
+  animate();
+  expect(sent()).toEqual([0.3, 0.4, 0.6, 0.7, 0.8]);
 });
 
 test("who may only look sends no edits and takes hold of nothing", () => {
@@ -170,13 +205,7 @@ test("a frame is acknowledged when it is on the screen", async () => {
   let drawn: () => void = () => undefined;
   handlers.frame.mockReturnValueOnce(new Promise((done) => (drawn = done)));
   socket().hello(LOOK, 0);
-  const header = new TextEncoder().encode(
-    JSON.stringify({ frame: 7, revision: 0, view: "v", width: 1, height: 1, tiles: [], format: "rgb9e5", kind: "picture" }),
-  );
-  const bytes = new Uint8Array(4 + header.length);
-  new DataView(bytes.buffer).setUint32(0, header.length, true);
-  bytes.set(header, 4);
-  socket().onmessage({ data: bytes.buffer });
+  socket().onmessage({ data: frameOf(0) });
   expect(socket().sent).toEqual([]);
   drawn();
   await vi.waitFor(() => expect(socket().sent).toEqual([{ type: "ack", frame: 7 }]));

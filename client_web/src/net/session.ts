@@ -22,6 +22,11 @@ import { LiveSocket, type Asked, type Connection } from "./socket";
 
 const MAX_BUFFERED_BYTES = 1 << 20;
 
+/** While so many edits wait for a frame that shows them, the next one grows newer instead, for so long at most: a server
+ * that is busy with many hands need not read what it will never show. */
+const MAX_AHEAD = 2;
+const PATIENCE_MS = 100;
+
 export interface SessionHandlers {
   connection(state: Connection, retryInMs: number, reason?: string): void;
   hello(message: HelloMessage): void;
@@ -51,6 +56,9 @@ export class Session {
   private readonly messages: MessageHandlers;
   private scheduled = false;
   private sentThisFrame = false;
+  /** Newest revision that a frame has shown, and when the last edit went. */
+  private shownRevision = 0;
+  private sentTime = 0;
   /** The look that there is for one who may change only ways of looking at it; null for who may edit. */
   private fixed: Look | null = null;
   /** How often the room's look had changed when others changed it last. */
@@ -115,6 +123,7 @@ export class Session {
 
   private show(frame: Frame): void {
     this.queue.confirm(frame.header.revision);
+    this.shownRevision = Math.max(this.shownRevision, frame.header.revision);
     const acknowledge = () => void this.send({ type: "ack", frame: frame.header.frame });
     this.handlers.frame(frame).then(acknowledge, acknowledge);
   }
@@ -131,6 +140,7 @@ export class Session {
     if (message.room === null || message.room.created) {
       this.queue.reset(look, message.revision, message.solo, message.room !== null);
     } else this.queue.join(look, message.revision, message.solo);
+    this.shownRevision = this.queue.revision;
     this.handlers.hello(message);
     this.handlers.connection("open", 0);
     this.flush();
@@ -175,19 +185,27 @@ export class Session {
 
   private flush(): void {
     if (!this.socket.isOpen || !this.queue.pending) return;
-    if (this.socket.bufferedBytes < MAX_BUFFERED_BYTES) {
-      for (const { revision, patch, hand, solo, inputTime } of this.queue.take()) {
-        this.send({ type: "edit", revision, patch: [...patch], hand, solo: solo && [...solo] });
-        this.handlers.sent(revision, inputTime);
-      }
-      this.sentThisFrame = true;
-    }
+    if (this.socket.bufferedBytes < MAX_BUFFERED_BYTES && !this.isAhead) this.sendWanted();
     this.schedule();
+  }
+
+  private get isAhead(): boolean {
+    const isRecent = performance.now() - this.sentTime < PATIENCE_MS;
+    return isRecent && this.queue.revision - this.shownRevision >= MAX_AHEAD;
+  }
+
+  private sendWanted(): void {
+    for (const { revision, patch, hand, solo, inputTime } of this.queue.take()) {
+      this.send({ type: "edit", revision, patch: [...patch], hand, solo: solo && [...solo] });
+      this.handlers.sent(revision, inputTime);
+    }
+    this.sentThisFrame = true;
+    this.sentTime = performance.now();
   }
 
   /** Send a question about the look; the edits made before it go first. */
   ask(message: ClientMessage): boolean {
-    if (this.queue.pending) this.flush();
+    if (this.queue.pending && this.socket.isOpen) this.sendWanted();
     return this.send(message);
   }
 
