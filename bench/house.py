@@ -10,12 +10,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
 
 from bench.workers import bake_s
@@ -27,6 +28,7 @@ from worker.service import BakeService
 from worker.status import bake_id
 
 _START_S = 60.0
+SPEAKS = Subprotocol("relume.v1")
 
 
 @dataclass(frozen=True)
@@ -67,19 +69,27 @@ class Server:
     started_s: float
     edits: Path
 
+    def session(self, bake: str) -> str:
+        """Address of sessions on a bake."""
+        return f"ws://127.0.0.1:{self.port}/api/bakes/{bake}/session"
+
     def edit_ms(self) -> list[float]:
         """Edit received → frame handed to the socket, in the order of frames."""
         return [json.loads(line) for line in self.edits.read_text().splitlines()]
 
 
 @contextmanager
-def serving(house: House) -> Iterator[Server]:
-    """Start the server; it is ready when it accepts connections."""
+def serving(house: House, settings: Mapping[str, str] | None = None) -> Iterator[Server]:
+    """Start the server; it is ready when it accepts connections.
+
+    Args:
+        settings: environment variables of it.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
     edits = house.data / "edits.txt"
-    environment = {**os.environ, "RELUME_DATA": str(house.data), "RELUME_PORT": str(port)}
+    environment = {**os.environ, "RELUME_DATA": str(house.data), "RELUME_PORT": str(port), **(settings or {})}
     began = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-m", "bench.recording_server", str(edits)], env=environment)
     try:
@@ -139,6 +149,5 @@ class SessionClient:
 @contextmanager
 def session(server: Server, bake: str) -> Iterator[SessionClient]:
     """Open a session on a bake."""
-    url = f"ws://127.0.0.1:{server.port}/api/bakes/{bake}/session"
-    with connect(url, subprotocols=["relume.v1"], max_size=None, compression=None) as connection:  # type: ignore[list-item]
+    with connect(server.session(bake), subprotocols=[SPEAKS], max_size=None, compression=None) as connection:
         yield SessionClient(connection)

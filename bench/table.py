@@ -22,6 +22,7 @@ TARGETS = {
     "session.edit_to_socket_ms.p50": "≤ 10 ms",
     "session.edit_to_socket_ms.p95": "≤ 20 ms",
     "load.drag_beside_renders_ratio": "≥ 0.7",
+    "load.aggregate_ratio": "≥ 0.9",
     "canvas.edit_to_pixels_ms.p50": "≤ 33 ms",
     "canvas.edit_to_pixels_ms.p95": "≤ 60 ms",
     "accuracy.lambert": "≤ 0.5 %",

@@ -1,0 +1,115 @@
+"""load.aggregate_ratio: frames a second summed over 1 … 64 sessions that all drag, lowest ÷ best.
+
+A real server in its own process; this one has the hands of all sessions (`bench.hands`). All sessions are on one bake:
+with one slider in everybody's hand, so that all read one operator, and with four sliders in turn. Numbers of sessions
+are taken in turn, round after round; the ratio is of medians. What the server spends on a frame, which does not depend
+on what else the machine does, is in the row.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import AsyncIterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+from websockets.asyncio.client import connect
+
+from bench.figure import Figure
+from bench.hands import Hand
+from bench.house import SPEAKS, House, Server, baked_house, serving
+from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.bake import Recipe
+from relume.environments.studio import studio
+
+_NAME = "load.aggregate_ratio"
+_SLIDERS = tuple(
+    (f"/materials/{material}/terms/1/params/{name}", span)
+    for name, span in (("sigma", (0.1, 0.4)), ("ior", (1.3, 2.5)))
+    for material in ("Teapot", "Table")
+)
+_WARM_S = 1.0
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, drag with more and more hands."""
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 5, 3.0)
+    numbers = (1, 2) if tiny else (1, 2, 4, 8, 16, 32, 64)
+    shining = (LAMBERT, cook_torrance(0.2))
+    scene = teapot_on_table(studio(), shining, shining)
+    settings = {"RELUME_MAX_SESSIONS": "256"}  # those that have just gone are counted, too
+    kinds = {"one_operator": _SLIDERS[:1], "several": _SLIDERS}
+    found: dict[tuple[str, int], list[tuple[float, float]]] = {}
+    with (
+        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
+        serving(house, settings) as server,
+    ):
+        asyncio.run(_dragged(server, house, _SLIDERS, len(_SLIDERS), seconds))  # what is made once is made
+        for _ in range(rounds):
+            for kind, sliders in kinds.items():
+                for number in numbers:
+                    rates = asyncio.run(_dragged(server, house, sliders, number, seconds))
+                    found.setdefault((kind, number), []).append(rates)
+    medians = {key: np.median(rates, axis=0) for key, rates in found.items()}
+    fps = [float(rate) for rate, _ in medians.values()]
+    context = {
+        **{f"{kind}_fps": [float(medians[kind, number][0]) for number in numbers] for kind in kinds},
+        **{f"{kind}_ms_a_frame": [float(medians[kind, number][1]) for number in numbers] for kind in kinds},
+        "sessions": list(numbers),
+        "rounds": rounds,
+        "seconds": seconds,
+        "size": list(size),
+    }
+    return [Figure(_NAME, min(fps) / max(fps), "ratio", context)]
+
+
+async def _dragged(
+    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int, seconds: float
+) -> tuple[float, float]:
+    """Frames a second of so many hands together, and milliseconds of processor time that the server takes for each."""
+    async with _hands(server, house, sliders, number) as hands:
+        await asyncio.gather(*(hand.take() for hand in hands))
+        await asyncio.gather(*(hand.drag() for hand in hands))
+        await asyncio.sleep(min(_WARM_S, seconds))
+        frames, spent_s, began = _frames(hands), _spent_s(server), time.perf_counter()
+        await asyncio.sleep(seconds)
+        frames, spent_s = _frames(hands) - frames, _spent_s(server) - spent_s
+        return frames / (time.perf_counter() - began), 1e3 * spent_s / max(1, frames)
+
+
+@asynccontextmanager
+async def _hands(
+    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int
+) -> AsyncIterator[list[Hand]]:
+    """Open the sessions; each fails here where its hand does."""
+    async with AsyncExitStack() as stack:
+        hands = []
+        for k in range(number):
+            session = connect(server.session(house.bake), subprotocols=[SPEAKS], max_size=None, compression=None)
+            slider, span = sliders[k % len(sliders)]
+            hands.append(Hand(await stack.enter_async_context(session), slider, span, 0.618 * k))
+        reading = [asyncio.create_task(hand.run()) for hand in hands]
+        try:
+            yield hands
+            for task in reading:
+                if task.done():
+                    task.result()
+        finally:
+            for task in reading:
+                task.cancel()
+
+
+def _frames(hands: Sequence[Hand]) -> int:
+    return sum(hand.num_frames for hand in hands)
+
+
+def _spent_s(server: Server) -> float:
+    """Processor time of the server's process so far; nothing where the system does not say."""
+    stat = Path(f"/proc/{server.pid}/stat")
+    if not stat.is_file():
+        return 0.0
+    user, system = stat.read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
