@@ -40,7 +40,7 @@ def bake(
         int | None, typer.Option(metavar="N", help="Pieces of surfaces that light each other. [default: as fits]")
     ] = None,
     gather_rays: Annotated[
-        int | None, typer.Option(metavar="N", help="Rays of a sample that look for them. [default: 610; surface: 256]")
+        int | None, typer.Option(metavar="N", help="Rays of a sample that look for them. [default: 610; surface: 377]")
     ] = None,
     relightable: Annotated[
         bool, typer.Option("--relightable", help="Divide the light so that the environment can be turned or exchanged.")

@@ -91,12 +91,14 @@ class Plan:
         num_rays: shadow and camera rays.
         store_bytes: on disk, uncompressed.
         peak_bytes: memory of one worker process.
+        lone_bytes: what of it one process takes while the others do without: of a step that is one task.
     """
 
     num_view_samples: int
     num_rays: int
     store_bytes: int
     peak_bytes: int
+    lone_bytes: int = 0
 
 
 @dataclass(frozen=True)

@@ -49,9 +49,10 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
         MemoryBudgetError: it does not fit; the message says what is needed, what there is, and what to do.
     """
     memory = int(available_bytes() * MEMORY_SHARE)
-    if plan.peak_bytes * num_processes > memory:
-        what = f"this bake in {num_processes} process(es) of memory"
-        raise MemoryBudgetError(what, plan.peak_bytes * num_processes, memory, REMEDY)
+    needed = (plan.peak_bytes - plan.lone_bytes) * num_processes + plan.lone_bytes
+    if num_processes > 0 and needed > memory:
+        what = f"the memory of this bake in {num_processes} process{'es' if num_processes > 1 else ''}"
+        raise MemoryBudgetError(what, needed, memory, f"{REMEDY}, or a scene of fewer triangles")
     free = max(0, shutil.disk_usage(data_dir).free - DISK_RESERVE_BYTES)
     if plan.store_bytes > free:
         raise MemoryBudgetError(

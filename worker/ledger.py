@@ -59,7 +59,7 @@ class Ledger:
             id=identity,
             scene_id=scene_id,
             recipe=recipe_json(recipe),
-            plan=json.dumps(asdict(plan)),
+            plan=_plan_json(plan),
             state="queued",
             created=now,
             queued=now,
@@ -283,6 +283,12 @@ def _in_turns(rows: Sequence[BakeRow]) -> list[str]:
         ranks.append((row.state != "running", counts[row.client or ""], row.queued, row.id))
         counts[row.client or ""] += 1
     return [identity for *_, identity in sorted(ranks)]
+
+
+def _plan_json(plan: Plan) -> str:
+    kept = asdict(plan)
+    del kept["lone_bytes"]  # of no use any more; an older relume on the same ledger does not know it
+    return json.dumps(kept)
 
 
 def _plan(text: str) -> Plan:

@@ -106,6 +106,7 @@ class SurfaceMethod:
             + num_cells * _MAKING_BYTES_A_CELL
             + ROWS_A_SHARD * 3 * 2 * rays  # links: traced, joined, written
             + textures,
+            lone_bytes=nodes * _MAKING_BYTES_A_NODE,
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:

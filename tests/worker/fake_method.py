@@ -48,11 +48,13 @@ class FakeMethod:
     problem: str = ""
     peak_bytes: int = 1000
     store_bytes: int = 1000
+    lone_bytes: int = 0
     name: str = "fake"
     stages: tuple[str, ...] = ("samples", "visibility")
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        return Plan(self._rows(recipe) * len(recipe.views), self.num_rays, self.store_bytes, self.peak_bytes)
+        samples = self._rows(recipe) * len(recipe.views)
+        return Plan(samples, self.num_rays, self.store_bytes, self.peak_bytes, self.lone_bytes)
 
     def prepare(self, scene: Scene) -> None:
         pass

@@ -141,6 +141,16 @@ def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path:
             assert service.bakes() == []
 
 
+def test_what_one_process_takes_at_a_time_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("worker.budget.available_bytes", lambda: 10 << 30)
+    monkeypatch.setattr("worker.service.is_tiny", lambda plan: False)
+    alone = 5 << 30
+    with open_service(tmp_path, peak_bytes=alone, lone_bytes=alone - 1000) as service:
+        assert service.plan(SCENE.id, RECIPE).peak_bytes == alone
+    with open_service(tmp_path, peak_bytes=alone) as service, pytest.raises(MemoryBudgetError, match="fewer triangles"):
+        service.plan(SCENE.id, RECIPE)
+
+
 def test_unknown_names_are_refused(tmp_path: Path) -> None:
     with open_service(tmp_path) as service:
         with pytest.raises(ParameterError, match="fake"):
