@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import ParamSpec, TypeVar
@@ -21,6 +21,8 @@ from relume.errors import CancelledError
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Kernel = Callable[[int, int], object]
+"""Works on a range: its start and its stop."""
 
 # two shares even out a core that is busy with something else; more cost more to hand out than they win
 _SHARES_A_THREAD = 2
@@ -28,13 +30,15 @@ _SHARES_A_THREAD = 2
 # asked once: of an edit's frame of three milliseconds, asking at every kernel took a third of one
 _AVAILABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
-_NICE = 5  # of threads of long work: frames get three quarters of a core that both want
+_FRAME, _BESIDE, _LONG = "frame", "beside", "long"
+# where both want a core, frames get three quarters of it from long work, and nearly all from what follows them, which
+# takes no more than every other core: with both cores of two an edit's frame of 4 ms took 5
+_NICE = {_FRAME: 0, _BESIDE: 19, _LONG: 5}
 
 _lock = threading.Lock()
 _here = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
 _pools: dict[str, ThreadPoolExecutor] = {}
 _frames_under_way: list[int] = []  # threads that make them
-_FRAME, _BESIDE, _LONG = "frame", "beside", "long"
 
 
 def num_threads() -> int:
@@ -46,15 +50,16 @@ def num_threads() -> int:
 def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
         if name not in _pools:
-            _pools[name] = ThreadPoolExecutor(num_threads(), f"kernels-{name}", _begin, (name,))
+            num = max(1, num_threads() // 2) if name == _BESIDE else num_threads()
+            _pools[name] = ThreadPoolExecutor(num, f"kernels-{name}", _begin, (name,))
         return _pools[name]
 
 
 def _begin(name: str) -> None:
     _here.is_of_pool = True
-    if name != _FRAME and sys.platform == "linux":  # elsewhere it would be of the whole process
+    if _NICE[name] and sys.platform == "linux":  # elsewhere it would be of the whole process
         with suppress(OSError):  # not allowed to
-            os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE)
+            os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE[name])
 
 
 def do_long_work() -> None:
@@ -93,7 +98,7 @@ def _is_crowded(pool: str) -> bool:
     return pool == _FRAME and len(_frames_under_way) >= max(2, num_threads())
 
 
-def _run(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
+def _run(kernel: Kernel, count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
     # a thread of a pool that waited for its own pool would wait for itself
     name = getattr(_here, "pool", _FRAME)
@@ -101,14 +106,43 @@ def _run(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
         for start, stop in ranges:
             kernel(start, stop)
         return
-    pool = _pool(name)
-    futures = [pool.submit(kernel, start, stop) for start, stop in ranges]
+    if name == _FRAME:
+        _work_together(kernel, ranges)
+        return
+    futures = [_pool(name).submit(kernel, start, stop) for start, stop in ranges]
     errors = [error for future in futures if (error := future.exception()) is not None]
     if errors:
         raise errors[0]
 
 
-def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> None:
+def _work_together(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> None:
+    """Work through ranges with threads of the pool, whoever is free taking the next.
+
+    The caller works, too: threads that wait are woken late, which took a quarter of a frame of three milliseconds.
+    """
+    left = iter(ranges)  # whose next is one thread's, by the interpreter's lock
+
+    def work() -> list[BaseException]:
+        return [error for start, stop in left if (error := _error_of(kernel, start, stop)) is not None]
+
+    others = [_pool(_FRAME).submit(work) for _ in range(min(num_threads(), len(ranges)) - 1)]
+    errors = work()
+    for other in others:
+        if not other.cancel():  # else it would find nothing left
+            errors += other.result()
+    if errors:
+        raise errors[0]
+
+
+def _error_of(kernel: Kernel, start: int, stop: int) -> BaseException | None:
+    try:
+        kernel(start, stop)
+    except BaseException as error:  # raised when all ranges have ended
+        return error
+    return None
+
+
+def for_ranges(kernel: Kernel, count: int, grain: int) -> None:
     """Call `kernel(start, stop)` over [0, count) in ranges of at most `grain`, on all threads of the pool.
 
     Ranges must not depend on each other. The first exception is raised here after all ranges have ended.
@@ -117,7 +151,7 @@ def for_ranges(kernel: Callable[[int, int], object], count: int, grain: int) -> 
 
 
 def for_steps(
-    kernel: Callable[[int, int], object],
+    kernel: Kernel,
     count: int,
     grain: int,
     progress: Callable[[float], object],
@@ -147,7 +181,7 @@ def for_steps(
     for_ranges(step, count, grain)
 
 
-def for_shares(kernel: Callable[[int, int], object], count: int, shares_a_thread: int = _SHARES_A_THREAD) -> None:
+def for_shares(kernel: Kernel, count: int, shares_a_thread: int = _SHARES_A_THREAD) -> None:
     """Call `kernel(start, stop)` over [0, count) in a few even shares for each thread.
 
     For work of a few milliseconds, where handing out a range costs as much as doing it.

@@ -271,6 +271,8 @@ def _add_beams(
     out: F32,
 ) -> None:
     """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
+    if not wanted.arriving.beams:
+        return
     beams, sky = wanted.arriving.beams, _sky_in(transfer, wanted.light)
     of_eye = seen, camera, camera.yfov / height
     add_beams(beams, shares, transfer.surface_with(wanted.materials.images), *of_eye, wanted.materials, sky, rays, out)
