@@ -10,64 +10,48 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.core import types
 
-NUM = 8
+from relume.vector_code import (
+    FAST,
+    FLOAT,
+    NUM,
+    VECTOR,
+    Array,
+    difference,
+    extracted,
+    kernel_part,
+    product,
+    spread,
+    sum_of,
+    total,
+    word,
+)
 
-_FLOAT = ir.FloatType()
-_VECTOR = ir.VectorType(_FLOAT, NUM)
-_INDEX = ir.IntType(32)
-_FAST = ("fast",)
-_builders: Any = cgutils  # carries no types
-_intrinsic: Any = intrinsic  # its declared type is that of the generator, not of what kernels call
 _OVERLAP = (types.float32,) * 5  # what `overlap_of` returns
-
-
-def _spread(builder: Any, value: Any) -> Any:
-    """Put the same float into all lanes."""
-    undefined = ir.Constant(_VECTOR, ir.Undefined)
-    one = builder.insert_element(undefined, value, ir.Constant(_INDEX, 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INDEX, NUM), [0] * NUM))
 
 
 def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: Any, fall: Any) -> Any:
     """Compute the share of a triangle's area where the angle is below each of eight values y."""
-
-    def subtract(a: Any, b: Any) -> Any:
-        return builder.fsub(a, b, flags=_FAST)
-
-    def multiply(a: Any, b: Any) -> Any:
-        return builder.fmul(a, b, flags=_FAST)
-
-    risen, left = subtract(y, low), subtract(high, y)
-    all_of_it, nothing = ir.Constant(_VECTOR, [1.0] * NUM), ir.Constant(_VECTOR, [0.0] * NUM)
-    upper = subtract(all_of_it, multiply(multiply(left, left), fall))
-    is_upper = builder.fcmp_ordered(">", y, middle, flags=_FAST)
-    area = builder.select(is_upper, upper, multiply(multiply(risen, risen), rise))
-    area = builder.select(builder.fcmp_ordered(">=", y, high, flags=_FAST), all_of_it, area)
-    return builder.select(builder.fcmp_ordered("<=", y, low, flags=_FAST), nothing, area)
+    risen, left = difference(builder, y, low), difference(builder, high, y)
+    all_of_it, nothing = ir.Constant(VECTOR, [1.0] * NUM), ir.Constant(VECTOR, [0.0] * NUM)
+    upper = difference(builder, all_of_it, product(builder, product(builder, left, left), fall))
+    is_upper = builder.fcmp_ordered(">", y, middle, flags=FAST)
+    area = builder.select(is_upper, upper, product(builder, product(builder, risen, risen), rise))
+    area = builder.select(builder.fcmp_ordered(">=", y, high, flags=FAST), all_of_it, area)
+    return builder.select(builder.fcmp_ordered("<=", y, low, flags=FAST), nothing, area)
 
 
 def _shares(builder: Any, band: Any, overlap: Any) -> Any:
     """Compute Δ of bands [band, band + 8)."""
-    spread = [_spread(builder, value) for value in overlap]
-    first = _spread(builder, builder.sitofp(band, _FLOAT))
-    lower = builder.fadd(first, ir.Constant(_VECTOR, [float(k) for k in range(NUM)]), flags=_FAST)
-    upper = builder.fadd(first, ir.Constant(_VECTOR, [float(k + 1) for k in range(NUM)]), flags=_FAST)
-    above, below = _area_below(builder, upper, *spread), _area_below(builder, lower, *spread)
-    return builder.fsub(above, below, flags=_FAST)
+    of_all = [spread(builder, value) for value in overlap]
+    first = spread(builder, builder.sitofp(band, FLOAT))
+    lower = total(builder, [first, ir.Constant(VECTOR, [float(k) for k in range(NUM)])])
+    upper = total(builder, [first, ir.Constant(VECTOR, [float(k + 1) for k in range(NUM)])])
+    return difference(builder, _area_below(builder, upper, *of_all), _area_below(builder, lower, *of_all))
 
 
-def _address(context: Any, builder: Any, array_type: Any, array: Any, *index: Any) -> Any:
-    """Find where the eight floats from an index on stand, in the last dimension."""
-    struct = context.make_array(array_type)(context, builder, array)
-    shape, strides = _builders.unpack_tuple(builder, struct.shape), _builders.unpack_tuple(builder, struct.strides)
-    item = _builders.get_item_pointer2(context, builder, struct.data, shape, strides, "C", index)
-    return builder.bitcast(item, _VECTOR.as_pointer())
-
-
-@_intrinsic
+@kernel_part
 def deposit_eight(typing_context, out, band, low, middle, high, rise, fall, red, green, blue):  # type: ignore[no-untyped-def]
     """Add (red, green, blue) · Δ of bands [band, band + 8) to `out`.
 
@@ -78,19 +62,17 @@ def deposit_eight(typing_context, out, band, low, middle, high, rise, fall, red,
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array, first, *values = arguments
-        shares = _shares(builder, first, values[:5])
+        found, shares = Array(context, builder, signature.args[0], array), _shares(builder, first, values[:5])
         for channel, weight in enumerate(values[5:]):
-            index = ir.Constant(ir.IntType(64), channel)
-            address = _address(context, builder, signature.args[0], array, index, first)
-            eight = builder.load(address, align=4)
-            part = builder.fmul(shares, _spread(builder, weight), flags=_FAST)
-            builder.store(builder.fadd(eight, part, flags=_FAST), address, align=4)
+            place = found.place_of_eight(word(channel), first)
+            part = product(builder, shares, spread(builder, weight))
+            builder.store(total(builder, [builder.load(place, align=4), part]), place, align=4)
         return context.get_dummy_value()
 
     return types.void(out, types.int64, *_OVERLAP, types.float32, types.float32, types.float32), generate
 
 
-@_intrinsic
+@kernel_part
 def mean_of_eight(typing_context, bands, channel, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
     """Compute Σ Δ_j bands[channel, j] over [band, band + 8).
 
@@ -101,17 +83,13 @@ def mean_of_eight(typing_context, bands, channel, band, low, middle, high, rise,
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array, index, first, *overlap = arguments
-        shares = _shares(builder, first, overlap)
-        eight = builder.load(_address(context, builder, signature.args[0], array, index, first), align=4)
-        kind = ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR])
-        add_up = _builders.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{NUM}f32")
-        product = builder.fmul(shares, eight, flags=_FAST)
-        return builder.call(add_up, [ir.Constant(_FLOAT, 0.0), product], fastmath=_FAST)
+        eight = Array(context, builder, signature.args[0], array).eight(index, first)
+        return sum_of(builder, product(builder, _shares(builder, first, overlap), eight))
 
     return types.float32(bands, types.int64, types.int64, *_OVERLAP), generate
 
 
-@_intrinsic
+@kernel_part
 def add_means_of_eight(typing_context, means, settings, first, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
     """Add Σ Δ_j settings[j] over bands [band, band + 8) to the means, eight settings from the first on.
 
@@ -124,15 +102,13 @@ def add_means_of_eight(typing_context, means, settings, first, band, low, middle
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         means_array, array, first_setting, first_band, *overlap = arguments
         shares = _shares(builder, first_band, overlap)
-        address = _address(context, builder, signature.args[0], means_array, first_setting)
-        total = builder.load(address, align=4)
+        settings = Array(context, builder, signature.args[1], array)
+        place = Array(context, builder, signature.args[0], means_array).place_of_eight(first_setting)
+        parts = [builder.load(place, align=4)]
         for lane in range(NUM):
-            share = builder.extract_element(shares, ir.Constant(_INDEX, lane))
-            row = builder.add(first_band, ir.Constant(ir.IntType(64), lane))
-            values = builder.load(_address(context, builder, signature.args[1], array, row, first_setting), align=4)
-            part = builder.fmul(values, _spread(builder, share), flags=_FAST)
-            total = builder.fadd(total, part, flags=_FAST)
-        builder.store(total, address, align=4)
+            values = settings.eight(builder.add(first_band, word(lane)), first_setting)
+            parts.append(product(builder, values, spread(builder, extracted(builder, shares, lane))))
+        builder.store(total(builder, parts), place, align=4)
         return context.get_dummy_value()
 
     return types.void(means, settings, types.int64, types.int64, *_OVERLAP), generate

@@ -43,13 +43,19 @@ class VertexLight(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def turn_by(x, y):  # type: ignore[no-untyped-def]
-    """Find cos mδ and sin mδ for m of 1 to 4, of δ as a vector of any length; (0, 0) turns nothing."""
+def turned_by(x, y):  # type: ignore[no-untyped-def]
+    """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
     square = x * x + y * y
-    c1, s1 = np.float32(1), np.float32(0)
     if square > _LEAST:
         scale = np.float32(1) / math.sqrt(square)
-        c1, s1 = np.float32(x * scale), np.float32(y * scale)
+        return np.float32(x * scale), np.float32(y * scale)
+    return np.float32(1), np.float32(0)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _turn_by(x, y):  # type: ignore[no-untyped-def]
+    """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
+    c1, s1 = turned_by(x, y)
     c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
@@ -59,7 +65,7 @@ def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-unt
     """Add a light vector, turned.
 
     Args:
-        lanes: of it. (3 F,) float32. turn: from `turn_by`. side: −1 where azimuths run the other way round, else 1.
+        lanes: of it. (3 F,) float32. turn: from `_turn_by`. side: −1 where azimuths run the other way round, else 1.
         weight: that it counts with. is_added: to what is in `out`, which is written. (3 F,) float32
     """
     c1, s1, c2, s2, c3, s3, c4, s4 = turn
@@ -105,7 +111,7 @@ def _spread(vertices, tangents, lanes, rows, start, stop, tangent, out):  # type
             weight, point = weights[v, k], points[v, k]
             if weight > 0:
                 of_point = row(tangents, point)
-                turn = turn_by(dot(of_point, t), dot(of_point, b))
+                turn = _turn_by(dot(of_point, t), dot(of_point, b))
                 for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
                     of_one[i] = lanes[point, i]
                 add_turned(of_one, turn, np.float32(1), weight, True, sums)

@@ -20,8 +20,9 @@ from relume.btf.rings import taps_at
 from relume.moving.edges import differ
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import Surface
-from relume.moving.relief.light import ReliefLight, VertexLight, add_turned, turn_by
-from relume.moving.relief.numbers import EMPTY, HALF, NUMBERS, PAIRS, WIDTH
+from relume.moving.relief.lanes import add_texels, few_of, under_light
+from relume.moving.relief.light import ReliefLight, VertexLight, turned_by
+from relume.moving.relief.numbers import NUMBERS
 from relume.moving.relief.place import (
     AT_ONCE,
     LEVEL,
@@ -42,10 +43,11 @@ from relume.moving.relief.place import (
 from relume.moving.relief.tables import Cover
 from relume.parallel import for_shares
 from relume.project.texels import texels_at
+from relume.vector_code import call_for
 
 F32 = NDArray[np.float32]
 
-F = np.float32  # bytes by themselves would make doubles of products
+F = np.float32
 _SHARES = 4  # for each thread: rays that see fine texels cost more
 _ALIKE = np.float32(0.999)  # cosine of tangents that azimuths about a ray may be counted from together
 
@@ -128,85 +130,81 @@ def _join(owner, num_pixels, is_alike, out):  # type: ignore[no-untyped-def]
 # Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
 # which threads share; that was three quarters of the kernel.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _add_texels(weight, step, view, of_view, texel, share, first, out):  # type: ignore[no-untyped-def]
-    """Sum the numbers of four texels between four sides, in one line: sums stay in registers.
+def _ask(levels, rings, weights, columns, num_rays, of_one, asked, counts):  # type: ignore[no-untyped-def]
+    """Find the texels and the sides that rays show, and call for their numbers: they arrive while others are summed.
 
     Args:
-        first: of the four; where it is not 0 they are added. out: (24,)
+        of_one: room for what is found of one ray. asked: the same of all: texels, 8 a ray; shares of each, 8 a ray;
+            sides, 4 a ray; shares of each, 4 a ray; written. counts: texels of each, written.
     """
-    a, b, c, d = texel[first], texel[first + 1], texel[first + 2], texel[first + 3]
-    e, f, g, h = share[first], share[first + 1], share[first + 2], share[first + 3]
-    p, q, r, s = view[0], view[1], view[2], view[3]
-    of_p, of_q, of_r, of_s = of_view[0], of_view[1], of_view[2], of_view[3]
-    for i in range(NUMBERS):
-        one = e * F(weight[p, a, i]) + f * F(weight[p, b, i]) + g * F(weight[p, c, i]) + h * F(weight[p, d, i])
-        two = e * F(weight[q, a, i]) + f * F(weight[q, b, i]) + g * F(weight[q, c, i]) + h * F(weight[q, d, i])
-        three = e * F(weight[r, a, i]) + f * F(weight[r, b, i]) + g * F(weight[r, c, i]) + h * F(weight[r, d, i])
-        four = e * F(weight[s, a, i]) + f * F(weight[s, b, i]) + g * F(weight[s, c, i]) + h * F(weight[s, d, i])
-        before = out[i] if first else F(0)
-        out[i] = (
-            before
-            + of_p * step[p, i] * one
-            + of_q * step[q, i] * two
-            + of_r * step[r, i] * three
-            + of_s * step[s, i] * four
-        )
+    texel, share, view, of_view = of_one
+    texels, shares, views, of_views = asked
+    for j in range(num_rays):
+        counts[j] = texels_at(levels, columns[U + j], columns[V + j], columns[LEVEL + j], texel, share)
+        taps_at(rings, columns[THETA + j], columns[TURN + j], view, of_view)
+        for k in range(8):
+            texels[8 * j + k], shares[8 * j + k] = texel[k], share[k]
+        for k in range(4):
+            views[4 * j + k], of_views[4 * j + k] = view[k], of_view[k]
+            for first in range(0, counts[j], 2):  # two beside each other are two lines of the cache at most
+                call_for(weights, (view[k], texel[first], 0))
+                call_for(weights, (view[k], texel[first + 1], NUMBERS - 1))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _under(numbers, axes, light, channel):  # type: ignore[no-untyped-def]
-    """Sum numbers with the light of a channel: what `AXIS_OF` and `LANE_OF` say, the first axis in one loop."""
-    low, high = channel * HALF, PAIRS + channel * HALF
-    first = np.float32(0)
-    for i in range(HALF):
-        # where a lane is empty its light is nothing
-        first += numbers[i] * light[low + i] + numbers[HALF + i] * light[high + i]
-    l0, l1, l2, l8 = light[low], light[low + 1], light[low + 2], light[high]
-    second = numbers[16] * l0 + numbers[17] * l1 + numbers[18] * l2 + numbers[19] * light[low + 3]
-    second += numbers[20] * l8 + numbers[21] * light[high + 1]
-    third = numbers[22] * l0 + numbers[23] * l8 + numbers[EMPTY] * l2
-    return axes[channel, 0] * first + axes[channel, 1] * second + axes[channel, 2] * third
+def _arriving(numbers, axes, few_axes, tangents, vectors, about, shares, x, y, side):  # type: ignore[no-untyped-def]
+    """Sum numbers with the light between three vertices, of each channel.
+
+    Args:
+        numbers, axes, few_axes, vectors, about, shares, side: of `under_light`. tangents: of vertices.
+        x, y: axes of the texture, tuples.
+    """
+    a, b, c = about
+    t = row(tangents, a)
+    is_alike = min(dot(t, row(tangents, b)), dot(t, row(tangents, c))) > _ALIKE
+    red = green = blue = F(0)
+    for q in range(1 if is_alike else 3):  # each turned by itself where frames differ
+        t = row(tangents, about[q])
+        of_a = shares[0] if is_alike or q == 0 else F(0)
+        of_b = shares[1] if is_alike or q == 1 else F(0)
+        of_c = shares[2] if is_alike or q == 2 else F(0)
+        turn = turned_by(dot(t, x), dot(t, y))
+        more = under_light(numbers, axes, few_axes, vectors, about, (of_a, of_b, of_c), turn, side)
+        red, green, blue = red + more[0], green + more[1], blue + more[2]
+    return red, green, blue
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _show(  # type: ignore[no-untyped-def]
-    rings, tables, scale, turned, color, pixel_angle, places, normals, hits, directions, vertex, weight, light, eye,
-    rows, start, stop, out,
+    rings, tables, few_axes, scale, turned, color, pixel_angle, places, normals, hits, directions, vertex, weight,
+    light, eye, rows, start, stop, out,
 ):  # fmt: skip
     """Show what rays rows[start:stop] see. out: (rays, 3)"""
     face, uv, distance = hits
     levels, weights, step, axes = tables
     tangents, vectors = light
-    view, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
-    texel, share_of = np.empty(8, np.int32), np.empty(8, np.float32)
-    blended, arriving = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
-    numbers, columns = np.empty(NUMBERS, np.float32), np.zeros(NUM_COLUMNS * AT_ONCE, np.float32)
+    of_one = np.empty(8, np.int32), np.empty(8, np.float32), np.empty(4, np.int32), np.empty(4, np.float32)
+    texels, shares_of = np.empty(8 * AT_ONCE, np.int32), np.empty(8 * AT_ONCE, np.float32)
+    views, of_views = np.empty(4 * AT_ONCE, np.int32), np.empty(4 * AT_ONCE, np.float32)
+    counts, numbers = np.empty(AT_ONCE, np.int64), np.empty(NUMBERS, np.float32)
+    columns = np.zeros(NUM_COLUMNS * AT_ONCE, np.float32)
     finest = np.float32(max(levels[0, 1], levels[0, 2]))
     for begin in range(start, stop, AT_ONCE):
         num_rays = min(AT_ONCE, stop - begin)
         gather(places, normals, face, uv, distance, directions, vertex, weight, rows, begin, num_rays, columns)
         lay(columns, num_rays, eye, pixel_angle, turned, scale, finest)
+        _ask(levels, rings, weights, columns, num_rays, of_one, (texels, shares_of, views, of_views), counts)
         for j in range(num_rays):
             ray = rows[begin + j]
-            num = texels_at(levels, columns[U + j], columns[V + j], columns[LEVEL + j], texel, share_of)
-            taps_at(rings, columns[THETA + j], columns[TURN + j], view, of_view)
-            a, b, c = about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
+            for first in range(0, counts[j], 4):
+                add_texels(weights, step, views, of_views, 4 * j, texels, shares_of, 8 * j + first, first > 0, numbers)
+            about = vertex[ray, 0], vertex[ray, 1], vertex[ray, 2]
             shares = weight[ray, 0], weight[ray, 1], weight[ray, 2]
-            x, y, t = three(columns, X, j), three(columns, Y, j), row(tangents, a)
-            is_alike = min(dot(t, row(tangents, b)), dot(t, row(tangents, c))) > _ALIKE
-            for q in range(1 if is_alike else 3):  # each turned by itself where frames differ
-                t = row(tangents, about[q])
-                of_a = shares[0] if is_alike or q == 0 else F(0)
-                of_b = shares[1] if is_alike or q == 1 else F(0)
-                of_c = shares[2] if is_alike or q == 2 else F(0)
-                for i in range(3 * WIDTH):
-                    blended[i] = of_a * vectors[a, i] + of_b * vectors[b, i] + of_c * vectors[c, i]
-                add_turned(blended, turn_by(dot(t, x), dot(t, y)), columns[SIDE + j], F(1), q > 0, arriving)
-            for first in range(0, num, 4):
-                _add_texels(weights, step, view, of_view, texel, share_of, first, numbers)
-            for channel in range(3):
-                more = color[channel] * _under(numbers, axes, arriving, channel)
-                out[ray, channel] = max(out[ray, channel] + more, F(0))
+            x, y, side = three(columns, X, j), three(columns, Y, j), columns[SIDE + j]
+            more = _arriving(numbers, axes, few_axes, tangents, vectors, about, shares, x, y, side)
+            out[ray, 0] = max(out[ray, 0] + color[0] * more[0], F(0))
+            out[ray, 1] = max(out[ray, 1] + color[1] * more[1], F(0))
+            out[ray, 2] = max(out[ray, 2] + color[2] * more[2], F(0))
 
 
 def show_texels(
@@ -252,7 +250,7 @@ def _args_of(cover: Cover, surface: Surface, places: F32, sight: Sight, light: V
     texels, seen = cover.texels, sight.seen
     turned = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
     return (
-        texels.btf.rings, cover.tables, np.float32(texels.scale), turned, cover.color, np.float32(sight.pixel_angle),
-        places, surface.vertices.normal, (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions,
-        seen.vertex, seen.weight, light, sight.eye,
+        texels.btf.rings, cover.tables, few_of(cover.tables.axes), np.float32(texels.scale), turned, cover.color,
+        np.float32(sight.pixel_angle), places, surface.vertices.normal,
+        (seen.hits.face, seen.hits.uv, seen.hits.distance), seen.directions, seen.vertex, seen.weight, light, sight.eye,
     )  # fmt: skip
