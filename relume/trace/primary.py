@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -10,7 +11,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges, num_threads
+from relume.parallel import for_ranges, for_shares, num_threads
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene, intersect, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
@@ -102,8 +103,18 @@ def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> 
     """
     width, height = size
     half = np.tan(camera.yfov / 2)
-    local = np.stack(
-        [(2 * x / width - 1) * half * width / height, (1 - 2 * y / height) * half, np.full_like(x, -1)], axis=-1
-    ).astype(np.float64)
-    world = local @ camera.to_world[:3, :3].T
-    return np.asarray(world / np.linalg.norm(world, axis=-1, keepdims=True), np.float32)
+    out = np.empty((len(x), 3), np.float32)
+    of_camera = np.ascontiguousarray(camera.to_world[:3, :3], np.float64), half * width / height, half, width, height
+    for_shares(lambda start, stop: _aim(*of_camera, x, y, start, stop, out), len(x))
+    return out
+
+
+@nb.njit(nogil=True, cache=True)
+def _aim(rotation, half_width, half_height, width, height, x, y, start, stop, out):  # type: ignore[no-untyped-def]
+    """Aim rays [start, stop), in double precision: pixels of wide pictures are a ten thousandth apart."""
+    for r in range(start, stop):
+        right, up = (2 * x[r] / width - 1) * half_width, (1 - 2 * y[r] / height) * half_height
+        length = math.sqrt(right * right + up * up + 1)
+        for axis in range(3):
+            along = rotation[axis, 0] * right + rotation[axis, 1] * up - rotation[axis, 2]
+            out[r, axis] = along / length
