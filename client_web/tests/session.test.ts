@@ -232,6 +232,20 @@ describe("a connection that is lost", () => {
     ]);
   });
 
+  test("takes with it what was to be acknowledged: the next one does not know of it", async () => {
+    let drawn: () => void = () => undefined;
+    handlers.frame.mockReturnValueOnce(new Promise((done) => (drawn = done)));
+    socket().hello(LOOK, 0);
+    socket().onmessage({ data: frameOf(0) });
+    socket().onclose({ code: 1006, reason: "" });
+    vi.advanceTimersByTime(10_000);
+    socket().hello(LOOK, 0);
+    drawn();
+    socket().onmessage({ data: frameOf(0) });
+    await vi.waitFor(() => expect(socket().sent.length).toBeGreaterThan(0));
+    expect(socket().sent).toEqual([{ type: "ack", frame: 7 }]);
+  });
+
   test("is not tried again where the server says that it is of no use", () => {
     socket().hello(LOOK, 0);
     socket().onclose({ code: 4404, reason: "no such bake" });

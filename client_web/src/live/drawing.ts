@@ -51,6 +51,8 @@ const away = new Set<string>();
 const dirty = new Set<string>();
 /** Views of which the server sent a picture that is wanted while one was being drawn here, older than it. */
 const overtaken = new Set<string>();
+/** Of each view: who waits for its next picture. A hand that goes on moving must not keep frames from being acknowledged. */
+const waiting = new Map<string, (() => void)[]>();
 let running: Promise<void> | null = null;
 let durations: number[] = [];
 
@@ -131,12 +133,18 @@ async function loadOfLobes({ of, evaluator }: Here): Promise<void> {
   evaluator.keep(OF_LOBES, await loadArray(of, OF_LOBES));
 }
 
-/** One picture at a time, each from the newest eye; resolves when none is left to be drawn. */
+/** One picture at a time, each from the newest eye; resolves when the view has been drawn once, or will not be. */
 function redraw(view: string): Promise<void> {
   dirty.add(view);
-  running ??= drawAll().finally(() => (running = null));
-  return running;
+  const isDrawn = new Promise<void>((done) => waiting.set(view, [...(waiting.get(view) ?? []), done]));
+  running ??= drawAll().finally(() => {
+    running = null;
+    for (const asked of waiting.values()) for (const done of asked) done();
+    waiting.clear();
+  });
+  return isDrawn;
 }
+
 
 async function drawAll(): Promise<void> {
   for (let view = first(dirty); view !== undefined && here !== null; view = first(dirty)) {
@@ -144,12 +152,16 @@ async function drawAll(): Promise<void> {
     overtaken.delete(view);
     const { of } = here;
     const start = performance.now();
+    const asked = waiting.get(view) ?? [];
+    waiting.delete(view);
     try {
       const frame = await drawn(here, view);
       if (frame !== null && here?.of === of && !overtaken.has(view)) await takeFrame(of, frame);
     } catch (error) {
       if (here?.of !== of) return;
       return here.evaluator.isLost ? loseContext() : giveUp(`${(error as Error).message}; the server draws instead.`);
+    } finally {
+      for (const done of asked) done();
     }
     judge(performance.now() - start);
   }

@@ -124,7 +124,10 @@ export class Session {
   private show(frame: Frame): void {
     this.queue.confirm(frame.header.revision);
     this.shownRevision = Math.max(this.shownRevision, frame.header.revision);
-    const acknowledge = () => void this.send({ type: "ack", frame: frame.header.frame });
+    const { number } = this.socket;
+    const acknowledge = () => {
+      if (number === this.socket.number) this.send({ type: "ack", frame: frame.header.frame });
+    };
     this.handlers.frame(frame).then(acknowledge, acknowledge);
   }
 

@@ -26,6 +26,8 @@ export interface SocketHandlers {
 
 export class LiveSocket {
   private socket: WebSocket | null = null;
+  /** How many connections there have been: what came over one is no longer known over the next. */
+  number = 0;
   private attempt = 0;
   private retry = 0;
   private greeted = false;
@@ -51,6 +53,7 @@ export class LiveSocket {
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.handlers.received(event.data);
     socket.onclose = (event) => this.lost(socket, event);
     this.socket = socket;
+    this.number += 1;
   }
 
   /** The server has said hello: messages may go, and `resume` names the session from now on. */

@@ -1,9 +1,10 @@
 /** The shown picture's histogram, made when the hand rests. */
-import { useLayoutEffect, useMemo, useRef } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { histogramOf, MAX_STOP, MIN_STOP, NUM_BINS, percentile, type Histogram } from "../picture/histogram";
 import { stage } from "../picture/stage";
 import { bake } from "../state/bakes";
-import { settled } from "../state/fidelity";
+import { drawn } from "../state/display";
+import { exact } from "../state/fidelity";
 import { exposure } from "../state/look";
 import { histogramOpen } from "../state/panels";
 import { viewName } from "../state/views";
@@ -62,23 +63,29 @@ function paint(canvas: HTMLCanvasElement, histogram: Histogram): void {
   }
 }
 
-function useHistogram(): Histogram | null {
-  const held = useRef<Histogram | null>(null);
-  const rest = settled.value;
+const REST_MS = 250; // after the last frame
+
+/** Of the picture that is shown once no more frames come, and whether that was exact. */
+function useHistogram(): { histogram: Histogram; isExact: boolean } | null {
+  const [rested, setRested] = useState(-1);
+  const frame = drawn.value;
+  useEffect(() => {
+    const timer = setTimeout(() => setRested(frame), REST_MS);
+    return () => clearTimeout(timer);
+  }, [frame]);
   return useMemo(() => {
     const { isThere, pixels } = stage.active;
-    if (rest && isThere) held.current = histogramOf(pixels.words, exposure.value);
-    return held.current;
-  }, [rest, exposure.value, bake.value, viewName.value]);
+    return rested < 0 || !isThere ? null : { histogram: histogramOf(pixels.words, exposure.value), isExact: exact.value };
+  }, [rested, exact.value, exposure.value, bake.value, viewName.value]);
 }
 
 function Bars() {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const histogram = useHistogram();
+  const found = useHistogram();
   useLayoutEffect(() => {
-    if (histogram !== null) paint(canvas.current as HTMLCanvasElement, histogram);
-  }, [histogram]);
-  const words = histogram === null ? "Waiting for the exact picture" : summary(histogram);
+    if (found !== null) paint(canvas.current as HTMLCanvasElement, found.histogram);
+  }, [found]);
+  const words = found === null ? "Waiting for the picture" : `${found.isExact ? "" : "not exact yet: "}${summary(found.histogram)}`;
   return (
     <figure class="histogram" aria-label="Histogram, stops about middle grey">
       <canvas ref={canvas} aria-hidden="true" style={{ width: `${WIDTH}px`, height: `${HEIGHT}px` }} />
