@@ -69,7 +69,7 @@ class Array:
 
 
 def picked(builder: Any, one: Any, other: Any, places: Iterable[int]) -> Any:
-    """Take lanes of two vectors; those of the second are counted from eight on."""
+    """Take lanes of two vectors, `one` and `other`; places of the second are counted from eight on. builder: LLVM's"""
     return builder.shuffle_vector(one, other, ir.Constant(_WHOLE, list(places)))
 
 
@@ -80,17 +80,17 @@ def spread(builder: Any, value: Any) -> Any:
 
 
 def extracted(builder: Any, vector: Any, lane: int) -> Any:
-    """One lane."""
+    """One lane of a vector. builder: LLVM's"""
     return builder.extract_element(vector, ir.Constant(_INDEX, lane))
 
 
 def product(builder: Any, one: Any, other: Any) -> Any:
-    """a b, of floats or of all lanes."""
+    """one · other, of floats or of all lanes. builder: LLVM's"""
     return builder.fmul(one, other, flags=FAST)
 
 
 def difference(builder: Any, one: Any, other: Any) -> Any:
-    """a − b, of floats or of all lanes."""
+    """one − other, of floats or of all lanes. builder: LLVM's"""
     return builder.fsub(one, other, flags=FAST)
 
 
@@ -103,7 +103,7 @@ def total(builder: Any, values: Sequence[Any]) -> Any:
 
 
 def inner(builder: Any, ones: Iterable[Any], others: Iterable[Any]) -> Any:
-    """Σ a b of some floats or vectors, lane by lane."""
+    """Σ one · other of ones and others, floats or vectors, lane by lane. builder: LLVM's"""
     return total(builder, [product(builder, a, b) for a, b in zip(ones, others, strict=True)])
 
 

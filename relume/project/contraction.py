@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.project.eight_bands import NUM as EIGHT
+from relume.vector_code import NUM as EIGHT
 
 F32 = NDArray[np.float32]
 

@@ -14,9 +14,9 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import angles_into
-from relume.project.eight_bands import NUM as EIGHT
 from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight
 from relume.project.overlap import overlap_of
+from relume.vector_code import NUM as EIGHT
 
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
-from relume.project.eight_bands import NUM as EIGHT
 from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
 from relume.project.project_kernel import project_points
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
+from relume.vector_code import NUM as EIGHT
 
 F32 = NDArray[np.float32]
 

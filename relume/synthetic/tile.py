@@ -32,7 +32,11 @@ class Tile(NamedTuple):
 
     @classmethod
     def of_one(cls, positions: F64, normals: F64, faces: I64, terms: Terms) -> Self:
-        """One whose faces all have the same material."""
+        """One whose faces all have the same material.
+
+        Args:
+            positions, normals, faces: see the class. terms: of the material.
+        """
         return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
 
 

@@ -32,6 +32,7 @@ from relume.vector_code import (
     word,
 )
 
+_tuple: Any = types.UniTuple  # carries no types
 _TEXELS, _SIDES, _CORNERS, _CHANNELS = 4, 4, 3, 3
 _ORDERS = [int(order) for order in OF_ORDER[:, :HALF].argmax(axis=0)]  # of a channel's pairs of lanes
 _FEW = [int(lane) for lane in LANE_OF[2 * HALF :]]  # that the second and the third axis count for
@@ -120,8 +121,8 @@ def under_light(typing_context, numbers, axes, few_axes, vectors, about, shares,
             found.append(total(builder, [summed, product(builder, axes.one(channel, word(lone_axis)), of_lone)]))
         return context.make_tuple(builder, signature.return_type, found)
 
-    three, corner = types.UniTuple(types.float32, 3), types.UniTuple(types.uint32, 3)
-    given = corner, three, types.UniTuple(types.float32, 2), types.float32
+    three, corner, two = (_tuple(*of) for of in ((types.float32, 3), (types.uint32, 3), (types.float32, 2)))
+    given = corner, three, two, types.float32
     return three(numbers, axes, few_axes, vectors, *given), generate
 
 
