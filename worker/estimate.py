@@ -41,8 +41,9 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
     """Wall seconds that a bake will take; None where nothing was measured yet.
 
     A plan counts rays that are never traced: edges that are not there, lights behind the surface, shadows that are
-    predicted. So the rate is that of planned rays. Tiny bakes run one task at a time, others `num_workers`; the others'
-    rate includes their own overhead, so a bake is judged by its like where there is one.
+    predicted. So the rate is that of planned work. Plans of before tell rays alone and judge where there is no other.
+    Tiny bakes run one task at a time, others `num_workers`; the others' rate includes their own overhead, so a bake is
+    judged by its like where there is one.
 
     Args:
         plan: of the bake.
@@ -50,7 +51,17 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
         num_workers: tasks that run at once.
         crowded: how many will want each core while it runs.
     """
+    others = [each for each in finished if each.plan.work_s] if plan.work_s else []
+    finished, work_of = (others, _work_s) if others else (finished, _num_rays)
     alike = [each for each in finished if is_tiny(each.plan) == is_tiny(plan)] or finished
-    planned_rays = sum(each.plan.num_rays for each in alike)
+    planned = sum(work_of(each.plan) for each in alike)
     wall_s = sum(each.task_s / each.crowding / (1 if is_tiny(each.plan) else num_workers) for each in alike)
-    return crowded * plan.num_rays * wall_s / planned_rays if planned_rays and wall_s else None
+    return crowded * work_of(plan) * wall_s / planned if planned and wall_s else None
+
+
+def _work_s(plan: Plan) -> float:
+    return plan.work_s
+
+
+def _num_rays(plan: Plan) -> float:
+    return plan.num_rays

@@ -51,6 +51,7 @@ _EMISSION_BYTES = 12
 _LAYER_BYTES = 12 + 12 + 1 + MOST_MIRRORS * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
+_RAY_NS, _TRIANGLE_US = 5.0, 2.0  # of one core, on scenes of 200 to a million triangles
 
 
 class Sampled(NamedTuple):
@@ -99,9 +100,11 @@ class SampledViews:
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
+        num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe)
         return Plan(
             num_view_samples=samples,
-            num_rays=samples * recipe.num_lights + bounds.camera_rays(scene, recipe),
+            num_rays=num_rays,
+            work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
             store_bytes=in_store + bounds.triangles_bytes(scene) + _METADATA_BYTES,
             peak_bytes=bounds.process_bytes(scene)
             + max(bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)),

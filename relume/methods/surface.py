@@ -54,6 +54,7 @@ _VERTEX_BYTES = 12 + 2 * 4 * POINTS_A_VERTEX
 _MAKING_BYTES_A_NODE = 600  # while nodes are shared: their surface, their keys, and the order of these
 _CELL_BYTES = POINTS_A_CELL * (24 + 2 * RAYS_A_CELL_POINT) + 64
 _MAKING_BYTES_A_CELL = 4000
+_RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # of one core, on scenes of 200 to a million triangles
 
 
 class SurfaceMethod:
@@ -87,9 +88,11 @@ class SurfaceMethod:
         nodes = most_nodes(bounds.num_triangles(scene), recipe.num_points)
         triangles = bounds.num_triangles(scene)
         textures = bounds.texture_bytes(scene)
+        num_rays = points * (recipe.num_lights + rays) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT)
         return Plan(
             num_view_samples=points,
-            num_rays=points * (recipe.num_lights + rays) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT),
+            num_rays=num_rays,
+            work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
             store_bytes=points * (_POINT_BYTES + 2 * rays + bits)
             + of_cells * bits
             + num_cells * _CELL_BYTES

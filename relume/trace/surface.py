@@ -102,6 +102,23 @@ def surface_at(
     return Surface(Points(position, normal, tangent, seed), diffuse, specular, uv, roughness, emission)
 
 
+def places_on(geometry: Geometry, face: NDArray[np.integer], uv: F32, normal: F32) -> F32:
+    """Points of faces, moved off them, as `surface_at` has them, and nothing else of what is there.
+
+    Args:
+        geometry: the triangles. face: numbers of n faces.
+        uv: places on them, barycentric, of the second and third corner. (n, 2)
+        normal: of the faces, unit, to the side that the points are on. (n, 3)
+    Returns:
+        (n, 3) float32
+    """
+    p = geometry.positions[geometry.faces[face]]
+    twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    shares = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
+    inside = _off_edges(shares, p, twice_area, OFF_EDGES * geometry.epsilon)
+    return np.asarray(np.einsum("nk,nkc->nc", inside, p) + geometry.epsilon * normal, np.float32)
+
+
 def _surface_at(
     geometry: Geometry,
     hits: Hits,

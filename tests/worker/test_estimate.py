@@ -1,8 +1,16 @@
 """How long a bake is said to take before it starts."""
 
+from dataclasses import replace
+
 import pytest
 
-from relume.bake import Plan
+from relume.bake import Plan, Recipe
+from relume.methods.registry import METHODS
+from relume.scene.archive import make_scene
+from relume.scene.cornell import sunny_sky
+from relume.scene.demo.still_life import look_at
+from relume.scene.demo.surfaces import sphere
+from relume.scene.model import Material
 from worker.estimate import Finished, crowding, seconds_for
 from worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
 
@@ -47,3 +55,30 @@ def test_a_busy_machine_takes_longer_and_does_not_make_later_bakes_look_slow():
 def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
     monkeypatch.setattr("worker.estimate.num_cores", lambda: 2)
     assert [crowding(load) for load in (0.0, 1.9, 5.0)] == [1.0, 1.0, 2.5]
+
+
+def test_triangles_take_their_time():
+    few, many = (METHODS["surface"].plan(ball(n), Recipe("surface", ("front",), (64, 48), 60)) for n in (4, 64))
+    assert few.num_rays == many.num_rays
+    assert seconds_for(many, [Finished(few, 60.0)], 1) > 60.0
+
+
+def ball(fineness):
+    mesh = sphere(1.0, fineness).mesh("ball", 0)
+    material = Material("Clay", ({"model": "lambert", "color": [0.5, 0.5, 0.5]},))
+    camera = look_at("front", (0.0, 0.5, 4.0), (0.0, 0.0, 0.0), 0.7)
+    return make_scene("ball", [mesh], [material], [camera], sunny_sky())
+
+
+def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
+    recipe = Recipe("direct", ("front",), (640, 480), 500)
+    direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "surface"))
+    found = seconds_for(surface, [Finished(direct, 10.0)], 1)
+    assert found == pytest.approx(10.0 * surface.work_s / direct.work_s)
+    assert found > 5 * 10.0 * surface.num_rays / direct.num_rays
+
+
+def test_plans_that_tell_rays_alone_judge_where_there_are_no_others():
+    told = replace(LARGE, work_s=10.0)
+    assert seconds_for(replace(told, work_s=50.0), [Finished(told, 20.0), Finished(LARGE, 900.0)], 1) == 100.0
+    assert seconds_for(told, [Finished(LARGE, 30.0)], 1) == pytest.approx(30.0)

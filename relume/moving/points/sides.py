@@ -18,7 +18,7 @@ from relume.scene.model import Camera
 from relume.trace.geometry import Geometry
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, camera_directions, trace_from
-from relume.trace.surface import surface_at
+from relume.trace.surface import places_on
 
 F32 = NDArray[np.float32]
 
@@ -63,9 +63,8 @@ def _seen_from(
     normal = normals[face] * np.where(sides % 2 == 0, 1, -1)[:, None].astype(np.float32)
     root, v = np.sqrt(rng.random(len(sides))), rng.random(len(sides))
     uv = np.stack([root * (1 - v), root * v], axis=1).astype(np.float32)
-    surface = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal)
     directions = lobe_directions(normal, 1.0, rng)
-    hits = trace_from(geometry.embree, surface.points.position, directions)
+    hits = trace_from(geometry.embree, places_on(geometry, face, uv, normal), directions)
     return np.stack([sides, _sides_hit(normals, hits, directions, outside)])
 
 
