@@ -1,6 +1,6 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
 import { importMaterial, isFound } from "../src/library/library";
-import { placeOf, pointOf, rangeOf } from "../src/library/map";
+import { highlightOf, placeOf, pointOf, rangeOf } from "../src/library/map";
 
 const POINTS = [
   { f0: 0.04, sigma: 0.02 },
@@ -27,6 +27,17 @@ describe("the map of materials", () => {
   it("keeps places outside on the edge", () => {
     expect(pointOf({ x: -3, y: 0 }, RANGE).f0).toBeCloseTo(0.04);
     expect(pointOf({ x: 0, y: 9 }, RANGE).sigma).toBeCloseTo(0.5);
+  });
+});
+
+describe("the highlight of a material on the map", () => {
+  const term = (model: string, params: object) => ({ model, color: [1, 1, 1], texture: null, params, curves: {} }) as never;
+
+  it("is that of its Cook–Torrance term, of several channels their mean", () => {
+    expect(highlightOf([])).toBeNull();
+    expect(highlightOf([term("lambert", {}), term("ggx", { roughness: 0.3 })])).toBeNull();
+    const { f0, sigma } = highlightOf([term("lambert", {}), term("cook_torrance", { sigma: [0.1, 0.2, 0.3], ior: 3, extinction: 0 })]) ?? {};
+    expect([f0, sigma]).toEqual([expect.closeTo(0.25), expect.closeTo(0.2)]);
   });
 });
 

@@ -70,10 +70,11 @@ export class Eye {
     this.keep();
   };
 
-  /** From now on turn about what the middle of the picture shows. */
+  /** From now on turn about what the middle of the picture shows; where nobody says what that is, about what it was. */
   async grasp(): Promise<void> {
     const [width, height] = eyeSize(...this.size);
-    const { position } = await askProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
+    const middle = askProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
+    const position = await middle.then((answer) => answer.position, () => null);
     if (position !== null) this.motion.restate((orbit) => orbitOf(frameOf(orbit), this.bounds, position as Triple));
   }
 

@@ -2,17 +2,23 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { getMaterialMap, materialAt } from "../net/api";
 import type { MaterialMapBody } from "../protocol";
-import { selectedMaterial } from "../state/selection";
+import { selectedMaterial, terms } from "../state/selection";
 import { useDrag } from "../ui/drag";
 import { attempt, note } from "../ui/toasts";
 import { giveTerms, library } from "./library";
-import { placeOf, pointOf, rangeOf, type Place } from "./map";
+import { highlightOf, placeOf, pointOf, rangeOf, type Place } from "./map";
 
 const [WIDTH, HEIGHT] = [288, 180];
 const STEP = 0.01;
+const MIDDLE: Place = { x: 0.5, y: 0.5 };
 
-/** Ask for the newest place only: an answer that a later move has overtaken is dropped. */
-function useChoice(range: ReturnType<typeof rangeOf> | null) {
+const clamp = (share: number) => Math.min(1, Math.max(0, share));
+const inside = ({ x, y }: Place): Place => ({ x: clamp(x), y: clamp(y) });
+const wordsOf = ({ f0, sigma }: { f0: number; sigma: number }) =>
+  `reflectance ${(100 * f0).toFixed(1)} %, roughness ${sigma.toFixed(3)}`;
+
+/** Ask for the newest place only: an answer that a later move has overtaken is dropped. `done` when none is awaited. */
+function useChoice(range: ReturnType<typeof rangeOf> | null, done: () => void) {
   const newest = useRef(0);
   return async (place: Place) => {
     const target = selectedMaterial.value;
@@ -21,9 +27,10 @@ function useChoice(range: ReturnType<typeof rangeOf> | null) {
     const asked = ++newest.current;
     const { f0, sigma } = pointOf(place, range);
     await attempt(async () => {
-      const terms = await materialAt(f0, sigma);
-      if (asked === newest.current) giveTerms(target, "Material map", terms);
+      const found = await materialAt(f0, sigma);
+      if (asked === newest.current) giveTerms(target, "Material map", found);
     });
+    if (asked === newest.current) done();
   };
 }
 
@@ -53,20 +60,22 @@ function Plane({ map, range }: { map: MaterialMapBody; range: ReturnType<typeof 
 
 export function NavigationMap() {
   const [map, setMap] = useState<MaterialMapBody | null>(null);
-  const [place, setPlace] = useState<Place>({ x: 0.5, y: 0.5 });
+  const [hand, setHand] = useState<Place | null>(null); // until the material has come there
   useEffect(() => void attempt(async () => setMap(await getMaterialMap())), []);
   const range = map === null ? null : rangeOf(map.points);
-  const choose = useChoice(range);
+  const choose = useChoice(range, () => setHand(null));
+  const own = highlightOf(terms.value);
+  const here = hand ?? (own === null || range === null ? null : inside(placeOf(own, range)));
   const go = (x: number, y: number) => {
-    const next = { x: Math.min(1, Math.max(0, x)), y: Math.min(1, Math.max(0, y)) };
-    setPlace(next);
+    const next = inside({ x, y });
+    if (selectedMaterial.peek() !== null) setHand(next);
     void choose(next);
   };
   const point = (event: PointerEvent & { currentTarget: Element }) => {
     const box = event.currentTarget.getBoundingClientRect();
     go((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
   };
-  const hand = useDrag({
+  const drag = useDrag({
     begin(event) {
       if (event.button !== 0) return false;
       point(event);
@@ -80,11 +89,11 @@ export function NavigationMap() {
     event.preventDefault();
     event.stopPropagation();
     const size = event.shiftKey ? STEP / 5 : STEP;
-    go(place.x + size * (step[0] as number), place.y + size * (step[1] as number));
+    const from = here ?? MIDDLE;
+    go(from.x + size * (step[0] as number), from.y + size * (step[1] as number));
   };
   if (map === null || range === null) return <p>Loading the map…</p>;
-  const { f0, sigma } = pointOf(place, range);
-  const words = `reflectance ${(100 * f0).toFixed(1)} %, roughness ${sigma.toFixed(3)}`;
+  const words = here === null ? "no material of the map" : wordsOf(pointOf(here, range));
   return (
     <div class="material-map">
       <svg
@@ -93,10 +102,10 @@ export function NavigationMap() {
         role="application"
         aria-label={`Map of materials; arrow keys move the point. Now ${words}`}
         onKeyDown={key}
-        {...hand}
+        {...drag}
       >
         <Plane map={map} range={range} />
-        <circle class="here" cx={place.x * WIDTH} cy={place.y * HEIGHT} r={6} />
+        {here !== null && <circle class="here" cx={here.x * WIDTH} cy={here.y * HEIGHT} r={6} />}
       </svg>
       <p class="material-map-words">
         {words} <span>→ brighter, ↓ rougher</span>

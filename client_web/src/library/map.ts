@@ -1,4 +1,6 @@
 /** Sun's navigation map: where a point of the plane lies on the plot. Reflectance by its root, roughness by its logarithm. */
+import type { ParamValue, Term } from "../protocol";
+
 export interface Range {
   f0: [low: number, high: number];
   sigma: [low: number, high: number];
@@ -15,6 +17,17 @@ const between = (at: number, [low, high]: [number, number]) => low + Math.min(1,
 export function rangeOf(points: readonly { f0: number; sigma: number }[]): Range {
   const [f0, sigma] = [points.map((p) => p.f0), points.map((p) => p.sigma)];
   return { f0: [Math.min(...f0), Math.max(...f0)], sigma: [Math.min(...sigma), Math.max(...sigma)] };
+}
+
+const mean = (value: ParamValue | undefined, otherwise: number): number =>
+  value === undefined ? otherwise : typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
+
+/** Where a material's highlight is on the map; null where it has none of its kind. */
+export function highlightOf(terms: readonly Term[]): { f0: number; sigma: number } | null {
+  const params = terms.find(({ model }) => model === "cook_torrance")?.params;
+  if (params === undefined) return null;
+  const [n, k] = [mean(params.ior, 1.5), mean(params.extinction, 0)];
+  return { f0: ((n - 1) ** 2 + k ** 2) / ((n + 1) ** 2 + k ** 2), sigma: mean(params.sigma, 0.2) };
 }
 
 const roots = (range: Range): [number, number] => [Math.sqrt(range.f0[0]), Math.sqrt(range.f0[1])];

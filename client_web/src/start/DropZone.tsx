@@ -124,6 +124,11 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
           </>
         )}
       </div>
+      {environment !== null && scenes.length === 0 && (
+        <p class="quiet" role="status">
+          Add the scene that it shall light. A scene that is here already takes it in the editor, under <i>Environment</i>.
+        </p>
+      )}
     </section>
   );
 }

@@ -15,7 +15,6 @@ import { pinning } from "../state/comments";
 import { hoveredMaterial, select } from "../state/selection";
 import { pointedView } from "../state/views";
 import { useDrag } from "../ui/drag";
-import { attempt } from "../ui/toasts";
 import { leavePicture, probeAt } from "./probe";
 
 type Pulled = PointerEvent & { readonly currentTarget: Element };
@@ -51,7 +50,7 @@ export function usePointer(screen: Screen | null, view: string) {
   const begin = (event: PointerEvent) => {
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
     const eye = eyeOf(view);
-    if (eye !== null) void attempt(() => eye.grasp());
+    void eye?.grasp();
     return event.button <= (eye === null ? 1 : 2);
   };
   const move = (event: PointerEvent) => {
