@@ -10,7 +10,25 @@ import asyncio
 import concurrent.futures
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from dataclasses import dataclass
 from typing import Any
+
+from relume.errors import RelumeError
+
+
+@dataclass(frozen=True)
+class _Failed:
+    """What a call has raised, on its way back."""
+
+    error: Exception
+
+
+def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Call it in the worker. A full disk is what the bake says, once; raised here, Dask would log it with its trace."""
+    try:
+        return fn(*args, **kwargs)
+    except (RelumeError, OSError, MemoryError) as error:
+        return _Failed(error)
 
 
 class DaskExecutor(Executor):
@@ -25,7 +43,7 @@ class DaskExecutor(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Hand a call out. Its future raises KilledWorker where the worker died, CancelledError where all went away."""
-        task = self._client.submit(fn, *args, pure=False, **kwargs)
+        task = self._client.submit(_attempt, fn, *args, pure=False, **kwargs)
         outcome: Future[Any] = Future()
         self._client.loop.add_callback(_follow, task, outcome)
         return outcome
@@ -41,4 +59,7 @@ async def _follow(task: Any, outcome: Future[Any]) -> None:
     except Exception as error:
         outcome.set_exception(error)
     else:
-        outcome.set_result(result)
+        if isinstance(result, _Failed):
+            outcome.set_exception(result.error)
+        else:
+            outcome.set_result(result)

@@ -73,7 +73,10 @@ class BakeService:
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)
         self._board = StatusBoard(self.ledger)
-        self._complaint = Complaint(log, "the queue of bakes cannot be read")
+        self._complaints = {
+            tiny: Complaint(log, f"the queue of {kind} cannot be worked on")
+            for tiny, kind in ((False, "bakes"), (True, "small bakes"))
+        }
         self._owner = new_owner()
         self._closing = threading.Event()
         self._is_crowding = threading.Event()
@@ -221,7 +224,7 @@ class BakeService:
             try:
                 self._wakes[tiny].clear()
                 has_run = self._run_next(tiny)
-                self._complaint.well()
+                self._complaints[tiny].well()
                 if has_run:
                     at_work_s = time.monotonic()
                     continue
@@ -229,7 +232,7 @@ class BakeService:
                     self._executors.stop_cluster()
                 self._wakes[tiny].wait(POLL_S)
             except Exception as error:  # the database may be away for a while; the lane must outlive that
-                self._complaint.meet(error)
+                self._complaints[tiny].meet(error)
                 self._closing.wait(POLL_S)
 
     def _run_next(self, tiny: bool) -> bool:

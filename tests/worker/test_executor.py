@@ -2,6 +2,7 @@
 
 import asyncio
 import concurrent.futures
+import errno
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -80,6 +81,19 @@ def test_future_has_the_result_or_the_error_of_its_task() -> None:
     assert submit(7).result(0) == 7
     with pytest.raises(ZeroDivisionError):
         submit(ZeroDivisionError()).result(0)
+
+
+def test_what_a_worker_foresees_comes_back_as_a_result_which_dask_does_not_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    handed: list[object] = []
+
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    client = FakeClient()
+    monkeypatch.setattr(client, "submit", lambda fn, *args, **_: handed.append(fn(*args)) or FakeTask(handed[-1]))
+    with pytest.raises(OSError, match="No space"):
+        DaskExecutor(client).submit(full).result(0)
+    assert handed
 
 
 def test_future_of_a_task_that_went_away_wakes_those_who_wait() -> None:

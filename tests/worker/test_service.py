@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.errors import MemoryBudgetError, NotFoundError, ParameterError
+from relume.errors import DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease
 from worker.scenes import delete_scene, register_scene
@@ -119,6 +119,29 @@ def test_failure_is_one_sentence_and_a_second_try_finishes(
         service.submit(SCENE.id, RECIPE)
         assert follow(service, identity).state == "ready"
         assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("worker.service.POLL_S", 0.02)
+    tried = threading.Event()
+    with open_service(tmp_path) as service:
+        run_next = service._run_next
+
+        def fails(tiny: bool) -> bool:
+            if tiny:
+                return run_next(tiny)
+            tries.append(tiny)
+            if len(tries) > 5:
+                tried.set()
+            raise DiskFullError("the database")
+
+        tries: list[bool] = []
+        monkeypatch.setattr(service, "_run_next", fails)
+        assert tried.wait(60)
+    assert caplog.text.count("trying again") == 1
+    assert "that is over" not in caplog.text
 
 
 def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
