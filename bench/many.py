@@ -36,7 +36,7 @@ _WARM_S = 1.0
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, drag with more and more hands."""
-    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 5, 3.0)
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 3, 2.0)
     numbers = (1, 2) if tiny else (1, 2, 4, 8, 16, 32, 64)
     shining = (LAMBERT, cook_torrance(0.2))
     scene = teapot_on_table(studio(), shining, shining)
