@@ -49,15 +49,16 @@ class Hand:
         while self._is_dragging and self._revision < header["revision"] + _AHEAD:
             await self._edit()
 
-    async def take(self) -> None:
-        """Take the slider in hand, and wait until what is made for it is made."""
-        await self._send(type="touch", parameter=self._slider)
+    async def rest(self) -> None:
+        """Let go, and wait for the exact picture."""
+        self._is_dragging = False
         await self._edit(0.0)
         await self._is_exact.wait()
 
     async def drag(self) -> None:
-        """Begin to move it."""
+        """Take the slider in hand, and begin to move it."""
         self._is_dragging = True
+        await self._send(type="touch", parameter=self._slider)
         await self._edit()
 
     async def _edit(self, turns: float | None = None) -> None:
