@@ -172,10 +172,13 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Ac
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
+    def btf_is_made(work: str, material: str, num_bytes: int) -> None:
+        access.quotas.become(("btf-work", work), ("btf", material), num_bytes)
+
     return _Queues(
         RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.measured, "render")),
         ComparisonQueue(sessions, settings.data, batch.run, quota),
-        BtfQueue(sessions, settings.data, batch.run, quota),
+        BtfQueue(sessions, settings.data, batch.run, quota, btf_is_made),
     )
 
 

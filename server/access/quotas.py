@@ -18,7 +18,7 @@ from worker.database.models import BakeRow
 if TYPE_CHECKING:
     from server.settings import Settings
 
-Kind = Literal["scene", "environment", "material", "btf-work", "image", "bake", "render"]
+Kind = Literal["scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 
 
@@ -122,6 +122,17 @@ class Quotas:
             session.execute(
                 update(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object == thing).values(bytes=num_bytes)
             )
+
+    def become(self, before: tuple[Kind, str], after: tuple[Kind, str], num_bytes: int) -> None:
+        """Something has become another thing of so many bytes, whose owner is the same, unless somebody has it."""
+        with self._sessions.begin() as session:
+            row = session.get(OwnedRow, before)
+            if row is None:
+                return
+            session.delete(row)
+            if session.get(OwnedRow, after) is None:
+                kind, thing = after
+                session.add(OwnedRow(kind=kind, object=thing, owner=row.owner, bytes=num_bytes))
 
     def disown(self, kind: Kind, *things: str) -> None:
         """They are deleted."""

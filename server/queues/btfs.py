@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from sqlalchemy.orm import Session, sessionmaker
 
+from relume.folders import folder_bytes
 from server.apart.btfs import FOUND, IMAGES
 from server.apart.step import RunStep
 from server.apart.step_timer import StepTimer
 from server.queues.work_queue import Quota, Work, WorkQueue
 from server.records.tables import BtfRow
 from server.wire.btfs import BtfRequest
+from worker.paths import btfs_path
 
 BtfWork = Work[BtfRequest]
 
@@ -22,13 +25,22 @@ class BtfQueue(WorkQueue[BtfRequest]):
 
     row, noun, request_type = BtfRow, "BTF", BtfRequest
 
-    def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
+    def __init__(
+        self,
+        sessions: sessionmaker[Session],
+        data: Path,
+        run: RunStep,
+        quota: Quota,
+        kept: Callable[[str, str, int], None],
+    ) -> None:
         """
         Args:
             sessions: of the database. data: directory of what is made.
             run: does the steps. quota: how much may wait.
+            kept: called with the id of a work that is done, that of the BTF, and how many bytes it takes.
         """
         super().__init__(sessions, data / "btf-works", run, quota)
+        self._btfs, self._kept = btfs_path(data), kept
 
     def steps(self, request: BtfRequest) -> int:
         """One, which keeps what it has found when it is stopped."""
@@ -54,5 +66,7 @@ class BtfQueue(WorkQueue[BtfRequest]):
         values = {"request": work.request.model_dump(mode="json"), "folder": str(folder)}
         if not self.run_apart(work, "BTF", values, timer.tell)["is_done"]:
             return 0
+        if (material := self.material(work.id)) is not None:
+            self._kept(work.id, material, folder_bytes(self._btfs / material))
         (folder / IMAGES).unlink(missing_ok=True)
         return 1

@@ -5,8 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import SIZE, FakeMethod, tiny_scene
 from session_client import Baked
@@ -114,6 +116,26 @@ class TestBytes:
         files = (settings.data / "renders" / url.rsplit("/", 1)[1]).iterdir()
         assert access.quotas.used_bytes("Ann") == sum(file.stat().st_size for file in files) > 0
         assert client.delete(url, headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_a_btf_that_was_made_here_counts_by_what_is_kept(
+        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, tmp_path: Path
+    ) -> None:
+        settings.max_bytes_each = 1_000_000
+        ann, works = bearer("edit", "Ann"), "/api/materials/btf-works"
+        with zipped(tmp_path / "a.zip").open("rb") as images:
+            url = client.post(works, files={"images": ("a.zip", images)}, headers=ann).headers["location"]
+        while (body := client.get(url, headers=ann).json())["state"] != "ready":
+            assert body["state"] != "failed", body
+            time.sleep(0.02)
+        kept = sum(file.stat().st_size for file in (settings.data / "btfs" / body["material"]).iterdir())
+        assert access.quotas.used_bytes("Ann") == kept > 0
+        settings.max_bytes_each = kept
+        refused = client.post(f"{works}/synthetic", json={"geometry": "weave", "size": 8}, headers=ann)
+        assert refused.status_code == 429
+        assert client.delete(f"{url}?forget=true", headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == kept
+        assert client.delete(f"/api/materials/btf/{body['material']}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
 

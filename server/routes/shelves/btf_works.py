@@ -61,7 +61,11 @@ async def make_synthetic_btf(
     """Queue the rendering of a small geometry from all sides in light from all sides."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     wanted = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    return _answer(await run_in_threadpool(services.btfs.submit, wanted, caller.name), services, response)
+    quotas = services.access.quotas
+    await run_in_threadpool(quotas.check_bytes, caller.name, 1)  # how many it will take is known when it is made
+    identity = await run_in_threadpool(services.btfs.submit, wanted, caller.name)
+    await run_in_threadpool(quotas.own, caller.name, "btf-work", identity, 0)
+    return _answer(identity, services, response)
 
 
 def _answer(identity: str, services: Services, response: Response) -> BtfWorkBody:

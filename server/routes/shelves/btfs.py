@@ -40,6 +40,7 @@ async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
 def delete_btf(material: Id, services: Shared) -> Response:
     """Delete a BTF; looks that name it are refused from then on."""
     STORE.remove(btfs_path(services.settings.data), material)
+    services.access.quotas.disown("btf", material)
     return Response(status_code=204)
 
 
