@@ -105,3 +105,12 @@ def moving(opened: Opened) -> Opened:
     """A bake whose eyes move, opened."""
     assert opened.eyes is Eyes.FREE
     return opened
+
+
+@pytest.fixture
+def aside(moving: Opened) -> Camera:
+    """An eye that nobody baked."""
+    first = moving.views["front"].camera
+    to_world = first.to_world.copy()
+    to_world[:3, 3] += [0.4, 0.3, -0.2]
+    return Camera("front", to_world, first.yfov)

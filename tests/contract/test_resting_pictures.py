@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from looks_of_pictures import EDITS, LOBE, drawn, light, lit, painted, transport
 from sessions import look_of, make_next, relative_rmse
-from test_moving_pictures import aside as aside  # the eye that nobody baked
 
 from relume.bake import Recipe
 from relume.errors import CancelledError
