@@ -60,6 +60,10 @@ class MemoryBudgetError(PlanError):
         self.needed_bytes, self.allowed_bytes = needed_bytes, allowed_bytes
 
 
+class NotMadeError(RelumeError):
+    """Something could not be made that a picture can do without: what is shown stays."""
+
+
 class StoreError(RelumeError):
     """A transfer store cannot be read or written."""
 

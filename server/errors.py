@@ -132,6 +132,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.StoreNotFoundError, Row(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
     (relume_errors.StoreError, Row(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
     (relume_errors.EditNotSupportedError, Row(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
+    (relume_errors.NotMadeError, Row(409, "not-made", "Cannot be made", CLOSE_INTERNAL)),
     (relume_errors.EditError, Row(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
     (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),

@@ -54,7 +54,8 @@ class Job(Protocol):
     @property
     def refines(self) -> bool: ...
     def make(self, progress: Progress, cancelled: Cancelled) -> Any:
-        """Make it, unless the memory has it. Raises CancelledError where `cancelled`, asked now and then, said so."""
+        """Make it, unless the memory has it; a `NotMadeError` where what is shown can stay. Raises CancelledError where
+        `cancelled`, asked now and then, said so."""
         ...
 
     def install(self, made: Any) -> None:

@@ -259,6 +259,9 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
             picture = shown(of_eye(session, number))
             assert np.abs(picture - before).max() > 0.01
             session.ready("the exact picture from here")  # given up: what it needs is gone
+            problem = session.text("problem")["problem"]
+            assert problem["type"].endswith("not-made")
+            assert "the moving picture stays" in problem["detail"]
         session.send(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
         assert session.text("probe")["material"] is not None
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import CancelledError, RelumeError
+from relume.errors import CancelledError, NotMadeError, RelumeError
 from relume.look import Look
 from relume.memory import Memory
 from relume.moving.correction import Places, correction
@@ -155,15 +155,15 @@ class StillJob:
     state: ClassVar[Literal["shading"]] = "shading"
     refines = True
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Picture | None:
-        """Trace and shade it. Raises CancelledError where `cancelled`, asked now and then, said so."""
+    def make(self, progress: Progress, cancelled: Cancelled) -> Picture | NotMadeError:
+        """Trace and shade it, or why not. Raises CancelledError where `cancelled`, asked now and then, said so."""
         try:
             return self.wanted.picture(progress, cancelled)
         except CancelledError:
             raise
-        except RelumeError:  # the scene is gone, or it needs more memory than there is: the moving picture stays
-            return None
+        except RelumeError as error:  # the scene is gone, or it needs more memory than there is
+            return NotMadeError(f"the moving picture stays: {self.what} cannot be had, for {error}")
 
-    def install(self, made: Picture | None) -> None:
+    def install(self, made: Picture | NotMadeError) -> None:
         """Hand it over."""
-        self.take(self.wanted.reflects, made)
+        self.take(self.wanted.reflects, None if isinstance(made, NotMadeError) else made)

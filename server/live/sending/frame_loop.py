@@ -11,7 +11,7 @@ import asyncio
 import time
 from typing import TYPE_CHECKING
 
-from relume.errors import RelumeError
+from relume.errors import NotMadeError, RelumeError
 from relume.picture.transfer import Eyes
 from server.library.ports import Library, Picture
 from server.library.threads import OneAtATime, Threads
@@ -183,6 +183,8 @@ class FrameLoop:
             viewport.installed(await self._work.quick(painter.install, viewport.picture, job, result))
             self._rest_until_s = 0.0
         await self._freezer.say_ready(viewport, job)
+        if isinstance(result, NotMadeError):
+            await self._socket.refuse(result)
 
     def _freeze_next(self) -> None:
         """Start what is needed most; what runs for nothing is ended."""
