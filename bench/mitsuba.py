@@ -113,12 +113,26 @@ def render(
     Raises:
         CalledProcessError: the peer failed.
     """
-    camera, llvm = scene.cameras[0], _llvm()
-    arrays: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
+    arrays: dict[str, Any] = {}
     for k, mesh in enumerate(scene.meshes):
         arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
         arrays[f"uvs_{k}"] = mesh.uvs
-    np.savez(folder / "scene.npz", allow_pickle=False, **arrays, **(images or {}))
+    return render_arrays(arrays | dict(images or {}), scene, size, job, folder)
+
+
+def render_arrays(
+    arrays: Mapping[str, Any], scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """Let the peer render surfaces that are handed over as arrays, seen and lit as a scene's first view.
+
+    Args:
+        arrays: "positions_k", "normals_k", "uvs_k" and "faces_k" of each surface, and what descriptions name.
+        scene: whose camera and environment are taken.
+        size, job, folder: as of `render`.
+    """
+    camera, llvm = scene.cameras[0], _llvm()
+    seen: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
+    np.savez(folder / "scene.npz", allow_pickle=False, **{**seen, **arrays})
     whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, **job}
     (folder / "job.json").write_text(json.dumps(whole))
     script = Path(__file__).with_name("peer_mitsuba_render.py")

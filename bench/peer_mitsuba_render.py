@@ -19,34 +19,46 @@ mi: Any = __import__("mitsuba")
 mi.set_variant("llvm_ad_rgb")
 sys.path.append(str(Path(__file__).parent))  # the interpreter is isolated
 plugins: Any = __import__("peer_mitsuba_plugins")
+__import__("peer_mitsuba_gltf")
 
 
-def image(arrays: Any, value: Any) -> Any:
-    """A value of a BSDF; {"array": name} is a texture of that array of scene.npz, (height, width, 1)."""
-    if not isinstance(value, dict) or "array" not in value:
-        return value
-    return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True}
+def described(arrays: Any, value: Any) -> Any:
+    """A description with its images.
+
+    Args:
+        arrays: of scene.npz.
+        value: {"array": name} in it becomes a texture of that array, (height, width, 1 or 3), its values as they are;
+            "wrap_mode" and "filter_type" may stand beside it.
+    """
+    if isinstance(value, dict) and "array" in value:
+        others = {key: of for key, of in value.items() if key != "array"}
+        return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True, **others}
+    if isinstance(value, dict) and value.get("type") != "rgb":
+        return {key: described(arrays, of) for key, of in value.items()}
+    return mi.ScalarVector3f(value) if isinstance(value, list) else value
 
 
 def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
     """One mesh of the scene.
 
     Args:
-        arrays: of scene.npz. k: which mesh.
-        bsdf: its material, as `bench.mitsuba.bsdf` describes it; "interior" is the medium inside, {"array": name} an
-            image that is handed over, its values as they are.
+        arrays: of scene.npz. k: which mesh; "NAME_of_k" of the arrays are attributes of its vertices.
+        bsdf: its material, as `bench.mitsuba.bsdf` describes it; "interior" is the medium inside, "emitter" what it
+            shines. One that is neither a dielectric nor has "sides" is the same from both.
     """
     props = mi.Properties()
-    bsdf = {key: image(arrays, value) for key, value in bsdf.items()}
-    colors = {key: mi.ScalarVector3f(value) for key, value in bsdf.items() if isinstance(value, list)}
-    inside = bsdf.get("interior")
-    own = {key: value for key, value in {**bsdf, **colors}.items() if key != "interior"}
-    props["mesh_bsdf"] = mi.load_dict(own if "dielectric" in own["type"] else {"type": "twosided", "front": own})
-    if inside is not None:
-        props["interior"] = mi.load_dict(inside)
+    beside = {key: mi.load_dict(described(arrays, bsdf[key])) for key in ("interior", "emitter") if key in bsdf}
+    own = {key: described(arrays, value) for key, value in bsdf.items() if key not in ("interior", "emitter", "sides")}
+    has_sides = "dielectric" in own["type"] or "sides" in bsdf
+    props["mesh_bsdf"] = mi.load_dict(own if has_sides else {"type": "twosided", "front": own})
+    for key, value in beside.items():
+        props[key] = value
     positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
     vertices = {"has_vertex_normals": True, "has_vertex_texcoords": True}
     shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), **vertices, props=props)
+    for name in (name for name in arrays if name.endswith(f"_of_{k}")):
+        values = arrays[name]
+        shape.add_attribute(f"vertex_{name.removesuffix(f'_of_{k}')}", values.shape[1], values.ravel())
     params = mi.traverse(shape)
     params["vertex_texcoords"] = arrays[f"uvs_{k}"].ravel()
     params["vertex_positions"], params["vertex_normals"] = positions.ravel(), arrays[f"normals_{k}"].ravel()

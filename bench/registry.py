@@ -136,6 +136,7 @@ GROUPS = (
     ),
     Group("bench.glass", ("glass.rmse",)),
     Group("bench.rough", ("rough.rmse",)),
+    Group("bench.real_files", ("assets.rmse",)),
     Group("bench.mirror", ("mirror.rmse", "mirror.sharp_rmse")),
     Group(
         "bench.estimators",

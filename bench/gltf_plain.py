@@ -1,0 +1,166 @@
+"""A glTF file as plain arrays for a peer: an own, short reader, so that what the importer misreads is seen.
+
+Shares nothing with `relume.scene`. Triangle lists only; nothing is checked, the files are known.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One primitive of one node, in world space.
+
+    Attributes:
+        attributes: by the file's names; normals unit. (n, 2 to 4) each.
+        faces: (m, 3). material: the file's, by number; None for the default.
+    """
+
+    attributes: dict[str, F32]
+    faces: NDArray[np.uint32]
+    material: int | None
+
+
+@dataclass(frozen=True)
+class File:
+    """What a file says.
+
+    Attributes:
+        lights: of KHR_lights_punctual, with their place (4, 4).
+    """
+
+    json: dict[str, Any]
+    folder: Path
+    shapes: list[Shape] = field(default_factory=list)
+    lights: list[tuple[dict[str, Any], F64]] = field(default_factory=list)
+    chunk: bytes = b""
+
+    def buffer_view(self, number: int) -> bytes:
+        """Its bytes."""
+        view = self.json["bufferViews"][number]
+        buffer = self.json["buffers"][view["buffer"]]
+        data = self._bytes(buffer["uri"]) if "uri" in buffer else self.chunk
+        start = view.get("byteOffset", 0)
+        return data[start : start + view["byteLength"]]
+
+    def accessor(self, number: int) -> NDArray[Any]:
+        """Its values, integers that stand for shares as shares. (count, width)"""
+        of = self.json["accessors"][number]
+        dtype, width, count = np.dtype(_TYPES[of["componentType"]]), _WIDTHS[of["type"]], of["count"]
+        view = self.json["bufferViews"][of["bufferView"]]
+        data, start = self.buffer_view(of["bufferView"]), of.get("byteOffset", 0)
+        stride = view.get("byteStride", dtype.itemsize * width)
+        rows = np.lib.stride_tricks.as_strided(
+            np.frombuffer(data, np.uint8)[start:], (count, dtype.itemsize * width), (stride, 1), writeable=False
+        )
+        values = np.ascontiguousarray(rows).view(dtype)
+        return values / np.float32(np.iinfo(dtype).max) if of.get("normalized") else values
+
+    def image(self, texture: int) -> NDArray[np.uint8]:
+        """A texture's bytes, RGBA. (height, width, 4)"""
+        of = self.json["textures"][texture]
+        source = of.get("extensions", {}).get("EXT_texture_webp", of).get("source", of.get("source"))
+        image = self.json["images"][source]
+        data = self.buffer_view(image["bufferView"]) if "bufferView" in image else self._bytes(image["uri"])
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"))
+
+    def wraps(self, texture: int) -> str:
+        """How it continues, as Mitsuba calls it."""
+        sampler = self.json["textures"][texture].get("sampler")
+        mode = 10_497 if sampler is None else self.json["samplers"][sampler].get("wrapS", 10_497)
+        return {33_071: "clamp", 33_648: "mirror"}.get(mode, "repeat")
+
+    def _bytes(self, uri: str) -> bytes:
+        if uri.startswith("data:"):
+            return base64.b64decode(uri.split(",", 1)[1])
+        return (self.folder / unquote(uri)).read_bytes()
+
+
+def read_plain(path: Path) -> File:
+    """Read a file that is known to be right."""
+    data, chunk = path.read_bytes(), b""
+    if data[:4] == b"glTF":
+        length = struct.unpack_from("<I", data, 12)[0]
+        chunk, data = data[28 + length :], data[20 : 20 + length]
+    file = File(json.loads(data), path.parent, chunk=chunk)
+    lights = file.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
+    for node, to_world in _nodes(file.json):
+        number = node.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
+        if number is not None:
+            file.lights.append((lights[number], to_world))
+        if "mesh" in node:
+            primitives = file.json["meshes"][node["mesh"]]["primitives"]
+            file.shapes.extend(_shape(file, of, to_world) for of in primitives if of.get("mode", 4) == 4)
+    return file
+
+
+def _nodes(of: dict[str, Any]) -> Iterator[tuple[dict[str, Any], F64]]:
+    stack = [(root, np.eye(4)) for root in of["scenes"][of.get("scene", 0)]["nodes"]]
+    while stack:
+        number, parent = stack.pop()
+        node = of["nodes"][number]
+        to_world = parent @ _local(node)
+        yield node, to_world
+        stack.extend((child, to_world) for child in node.get("children", []))
+
+
+def _local(node: dict[str, Any]) -> F64:
+    if "matrix" in node:
+        return np.array(node["matrix"], np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", [0, 0, 0, 1])
+    q = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    local = np.eye(4)
+    local[:3, :3] = (np.eye(3) + 2 * w * q + 2 * q @ q) * np.array(node.get("scale", [1, 1, 1]))
+    local[:3, 3] = node.get("translation", [0, 0, 0])
+    return local
+
+
+def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
+    found = {name: file.accessor(k).astype(np.float32) for name, k in primitive["attributes"].items()}
+    positions, linear = found["POSITION"], to_world[:3, :3]
+    faces = file.accessor(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
+    triangles = np.asarray(faces.reshape(-1, 3), np.uint32)
+    mirrored = np.linalg.det(linear) < 0
+    found["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
+    triangles = triangles[:, ::-1] if mirrored else triangles
+    if "NORMAL" in found:
+        found["NORMAL"] = _unit(found["NORMAL"] @ np.linalg.inv(linear))
+    else:
+        found, triangles = _flat(found, triangles)
+    if "TANGENT" in found:
+        along, hand = _unit(found["TANGENT"][:, :3] @ linear.T), found["TANGENT"][:, 3:] * (-1 if mirrored else 1)
+        found["TANGENT"] = np.concatenate([along, hand], axis=1).astype(np.float32)
+    return Shape(found, np.ascontiguousarray(triangles), primitive.get("material"))
+
+
+def _flat(found: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[dict[str, F32], NDArray[np.uint32]]:
+    """Every triangle with corners and a normal of its own."""
+    corners = faces.reshape(-1)
+    own = {name: values[corners] for name, values in found.items()}
+    a, b, c = own["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)
+    own["NORMAL"] = np.repeat(_unit(np.cross(b - a, c - a)), 3, axis=0)
+    return own, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+
+
+def _unit(vectors: NDArray[Any]) -> F32:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1), np.float32)
