@@ -3,6 +3,7 @@
 import io
 import json
 import shutil
+import time
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from relume.btf.values import Values
 from relume.errors import CancelledError, MaterialError, NotFoundError, ParameterError
 from relume.synthetic.make import Made, make_btf
 from server.app import create_app
+from server.live.state.look_state import LookState
+from server.live.state.shown_views import ShownViews
 from server.settings import Settings
 
 
@@ -164,6 +167,14 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
         assert ball[24:40, 24:40].mean() > 10
         (model,) = [one for one in client.get("/api/models").json() if one["model"] == "measured_btf"]
         assert (model["needs_data"], model["data_prefix"], model["curves"]) == (True, "btf:", [])
+        resumes, bake = client.app.state.services.live.resumes, "0123456789abcdef"
+        shows = LookState({"materials": {"Ball": {"terms": []}}}, {"materials": {"Ball": json.loads(terms)}}, 0)
+        token = resumes.open(bake, shows, ShownViews(["front"], "front"))
+        refused = client.delete(f"/api/materials/btf/{found['id']}")
+        assert refused.status_code == 409
+        assert f"a session of bake {bake}" in refused.json()["detail"]
+        resumes.close(token, time.monotonic())
+        assert resumes.take(token, bake, time.monotonic()) is not None
         assert client.delete(f"/api/materials/btf/{found['id']}").status_code == 204
         assert client.get(f"/api/materials/btf/{found['id']}").status_code == 404
         assert client.get("/api/materials/btf").json() == []

@@ -80,6 +80,10 @@ def test_rest_imports_lists_shows_and_deletes(home, red, tmp_path):
         assert ball[16:48, 16:48, 0].mean() > 1.5 * ball[16:48, 16:48, 2].mean()
         needing = [m["model"] for m in client.get("/api/models").json() if m["needs_data"]]
         assert needing == ["measured_lv", "measured_hd", "measured_hf", "measured_btf"]
+        look = {"materials": {"Ball": {"terms": made["terms"]}}}
+        assert client.put("/api/looks/red", json=look).status_code == 201
+        assert "look 'red'" in client.delete(f"{url}/{made['id']}").json()["detail"]
+        assert client.delete("/api/looks/red", headers={"If-Match": "*"}).status_code == 204
         assert client.delete(f"{url}/{made['id']}").status_code == 204
         assert client.get(url).json() == []
         assert client.get(f"{url}/{made['id']}").status_code == 404

@@ -14,24 +14,24 @@ function words({ functions, missed, needed, is_mirror }: InOutBody): string {
   return `While the eye moves: ${functions} terms, which miss ${percent}${enough}.`;
 }
 
-/** How a texture that looks different from every side lies on a material, and who can draw it. */
-function Cover({ material }: { material: string }) {
+/** How a texture that looks different from every side lies on a material, and who can draw it; null: as everywhere. */
+export function coverWords(material: string): string | null {
   const isProjected = materialOf(material)?.is_projected === true;
-  const isMean = moves.value && drawsHere.value;
-  if (!isProjected && !isMean) return null;
-  return (
-    <p class="in-motion">
-      {isProjected && "The object has no places in textures: it is projected along the world’s axes, a metre for each repeat. "}
-      {isMean && "While the eye moves: the mean of all texels, as this browser draws."}
-    </p>
-  );
+  const said = [
+    isProjected && "The object has no places in textures: it is projected along the world’s axes, a metre for each repeat.",
+    moves.value && drawsHere.value && "While the eye moves: the mean of all texels, as this browser draws.",
+  ].filter(Boolean);
+  return said.length > 0 ? said.join(" ") : null;
 }
 
 export function InMotion({ term, material }: { term: Term; material: string }) {
   const isCover = isTexels(term);
   const asked = moves.value && !isCover ? JSON.stringify(term) : null;
   const told = useTold(asked, async (text) => (await getInOut([JSON.parse(text) as Term]))[0] ?? null);
-  if (isCover) return <Cover material={material} />;
+  if (isCover) {
+    const cover = coverWords(material);
+    return cover === null ? null : <p class="in-motion">{cover}</p>;
+  }
   if (told === null) return null;
   return (
     <p class="in-motion" title="In-out factorisation of this term, cosine-weighted RMS. Where the eye rests it is exact.">

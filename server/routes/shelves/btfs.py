@@ -7,6 +7,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.btf.shelf import STORE, BtfRecord, get_record, records
 from server.files.png import A_DAY, PngResponse
+from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.materials import terms_of, thumbnail_of
 from server.services import Shared
 from server.wire.bodies import BtfBody, moment
@@ -37,10 +38,16 @@ async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
 
 
 @router.delete("/{material}", status_code=204)
-def delete_btf(material: Id, services: Shared) -> Response:
-    """Delete a BTF; looks that name it are refused from then on."""
-    STORE.remove(btfs_path(services.settings.data), material)
-    services.access.quotas.disown("btf", material)
+async def delete_btf(material: Id, services: Shared) -> Response:
+    """Delete a BTF that no saved look, no link and no session of this server names."""
+    folder = btfs_path(services.settings.data)
+    STORE.path(folder, material)  # whatever its files are like
+
+    def remove() -> None:
+        STORE.remove(folder, material)
+        services.access.quotas.disown("btf", material)
+
+    await remove_unused(f"{STORE.what} {material}", STORE.prefix + material, services, remove)
     return Response(status_code=204)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from functools import partial
 from typing import Annotated
 
@@ -13,10 +11,10 @@ from fastapi.concurrency import run_in_threadpool
 from relume.brdf.channels import IMAGES
 from relume.images.shelf import ImageRecord, get_record, records, thumbnail_path
 from server.access.roles import Who
-from server.errors import InUseError
 from server.files.png import FOREVER, PngResponse
+from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.sending import import_apart, take_in
-from server.services import Services, Shared
+from server.services import Shared
 from server.wire.bodies import ImageBody, moment
 from server.wire.body import Id
 from worker.paths import images_path
@@ -24,7 +22,6 @@ from worker.paths import images_path
 router = APIRouter(prefix="/api/images", tags=["images"])
 ImageFile = Annotated[UploadFile, File(description="an image: .png, .jpg, .webp or .exr")]
 ImageName = Annotated[str, Form(max_length=200)]
-_MOST_NAMED = 3  # of what uses an image, in a message
 
 
 @router.post("", status_code=201)
@@ -59,24 +56,15 @@ def get_image_thumbnail(image: Id, services: Shared) -> PngResponse:
 @router.delete("/{image}", status_code=204)
 async def delete_image(image: Id, services: Shared) -> Response:
     """Delete an image that no saved look, no link and no session of this server names."""
-    sessions = partial(services.live.resumes.naming, now_s=time.monotonic())
-    await run_in_threadpool(_delete, image, services, sessions)
+    folder = images_path(services.settings.data)
+    record = await run_in_threadpool(get_record, folder, image)
+
+    def remove() -> None:
+        IMAGES.remove(folder, image)
+        services.access.quotas.disown("image", image)
+
+    await remove_unused(f"image {record.name!r}", record.texture, services, remove)
     return Response(status_code=204)
-
-
-def _delete(image: str, services: Services, sessions: Callable[[str], list[str]]) -> None:
-    """Delete it unless it is in use; `sessions` finds the bakes of those that name a text."""
-    record = get_record(images_path(services.settings.data), image)
-    said = f'"{record.texture}"'
-    users = [f"look {name!r}" for name in services.looks.naming(said)]
-    users += [f"link {identity}" for identity in services.shares.naming(said)]
-    users += [f"a session of bake {bake}" for bake in sessions(said)]
-    if users:
-        more = f" and {len(users) - _MOST_NAMED} more" if len(users) > _MOST_NAMED else ""
-        shown = ", ".join(users[:_MOST_NAMED])
-        raise InUseError(f"image {record.name!r} is shown by {shown}{more}; change or delete these first")
-    IMAGES.remove(images_path(services.settings.data), image)
-    services.access.quotas.disown("image", image)
 
 
 def _body(record: ImageRecord) -> ImageBody:

@@ -18,6 +18,7 @@ from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
 from server.files.uploads import keep_upload, plain_stem
+from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.sending import take_in
 from server.services import Services, Shared
 from server.wire.bodies import MeasuredBody, moment
@@ -76,10 +77,16 @@ def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
 
 
 @router.delete("/{material}", status_code=204)
-def delete_measured(material: Id, services: Shared) -> Response:
-    """Delete a measured material; looks that name it are refused from then on."""
-    STORE.remove(materials_path(services.settings.data), material)
-    services.access.quotas.disown("material", material)
+async def delete_measured(material: Id, services: Shared) -> Response:
+    """Delete a measured material that no saved look, no link and no session of this server names."""
+    folder = materials_path(services.settings.data)
+    STORE.path(folder, material)  # whatever its files are like
+
+    def remove() -> None:
+        STORE.remove(folder, material)
+        services.access.quotas.disown("material", material)
+
+    await remove_unused(f"{STORE.what} {material}", STORE.prefix + material, services, remove)
     return Response(status_code=204)
 
 
