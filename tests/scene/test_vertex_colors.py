@@ -7,8 +7,9 @@ import pytest
 from glb_builder import Glb
 
 from relume.environments.model import Environment
+from relume.scene.companions import Alone
 from relume.scene.gltf import import_gltf
-from relume.scene.mesh_files import import_ply
+from relume.scene.mesh_files import import_obj, import_ply
 from relume.scene.model import Coding, Scene, Texture
 from relume.scene.vertex_colors import WRAP, colors_as_image
 from relume.trace.texture import MipMap
@@ -84,3 +85,15 @@ def test_a_ply_file_shows_them() -> None:
     shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))
     np.testing.assert_allclose(shown, np.eye(3), atol=0.005)
     assert scene.warnings == ()
+
+
+@pytest.mark.parametrize("objects", [1, 2])
+def test_an_obj_file_of_one_object_shows_them_and_others_say_that_they_do_not(objects: int) -> None:
+    lines = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n" + "".join(f"o {k}\nf 1 2 3\n" for k in range(objects))
+    scene = import_obj(lines.encode(), "x", LIGHT, Alone())
+    if objects == 2:
+        assert "vertex colours" in str(scene.warnings[0])
+        return
+    (material,), (mesh,) = scene.materials, scene.meshes
+    shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))
+    np.testing.assert_allclose(shown, np.eye(3), atol=0.005)

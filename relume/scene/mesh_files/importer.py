@@ -48,7 +48,12 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
     emissions: list[F64] = []
     meshes: list[Mesh] = []
     taken: dict[str, int] = {}
-    for (thing, material), corners in obj.corners().items():
+    groups = obj.corners()
+    if (colors := obj.vertex_colors()) is not None:
+        if len(groups) == 1 and not obj.libraries:
+            return _scan(next(iter(groups.values())), colors, name, environment, warnings)
+        warnings.append(simplified("vertex colours are not used beside materials and objects of the .obj file"))
+    for (thing, material), corners in groups.items():
         if material not in numbers:
             numbers[material] = len(materials)
             if material and obj.libraries and material not in library:
@@ -74,8 +79,13 @@ def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene
     Raises:
         SceneError: it is damaged, too large, or has no triangles.
     """
-    warnings: list[Remark] = []
-    corners, colors = read_ply(data)
+    return _scan(*read_ply(data), name, environment, [])
+
+
+def _scan(
+    corners: Corners, colors: F32 | None, name: str, environment: Environment | None, warnings: list[Remark]
+) -> Scene:
+    """A mesh of one material, with the colours of its vertices."""
     corners, material = _colored(corners, colors, MaterialMaker(Alone(), warnings), warnings)
     mesh = make_mesh(corners, "mesh", 0, material, "the mesh", warnings)
     return _scene(name, [] if mesh is None else [mesh], [material], environment, warnings)

@@ -15,12 +15,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.color import srgb_decode
 from relume.errors import SceneError
 from relume.scene.checks import MAX_TRIANGLES
 from relume.scene.mesh_files.corners import Corners
 
 MAX_LINE_BYTES = 1 << 20
 MAX_GROUPS = 10_000
+_COLORED = 7  # words of a vertex that has a colour
 LEFT_OUT = {b"p", b"l", b"curv", b"curv2", b"surf"}
 
 
@@ -29,6 +31,7 @@ class Obj:
     """The triangles of an OBJ file and what it names beside them.
 
     Attributes:
+        colors: of positions, as scanners and sculptors write them behind the coordinates; none where some lack them.
         libraries: the material files it names.
         groups: triangles, nine numbers each, by object and material.
         left_out: kinds of lines that were not used.
@@ -37,9 +40,17 @@ class Obj:
     positions: array[float] = field(default_factory=lambda: array("d"))
     uvs: array[float] = field(default_factory=lambda: array("d"))
     normals: array[float] = field(default_factory=lambda: array("d"))
+    colors: array[float] = field(default_factory=lambda: array("d"))
     libraries: list[str] = field(default_factory=list)
     groups: dict[tuple[str, str], array[int]] = field(default_factory=dict)
     left_out: set[str] = field(default_factory=set)
+
+    def vertex_colors(self) -> NDArray[np.float32] | None:
+        """Linear colours of all positions, None where there are none. (num_positions, 3)"""
+        colors = _rows(self.colors, 3)
+        if len(colors) == 0 or len(self.colors) != len(self.positions) or not np.isfinite(colors).all():
+            return None
+        return srgb_decode(np.clip(colors, 0, 1).astype(np.float32))
 
     def corners(self) -> dict[tuple[str, str], Corners]:
         """The triangles of each group, v turned to run from the top."""
@@ -68,6 +79,8 @@ def read_obj(data: bytes) -> Obj:
         try:
             if kind == b"v":
                 obj.positions.extend([float(words[1]), float(words[2]), float(words[3])])
+                if len(words) == _COLORED:
+                    obj.colors.extend([float(words[4]), float(words[5]), float(words[6])])
             elif kind == b"vn":
                 obj.normals.extend([float(words[1]), float(words[2]), float(words[3])])
             elif kind == b"vt":
