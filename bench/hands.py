@@ -28,7 +28,7 @@ class Hand:
     def __init__(self, connection: ClientConnection, slider: str, span: tuple[float, float], phase: float) -> None:
         self._connection, self._slider, self._span, self._phase = connection, slider, span, phase
         self._revision = self.num_frames = 0
-        self._is_dragging, self._is_exact = False, asyncio.Event()
+        self._is_dragging, self._is_exact, self._is_seen = False, asyncio.Event(), asyncio.Event()
 
     async def run(self) -> None:
         """Acknowledge every frame, until cancelled."""
@@ -43,6 +43,8 @@ class Hand:
         (length,) = struct.unpack_from("<I", message)
         header = json.loads(message[4 : 4 + length])
         self.num_frames += 1
+        if header["revision"] > 0:
+            self._is_seen.set()
         if header["exact"] and header["revision"] == self._revision:
             self._is_exact.set()
         await self._send(type="ack", frame=header["frame"])
@@ -56,10 +58,12 @@ class Hand:
         await self._is_exact.wait()
 
     async def drag(self) -> None:
-        """Take the slider in hand, and begin to move it."""
+        """See the exact picture, take the slider in hand and begin to move it; until a frame has shown that."""
+        await self._is_exact.wait()
         self._is_dragging = True
         await self._send(type="touch", parameter=self._slider)
         await self._edit()
+        await self._is_seen.wait()
 
     async def _edit(self, turns: float | None = None) -> None:
         """Move it to where it is next, or so many turns from its middle."""
