@@ -79,3 +79,28 @@ def test_people_log_in_and_roles_say_what_they_may_do(
         editor.choose("Ball", 1)
         expect(editor.slider("Roughness σ")).to_have_attribute("aria-valuenow", str(edited))
     assert any(line.who == "Ann" and "edits in a session" in line.what for line in access.audit.list())
+
+
+@pytest.mark.slow
+def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
+    server: Server, asking: Server, access: Access, browser: Browser
+) -> None:
+    scene = str(server.call("/api/built-ins/cornell_box", {})["id"])
+    server.bake({"scene": scene, "method": "gather", "size": (96, 96), "lights": 100})
+    with opened_page(browser) as page:
+        page.goto(asking.url)
+        page.get_by_label("Token").fill(access.tokens.add("Vito", "view"))
+        page.get_by_role("button", name="Log in").click()
+        expect(page.locator(".account")).to_contain_text("Vito")
+        page.goto(f"{asking.url}/?scene={scene}")
+        viewer = Editor(page)
+        viewer.wait_until_exact()
+        before = viewer.pixels()
+        page.get_by_role("radiogroup", name="Light paths").get_by_role("radio", name="Direct").click()
+        viewer.wait_until_exact()
+        assert changed(viewer.pixels(), before) > 0.01
+        page.get_by_role("slider", name="Bounces").press("ArrowLeft")
+        viewer.wait_until_exact()
+        expect(page.get_by_text("may look, but not edit")).to_have_count(1)  # the line that is always there
+        expect(page.get_by_role("alert")).to_have_count(0)
+    server.delete(f"/api/scenes/{scene}")
