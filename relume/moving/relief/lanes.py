@@ -78,14 +78,14 @@ def add_texels(typing_context, weight, step, view, of_view, first_view, texel, s
 
 
 @kernel_part
-def under_light(typing_context, numbers, axes, few_axes, vectors, about, shares, turn, side):  # type: ignore[no-untyped-def]
-    """Sum numbers with the light between three vertices, turned: what `AXIS_OF` and `LANE_OF` say.
+def under_light(typing_context, numbers, axes, few_axes, vectors, about, shares, turns, side):  # type: ignore[no-untyped-def]
+    """Sum numbers with the light between three vertices, each turned: what `AXIS_OF` and `LANE_OF` say.
 
     Args:
         typing_context: Numba's. numbers: (24,) float32. axes: of colours. (3, 3) float32
         few_axes: from `few_of`. vectors: light about vertices, in lanes. (vertices, 3 F) float32
         about: the three vertices, a tuple of uint32. shares: of each, a tuple.
-        turn: cosine and sine, a tuple. side: −1 where azimuths run the other way round, else 1.
+        turns: cosine and sine for each, a tuple of six. side: −1 where azimuths run the other way round, else 1.
     Returns:
         Of each channel, a tuple of float32.
     """
@@ -94,35 +94,39 @@ def under_light(typing_context, numbers, axes, few_axes, vectors, about, shares,
         numbers, axes, few_axes, vectors = (
             Array(context, builder, kind, one) for kind, one in zip(signature.args[:4], arguments[:4], strict=True)
         )
-        about, shares, turn, side = arguments[4:]
+        about, shares, turns, side = arguments[4:]
         corners = [builder.zext(builder.extract_value(about, k), WORD) for k in range(_CORNERS)]
-        weights = [spread(builder, builder.extract_value(shares, k)) for k in range(_CORNERS)]
-        cosine, sine = _turned(builder, *(spread(builder, builder.extract_value(turn, k)) for k in range(2)))
         ones = ir.Constant(VECTOR, [1.0] * NUM)  # what no order turns is not mirrored either
         mirror = builder.select(_where(lambda order: order > 0), spread(builder, side), ones)
+        cosines: list[Any] = []
+        sines: list[Any] = []
+        for k in range(_CORNERS):
+            weight = spread(builder, builder.extract_value(shares, k))
+            turn = (spread(builder, builder.extract_value(turns, 2 * k + part)) for part in range(2))
+            for found, turned in zip((cosines, sines), _turned(builder, *turn), strict=True):
+                found.append(product(builder, weight, turned))
+        mirrored = [[product(builder, mirror, one) for one in of] for of in (cosines, sines)]
         low, high, few = (numbers.eight(word(k * NUM)) for k in range(3))
         lone, lone_axis = numbers.one(word(EMPTY)), int(AXIS_OF[EMPTY])
-        found = []
+        summed_up = []
         for channel in map(word, range(_CHANNELS)):
             at = builder.mul(channel, word(HALF))
             a, b = (
-                inner(builder, weights, [vectors.eight(corner, place) for corner in corners])
-                for place in (at, builder.add(at, word(PAIRS)))
+                [vectors.eight(corner, place) for corner in corners] for place in (at, builder.add(at, word(PAIRS)))
             )
-            b = product(builder, mirror, b)
-            along = difference(builder, product(builder, cosine, a), product(builder, sine, b))
-            across = inner(builder, (sine, cosine), (a, b))
+            along = difference(builder, inner(builder, cosines, a), inner(builder, mirrored[1], b))
+            across = total(builder, [inner(builder, sines, a), inner(builder, mirrored[0], b)])
             # where a lane is empty its light is nothing
             first = inner(builder, (low, high), (along, across))
             of_few = product(builder, few, picked(builder, along, across, _FEW))
             weighed = spread(builder, axes.one(channel, word(0))), few_axes.eight(channel, word(0))
             summed = sum_of(builder, inner(builder, weighed, (first, of_few)))
             of_lone = product(builder, lone, extracted(builder, along, int(LANE_OF[EMPTY])))
-            found.append(total(builder, [summed, product(builder, axes.one(channel, word(lone_axis)), of_lone)]))
-        return context.make_tuple(builder, signature.return_type, found)
+            summed_up.append(total(builder, [summed, product(builder, axes.one(channel, word(lone_axis)), of_lone)]))
+        return context.make_tuple(builder, signature.return_type, summed_up)
 
-    three, corner, two = (_tuple(*of) for of in ((types.float32, 3), (types.uint32, 3), (types.float32, 2)))
-    given = corner, three, two, types.float32
+    three, corner, six = (_tuple(*of) for of in ((types.float32, 3), (types.uint32, 3), (types.float32, 6)))
+    given = corner, three, six, types.float32
     return three(numbers, axes, few_axes, vectors, *given), generate
 
 

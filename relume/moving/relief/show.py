@@ -49,7 +49,6 @@ F32 = NDArray[np.float32]
 
 F = np.float32
 _SHARES = 4  # for each thread: rays that see fine texels cost more
-_ALIKE = np.float32(0.999)  # cosine of tangents that azimuths about a ray may be counted from together
 
 
 class Sight(NamedTuple):
@@ -159,19 +158,14 @@ def _arriving(numbers, axes, few_axes, tangents, vectors, about, shares, x, y, s
         numbers, axes, few_axes, vectors, about, shares, side: of `under_light`. tangents: of vertices.
         x, y: axes of the texture, tuples.
     """
-    a, b, c = about
-    t = row(tangents, a)
-    is_alike = min(dot(t, row(tangents, b)), dot(t, row(tangents, c))) > _ALIKE
-    red = green = blue = F(0)
-    for q in range(1 if is_alike else 3):  # each turned by itself where frames differ
-        t = row(tangents, about[q])
-        of_a = shares[0] if is_alike or q == 0 else F(0)
-        of_b = shares[1] if is_alike or q == 1 else F(0)
-        of_c = shares[2] if is_alike or q == 2 else F(0)
-        turn = turned_by(dot(t, x), dot(t, y))
-        more = under_light(numbers, axes, few_axes, vectors, about, (of_a, of_b, of_c), turn, side)
-        red, green, blue = red + more[0], green + more[1], blue + more[2]
-    return red, green, blue
+    t, u, v = row(tangents, about[0]), row(tangents, about[1]), row(tangents, about[2])
+    of_t, of_u, of_v = (
+        turned_by(dot(t, x), dot(t, y)),
+        turned_by(dot(u, x), dot(u, y)),
+        turned_by(dot(v, x), dot(v, y)),
+    )
+    turns = of_t[0], of_t[1], of_u[0], of_u[1], of_v[0], of_v[1]
+    return under_light(numbers, axes, few_axes, vectors, about, shares, turns, side)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
