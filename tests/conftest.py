@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from postgres import Cluster
 from shared_bakes import baked, corner, gathered, transfer
 from xdist.scheduler import LoadScopeScheduling
@@ -15,6 +16,10 @@ from xdist.scheduler import LoadScopeScheduling
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
 os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests beside which others run would wait for ever for renders
+
+# examples are drawn alike each time, and take as long as they take: machines differ, and others work on them
+settings.register_profile("relume", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("relume")
 
 TOGETHER = ("gestures", "journeys", "btf")  # folders whose tests share what is dear: a server and a browser, a BTF
 

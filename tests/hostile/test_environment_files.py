@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relume.environments.reading import read_environment
@@ -52,7 +52,7 @@ def test_environment_refuses_damaged_files(data: bytes) -> None:
     assert "\n" not in str(problem.value)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300)
 @given(st.lists(st.tuples(st.integers(8, 380), st.integers(0, 255)), min_size=1, max_size=6))
 def test_environment_survives_any_changed_exr_header(changes: list[tuple[int, int]]) -> None:
     data = bytearray(EXR)
@@ -147,7 +147,7 @@ def test_environment_refuses_missing_files(tmp_path: Path) -> None:
         read_environment(tmp_path / "none.hdr", "sky")
 
 
-@settings(max_examples=200, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(0, 255)), max_size=6), st.integers(0, 200))
 def test_environment_survives_any_changed_bytes(changes: list[tuple[int, int]], length: int) -> None:
     data = bytearray(hdr(8, 4, bytes([128, 64, 32, 129]) * 32))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from glb_builder import Glb, self_contained
 from hostile_scenes import LIGHT, imported
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relume.errors import SceneError
@@ -17,7 +17,7 @@ from relume.scene.importer import import_scene
 from relume.scene.model import Scene
 
 
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300)
 @given(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=12))
 def test_import_survives_any_changed_bytes(changes: list[tuple[float, int]]) -> None:
     data = bytearray(FUZZED)

@@ -167,7 +167,7 @@ OPERATIONS = st.builds(
 )
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(st.lists(st.lists(OPERATIONS, max_size=4), max_size=5))
 def test_patches_in_a_row_equal_plain_json_patch_and_whole_checking(patches):
     default = default_look(MATERIALS, LIGHTS)
