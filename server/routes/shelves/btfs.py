@@ -40,14 +40,7 @@ async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
 @router.delete("/{material}", status_code=204)
 async def delete_btf(material: Id, services: Shared) -> Response:
     """Delete a BTF that no saved look, no link and no session of this server names."""
-    folder = btfs_path(services.settings.data)
-    STORE.path(folder, material)  # whatever its files are like
-
-    def remove() -> None:
-        STORE.remove(folder, material)
-        services.access.quotas.disown("btf", material)
-
-    await remove_unused(f"{STORE.what} {material}", STORE.prefix + material, services, remove)
+    await remove_unused(STORE, btfs_path(services.settings.data), material, "btf", services)
     return Response(status_code=204)
 
 

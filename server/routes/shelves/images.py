@@ -58,12 +58,7 @@ async def delete_image(image: Id, services: Shared) -> Response:
     """Delete an image that no saved look, no link and no session of this server names."""
     folder = images_path(services.settings.data)
     record = await run_in_threadpool(get_record, folder, image)
-
-    def remove() -> None:
-        IMAGES.remove(folder, image)
-        services.access.quotas.disown("image", image)
-
-    await remove_unused(f"image {record.name!r}", record.texture, services, remove)
+    await remove_unused(IMAGES, folder, image, "image", services, called=f"image {record.name!r}")
     return Response(status_code=204)
 
 

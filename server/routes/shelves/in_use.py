@@ -3,35 +3,45 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from functools import partial
+from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
 
+from relume.asset_store import AssetStore
+from server.access.quotas import Kind
 from server.errors import InUseError
 from server.services import Services
 
 _MOST_NAMED = 3  # of what uses it, in a message
 
 
-async def remove_unused(what: str, data: str, services: Services, remove: Callable[[], object]) -> None:
-    """Remove a thing that no saved look, no link and no session of this server names.
+async def remove_unused(
+    store: AssetStore, folder: Path, identity: str, kind: Kind, services: Services, called: str | None = None
+) -> None:
+    """Remove a thing that no saved look, no link and no session of this server names, and whose it is.
 
     Args:
-        what: it is called, in messages. data: its name in looks. services: the server's.
-        remove: is called, off the event loop.
+        store, folder, identity: which thing, and where it is kept. kind: of it, in quotas. services: the server's.
+        called: in messages, where its id says little.
     Raises:
-        InUseError: it is named; nothing is removed.
+        NotFoundError: it is not there. InUseError: it is named; nothing is removed.
     """
-    sessions = services.live.resumes.naming(f'"{data}"', time.monotonic())  # of the event loop
-    await run_in_threadpool(partial(_remove, what, f'"{data}"', services, sessions, remove))
+    said = f'"{store.prefix}{identity}"'
+    sessions = services.live.resumes.naming(said, time.monotonic())  # of the event loop
+
+    def remove() -> None:
+        store.path(folder, identity)  # whatever its files are like
+        _check_unused(called or f"{store.what} {identity}", said, services, sessions)
+        store.remove(folder, identity)
+        services.access.quotas.disown(kind, identity)
+
+    await run_in_threadpool(remove)
 
 
-def _remove(what: str, said: str, services: Services, sessions: list[str], remove: Callable[[], object]) -> None:
+def _check_unused(what: str, said: str, services: Services, sessions: list[str]) -> None:
     users = [f"look {name!r}" for name in services.looks.naming(said)]
     users += [f"link {identity}" for identity in services.shares.naming(said)]
     users += [f"a session of bake {bake}" for bake in sessions]
     if users:
         more = f" and {len(users) - _MOST_NAMED} more" if len(users) > _MOST_NAMED else ""
         raise InUseError(f"{what} is shown by {', '.join(users[:_MOST_NAMED])}{more}; change or delete these first")
-    remove()

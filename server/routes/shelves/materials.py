@@ -79,14 +79,7 @@ def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
 @router.delete("/{material}", status_code=204)
 async def delete_measured(material: Id, services: Shared) -> Response:
     """Delete a measured material that no saved look, no link and no session of this server names."""
-    folder = materials_path(services.settings.data)
-    STORE.path(folder, material)  # whatever its files are like
-
-    def remove() -> None:
-        STORE.remove(folder, material)
-        services.access.quotas.disown("material", material)
-
-    await remove_unused(f"{STORE.what} {material}", STORE.prefix + material, services, remove)
+    await remove_unused(STORE, materials_path(services.settings.data), material, "material", services)
     return Response(status_code=204)
 
 
