@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from pathlib import Path
 
 
 def folder_bytes(folder: Path) -> int:
-    """What the files in a folder take, those of its folders too; nothing where there is none."""
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    """What the files in a folder take, those of its folders too; nothing where there is none.
+
+    What somebody deletes while it is counted takes nothing either.
+    """
+    total = 0
+    for parent, _, names in os.walk(folder, onerror=_unless_gone):
+        for name in names:
+            with suppress(FileNotFoundError):
+                total += os.stat(os.path.join(parent, name)).st_size
+    return total
+
+
+def _unless_gone(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError):
+        raise error
