@@ -33,8 +33,8 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     settings = open_settings(folder, database=data if is_url else None, host=host, port=port, scheduler=scheduler)
     check_port(settings.host, settings.port)
     open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
-    typer.echo(f"relume listens on {address(settings.host, settings.port)}", err=True)
-    run_server(settings)
+    where = address(settings.host, settings.port)
+    run_server(settings, tell_started=lambda: typer.echo(f"relume listens on {where}", err=True))
 
 
 def check_port(host: str, port: int) -> None:

@@ -124,13 +124,13 @@ def create_app(
     return app
 
 
-def serve(settings: Settings) -> None:
-    """Run the server until it is stopped; blocks."""
+def serve(settings: Settings, tell_started: Callable[[], object] = lambda: None) -> None:
+    """Run the server until it is stopped, and tell once when it answers; blocks."""
     set_up(settings.log_format, settings.log_level)
-    stoppable(create_app(settings), settings).run()
+    stoppable(create_app(settings), settings, tell_started).run()
 
 
-def stoppable(app: FastAPI, settings: Settings) -> Process:
+def stoppable(app: FastAPI, settings: Settings, tell_started: Callable[[], object] = lambda: None) -> Process:
     """The server that runs the app, and takes leave of its sessions before it ends."""
     return Process(
         configure(app, settings),
@@ -138,6 +138,7 @@ def stoppable(app: FastAPI, settings: Settings) -> Process:
         num_sessions=lambda: app.state.services.access.quotas.num_sessions,
         drain_seconds=settings.drain_seconds,
         stop_seconds=settings.stop_seconds,
+        tell_started=tell_started,
     )
 
 

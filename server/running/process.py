@@ -24,7 +24,7 @@ class Process(uvicorn.Server):
     Args:
         leave: what sessions and /readyz hear of. num_sessions: that are open.
         drain_seconds: how long they may take to leave. stop_seconds: how long all else may take after that.
-        end: ends this process, whatever it does.
+        tell_started: called once requests are answered. end: ends this process, whatever it does.
     """
 
     def __init__(
@@ -35,10 +35,12 @@ class Process(uvicorn.Server):
         num_sessions: Callable[[], int],
         drain_seconds: float,
         stop_seconds: float,
+        tell_started: Callable[[], object] = lambda: None,
         end: Callable[[int], object] = os._exit,
     ) -> None:
         super().__init__(config)
-        self._leave, self._num_sessions, self._end = leave, num_sessions, end
+        self._leave, self._num_sessions = leave, num_sessions
+        self._tell_started, self._end = tell_started, end
         self._drain_seconds, self._stop_seconds = drain_seconds, stop_seconds
         self._until_s: float | None = None
         self._signal: int | None = None
@@ -51,6 +53,12 @@ class Process(uvicorn.Server):
             super().run(sockets)
         finally:
             self._timer.cancel()  # whoever ran it may go on
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open what the app needs, then listen."""
+        await super().startup(sockets)
+        if self.started:
+            self._tell_started()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal has come: the first SIGTERM is seen to by `on_tick`, on the event loop."""

@@ -134,3 +134,25 @@ def test_what_stops_in_time_is_left_alone() -> None:
     willing.stop()
     willing.thread.join()
     assert not willing.ended.wait(0.4)
+
+
+def test_it_is_told_once_that_the_server_answers() -> None:
+    told: list[bool] = []
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await asyncio.sleep(0.2)
+        await send({"type": "lifespan.startup.complete"})
+        await receive()
+        await send({"type": "lifespan.shutdown.complete"})
+
+    config = uvicorn.Config(app, port=0, interface="asgi3", lifespan="on", log_config=None)
+    limits = {"drain_seconds": 5.0, "stop_seconds": 60.0}
+
+    def tell() -> None:
+        told.append(process.started)
+        process.should_exit = True
+
+    process = Process(config, leave=Leave(), num_sessions=lambda: 0, tell_started=tell, **limits)
+    process.run()
+    assert told == [True]
