@@ -12,6 +12,7 @@ from cli.options import Data, LookFile, SceneName, View, read_look
 if TYPE_CHECKING:
     from relume.exr.layers import Layering
 
+Turns = Literal["eye", "object", "environment"]
 Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="Where to write the picture, or frames.")]
 
 
@@ -27,8 +28,12 @@ def render(
     full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
     turntable: Annotated[
         int | None,
-        typer.Option(metavar="N", help="N frames from all sides as PNG, of a moving bake, into a folder."),
+        typer.Option(metavar="N", help="N frames once around as PNG, of a moving bake, into a folder."),
     ] = None,
+    turns: Annotated[
+        Turns,
+        typer.Option(help="Turntable: what turns; before an eye that stays, the object, or the environment alone."),
+    ] = "eye",
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the frames that are in the folder.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Moving bakes: as it looks while the eye moves.")] = False,
     data: Data = None,
@@ -44,6 +49,7 @@ def render(
     from relume.methods.registry import open_bake
     from relume.methods.stills import Stills
     from relume.render.image import render_image
+    from server.wire.renders import Animation, Turntable
     from worker.storage import open_kept
     from worker.tasks import scene_of
 
@@ -59,7 +65,7 @@ def render(
     service = open_bakes(open_settings(data))
     try:
         record = find_scene(service.ledger, scene)
-        bake, view_name = find_bake(service, record, view, moves=turntable is not None)
+        bake, view_name = find_bake(service, record, view, moves=turntable is not None and turns != "environment")
         transfer = open_kept(service.store_path(bake.id), lambda store: open_bake(store, Memory(4 << 30)))
         if not bake.is_current:
             typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
@@ -72,8 +78,8 @@ def render(
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
         if turntable is not None:
-            assert isinstance(transfer, MovingViews)
-            render_turntable(transfer, view_name, document, output, turntable, stills)
+            way = Turntable(turntable=turntable, turns=turns)
+            render_turntable(transfer, view_name, Animation(bake=bake.id, looks=[partial], path=way), output, stills)
         elif is_exr:
             origin = Origin(record.id, record.name, bake.id)
             precision: Literal["half", "float"] = "float" if full_float else "half"

@@ -219,10 +219,11 @@ export interface TruthRequest {
   dry_run?: boolean;
 }
 
-/** Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by default where the view begins. */
+/** Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by default where the view begins. `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps that stay, too; or the `environment` alone, which needs no bake whose eye moves. */
 export interface Turntable {
   turntable: number;
   start?: CameraFrame | null;
+  turns?: "eye" | "object" | "environment";
 }
 
 /** client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down to fit into it, until views are shown otherwise; all other frames come in the baked size. */

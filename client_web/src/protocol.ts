@@ -50,6 +50,7 @@ export type {
   TruthBody,
   TruthPlanBody,
   TruthRequest,
+  Turntable,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
 export { MAX_COMMENT, MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";

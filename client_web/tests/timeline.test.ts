@@ -2,6 +2,7 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Change } from "../src/document/change";
 import { edit, keepPassing, leavePassing, onChange, passing, showPassing } from "../src/edit/edit";
+import { hand } from "../src/edit/hand";
 import { history } from "../src/edit/history";
 import { fromText, toText } from "../src/edit/journal";
 import {
@@ -176,6 +177,7 @@ test("the eye goes from where one key is seen to where the other is, and rests w
   seeKeyframeFrom(1, at(100));
   expect(pathOf("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
   expect(pathOf("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
+  expect(pathOf("object", 9)).toMatchObject({ turns: "object", start: { to_world: at(0).to_world } });
   expect(pathOf("still", 9)).toBeNull();
   await vi.waitFor(() => expect(frames.value).not.toBeNull());
   const x = () => views.value[0]?.camera.to_world[3];
@@ -188,4 +190,21 @@ test("the eye goes from where one key is seen to where the other is, and rests w
   playing.value = false;
   expect(placedEye("front")?.camera.to_world[3]).toBe(x());
   [views.value, viewName.value, eyeWay.value] = [[], "", "still"];
+});
+
+test("one look is enough where the environment turns, and a view that was baked from one place shows it", async () => {
+  eyeWay.value = "environment";
+  const told = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, "/environment/rotation", k));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told, cameras: null })));
+  bake.value = "b";
+  timelineOpen.value = true;
+  addKeyframe({ name: "Dark", look: LOOK });
+  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+  expect(pathOf("environment", 9)).toEqual({ turntable: 9, turns: "environment", start: null });
+  seek(1);
+  expect(look.value?.environment.rotation).toBe(numFrames.value - 1);
+  expect(hand.value).toBe("/environment/rotation");
+  eyeWay.value = "around"; // which this view cannot
+  await vi.waitFor(() => expect(frames.value).toBeNull());
+  eyeWay.value = "still";
 });

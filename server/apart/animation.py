@@ -9,10 +9,11 @@ from relume import look as looks
 from relume.errors import ParameterError
 from relume.look import Look
 from relume.look.morph import morph, neighbours
+from relume.look.turned import with_turned_light, with_turned_sky
 from relume.picture.transfer import Eyes, Opened
 from relume.scene.placed_camera import placed_camera
 from server.wire.cameras import CameraFrame
-from server.wire.renders import Animation, Keyframes, Turntable
+from server.wire.renders import Animation, EyePath, Keyframes, Turntable
 
 if TYPE_CHECKING:
     from relume.moving.view import FreeView
@@ -26,14 +27,19 @@ def check_animation(request: Animation, view: str, transfer: Opened) -> Sequence
         ParameterError: what cannot be, and what can.
     """
     path, num = request.path, request.num_frames
-    if path is not None and transfer.eyes is not Eyes.FREE:
-        raise ParameterError("path", "a path", "none: the eye of this bake does not move; bake by method surface")
+    if path is not None and transfer.eyes is not Eyes.FREE and not _needs_no_eye(path):
+        able = "none that needs an eye: that of this bake does not move; bake by method surface"
+        raise ParameterError("path", "a path", able)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
     num_eyes = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
     if num_eyes > num:
         raise ParameterError("path/eyes", f"{num_eyes} keyframes", f"at most as many as frames, {num}")
     return eyes_of(request, view, transfer)
+
+
+def _needs_no_eye(path: Turntable | EyePath) -> bool:
+    return isinstance(path, Turntable) and path.turns == "environment" and path.start is None
 
 
 def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera | None]:
@@ -51,17 +57,32 @@ def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera 
 
     if isinstance(request.path, Turntable):
         start = view.camera if request.path.start is None else placed(request.path.start)
+        if request.path.turns == "environment":
+            return [start] * request.num_frames
         return turntable(start, view.bounds, request.num_frames)
     return along([placed(eye) for eye in request.path.eyes], request.num_frames)
 
 
-def look_of(request: Keyframes, default: Mapping[str, Any], index: int) -> Look:
-    """The look of a frame, validated: one of the batch's, or between two of them."""
-    return looks.validate(document_of(request, default, index), default)
+def look_of(request: Animation, view: str, transfer: Opened, index: int) -> Look:
+    """The look of a frame, validated: one of the batch's, or between two of them, under light that `path` may turn."""
+    default = transfer.default_look
+    return looks.validate(document_of(request, view, transfer, index), default)
 
 
-def document_of(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
-    """The complete look of a frame; only those that it lies between are completed."""
+def document_of(request: Animation, view: str | None, transfer: Opened, index: int) -> Mapping[str, Any]:
+    """The complete look of a frame, see `look_of`; `view` may be None where there is no path."""
+    document = _key_or_between(request, transfer.default_look, index)
+    if not isinstance(request.path, Turntable) or request.path.turns == "eye":
+        return document
+    degrees = 360 * index / request.num_frames
+    if request.path.turns == "environment":
+        return with_turned_sky(document, degrees)
+    lowest, highest = cast("FreeView", transfer.views[cast("str", view)]).bounds
+    return with_turned_light(document, degrees, ((lowest + highest) / 2).tolist())
+
+
+def _key_or_between(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
+    """Only those looks that a frame lies between are completed."""
     if len(request.looks) == request.num_frames:
         return looks.complete(request.looks[index], default)
     share = index / max(1, request.num_frames - 1)

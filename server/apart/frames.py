@@ -58,7 +58,7 @@ def paint_frame(
         )  # fmt: skip
         return image if asked.size is None or eye is not None else shrink(image, asked.size)
 
-    look = look_of(asked, transfer.default_look, index)
+    look = look_of(asked, asked.view, transfer, index)
     if asked.format == "exr":
         _export(target, render, look, transfer, asked, camera or view.camera, scene_name, tell)
     else:

@@ -79,20 +79,20 @@ def _frame_looks(request: LooksRequest, transfer: Opened) -> LooksBody:
     cameras = None if request.path is None else _told_way(request, transfer)
     size, found = 0, []
     for index in range(request.num_frames):
-        found.append(dict(document_of(request, transfer.default_look, index)))
+        found.append(dict(document_of(request, request.view, transfer, index)))
         size += len(json.dumps(found[-1]))
         if size > MAX_TOLD_BYTES:
             raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
     return LooksBody(looks=found, cameras=cameras)
 
 
-def _told_way(request: LooksRequest, transfer: Opened) -> list[CameraFrame]:
-    """Where each frame is seen from. Raises ParameterError where no eye can go there."""
+def _told_way(request: LooksRequest, transfer: Opened) -> list[CameraFrame] | None:
+    """Where each frame is seen from; None where it was baked. Raises ParameterError where no eye can go there."""
     if request.view is None:
         raise ParameterError("view", None, "the view that the path is a way of")
     baked_view(request.view, transfer)
     eyes = [eye for eye in check_animation(request, request.view, transfer) if eye is not None]
-    return [CameraFrame(to_world=eye.to_world.ravel().tolist(), yfov=math.degrees(eye.yfov)) for eye in eyes]
+    return [CameraFrame(to_world=eye.to_world.ravel().tolist(), yfov=math.degrees(eye.yfov)) for eye in eyes] or None
 
 
 def _check_looks(request: Keyframes, transfer: Opened) -> None:
@@ -138,7 +138,7 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
         raise ParameterError("size", list(request.size), baked)
     _check_looks(request, transfer)
     check_animation(request, request.view, transfer)
-    look = look_of(request, transfer.default_look, 0)
+    look = look_of(request, request.view, transfer, 0)
     layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
     return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))
 

@@ -18,14 +18,20 @@ MAX_FRAMES = 3600
 MAX_TOLD = 600  # frames whose looks are told at once
 MAX_TOLD_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
+Turns = Literal["eye", "object", "environment"]
 
 
 class Turntable(Body):
     """Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by
-    default where the view begins."""
+    default where the view begins.
+
+    `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps
+    that stay, too; or the `environment` alone, which needs no bake whose eye moves.
+    """
 
     turntable: Frames
     start: CameraFrame | None = None
+    turns: Turns = "eye"
 
 
 class EyePath(Body):

@@ -227,6 +227,9 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert (folder / "0002.png").read_bytes() == b"kept"
     assert main(["render", "quad", "--quick", "--output", str(tmp_path / "x.png")]) == 0
     assert "approximate" in capsys.readouterr().err
+    turned = tmp_path / "turned"
+    assert main(["render", "quad", "--turntable", "2", "--turns", "environment", "--output", str(turned)]) == 0
+    assert len(list(turned.glob("*.png"))) == 2
     assert main(["render", "quad", "--turntable", "0", "--output", str(tmp_path / "none")]) == 1
 
 

@@ -60,6 +60,33 @@ def test_a_turntable_goes_once_around_exactly_or_quickly(
     np.testing.assert_array_equal(exact[0], still)
 
 
+def test_an_object_turns_under_light_that_stays_and_the_light_alone(
+    client: TestClient, scene: dict[str, Any], bake: str, view: dict[str, Any], tmp_path: Path
+) -> None:
+    lamp = {"kind": "point", "position": [2.0, 1.0, 2.0], "emission": [60.0, 30.0, 0.0]}
+    asked = {"bake": bake, "view": view["name"], "exact": False, "looks": [{"lights": {"Lamp": lamp}}]}
+    found = {
+        turns: frames_of(client, asked | {"path": {"turntable": 5, "turns": turns}}, tmp_path)
+        for turns in ("eye", "object", "environment")
+    }
+    first = found["eye"][0]
+    of_frame = {turns: [np.sqrt(np.mean((frame - first) ** 2)) for frame in frames] for turns, frames in found.items()}
+    assert max(frames[0] for frames in of_frame.values()) == 0
+    assert max(of_frame["object"]) < 0.3 * min(of_frame["eye"][1:])  # a ball looks alike from all sides, but for facets
+    assert min(of_frame["environment"][1:]) > 3 * max(of_frame["object"])
+    fixed = client.post("/api/bakes", json={"scene": scene["id"], "size": SIZE, "lights": 50}).headers["location"]
+    of_fixed = {"bake": wait_until_done(client, fixed)["id"], "view": scene["views"][0]["name"]}
+    turned = frames_of(client, of_fixed | {"path": {"turntable": 3, "turns": "environment"}}, tmp_path)
+    look = {"environment": {"rotation": 120}}
+    (expected,) = frames_of(client, of_fixed | {"looks": [look]}, tmp_path)
+    np.testing.assert_array_equal(turned[1], expected)
+    told = client.post(
+        "/api/renders/looks", json=of_fixed | {"looks": [{}], "path": {"turntable": 3, "turns": "environment"}}
+    )
+    assert [frame["environment"]["rotation"] for frame in told.json()["looks"]] == [0, 120, 240]
+    assert told.json()["cameras"] is None
+
+
 def test_a_way_from_camera_to_camera_with_looks_between_looks(
     client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
@@ -88,6 +115,7 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
         {"path": {"turntable": 1_000_000}},
         {"path": {"eyes": []}},
         {"path": {"turntable": 3}, "frames": 4},
+        {"path": {"turntable": 3, "turns": "moon"}},
         {"path": {"eyes": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
         {"path": {"eyes": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
         {"frames": 0},

@@ -1,6 +1,6 @@
 /** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES } from "../looks/export";
+import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
 import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
 import { drawn } from "../state/display";
@@ -45,6 +45,30 @@ const TURNTABLES: Choice[] = [
   },
   { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", false) },
 ];
+
+const TURNS: Record<Turns, string> = {
+  eye: "the eye goes around",
+  object: "the object turns, under light that stays",
+  environment: "the environment turns alone",
+};
+
+/** What the turntables turn. */
+function WhatTurns() {
+  return (
+    <li>
+      <label>
+        Turntable:{" "}
+        <select value={turns.value} onChange={(event) => (turns.value = event.currentTarget.value as Turns)}>
+          {Object.entries(TURNS).map(([value, words]) => (
+            <option key={value} value={value}>
+              {words}
+            </option>
+          ))}
+        </select>
+      </label>
+    </li>
+  );
+}
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
@@ -93,6 +117,7 @@ export function ExportMenu() {
               <span>{help}</span>
             </li>
           ))}
+          {moves.value && <WhatTurns />}
         </ul>
       )}
     </div>

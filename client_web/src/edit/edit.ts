@@ -42,7 +42,9 @@ export function showPassing(label: string, next: Look): void {
   if (current === null) return;
   passing.value = { before: passing.peek()?.before ?? current, label };
   const change = changeTo(current, next);
-  if (change.patch.length > 0) show(change);
+  const [first, more] = change.patch;
+  if (first === undefined) return;
+  show(change, more === undefined ? heldAt(first.path, next) : null); // what changes alone is followed as under a hand
 }
 
 /** Go back to what was there before. */

@@ -7,7 +7,7 @@ import { eyeSize } from "../live/drawing";
 import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
-import type { Look, RenderBody, RenderRequest } from "../protocol";
+import type { Look, RenderBody, RenderRequest, Turntable } from "../protocol";
 import { lightLimits, lightLimitWords } from "../seen/limits";
 import { seenOf } from "../seen/rendered";
 import { bake } from "../state/bakes";
@@ -99,8 +99,12 @@ export function exportExr(layers: boolean | "light_groups"): Promise<void> {
 
 export const TURNTABLE_FRAMES = 72;
 
+/** What goes around in a turntable. */
+export type Turns = NonNullable<Turntable["turns"]>;
+export const turns = signal<Turns>("eye");
+
 /** Once around, from where the eye is: numbered frames in a ZIP, or a video. `exact`: as where the eye rests. */
 export function exportTurntable(format: "png" | "mp4", exact: boolean): Promise<void> {
-  const path = { turntable: TURNTABLE_FRAMES, start: eyeNow() };
+  const path = { turntable: TURNTABLE_FRAMES, turns: turns.value, start: eyeNow() };
   return render("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, exact });
 }

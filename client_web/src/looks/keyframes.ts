@@ -1,8 +1,9 @@
 /** Looks on the time line, which is kept for this tab. What becomes of them is a step of the history. */
-import { effect, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import { history, type Keyframe } from "../edit/history";
 import type { LooksRequest } from "../protocol";
 import { scene } from "../state/scene";
+import { moves } from "../state/views";
 
 export const MAX_KEYFRAMES = 24;
 export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
@@ -12,10 +13,14 @@ export const seconds = signal(4);
 /** How materials go from one look to the next. */
 export const between = signal<NonNullable<LooksRequest["between"]>>("parameters");
 export const loops = signal(true);
-/** What the eye of a view that moves does meanwhile: it stays, goes once around from where the first look is seen, or from
- * key to key. */
-export type EyeWay = "still" | "around" | "along";
+/** What moves meanwhile: nothing; the eye, once around from where the first look is seen, or from key to key; or, before an
+ * eye that stays, the object or the environment, once around. */
+export type EyeWay = "still" | "around" | "along" | "object" | "environment";
 export const eyeWay = signal<EyeWay>("still");
+/** What can move in the view in hand: of one that was baked from one place the environment alone. */
+export const wayNow = computed<EyeWay>(() => (moves.value || eyeWay.value === "environment" ? eyeWay.value : "still"));
+/** How many looks there is something to play of. */
+export const fewestKeyframes = computed(() => (wayNow.value === "still" || wayNow.value === "along" ? 2 : 1));
 
 function put(label: string, after: readonly Keyframe[]): void {
   const before = keyframes.peek();

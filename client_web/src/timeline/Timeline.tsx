@@ -17,6 +17,7 @@ import {
   addKeyframe,
   between,
   eyeWay,
+  fewestKeyframes,
   freeKeyframeName,
   keyframes,
   loops,
@@ -27,6 +28,7 @@ import {
   removeKeyframe,
   seconds,
   seeKeyframeFrom,
+  wayNow,
   type EyeWay,
 } from "../looks/keyframes";
 import { exportAnimation } from "./export";
@@ -37,18 +39,26 @@ const WAYS = [
   { value: "map", label: "Material map", title: "Cook–Torrance materials go across the map, through what lies between" },
 ] as const;
 
-const EYE_WAYS: Record<EyeWay, string> = { still: "Eye stays", around: "Once around", along: "From key to key" };
+const EYE_WAYS: Record<EyeWay, string> = {
+  still: "Eye stays",
+  around: "Once around",
+  along: "From key to key",
+  object: "Object turns",
+  environment: "Environment turns",
+};
+const OF_FIXED: EyeWay[] = ["still", "environment"];
 
-/** What the eye of a view that moves does meanwhile. */
+/** What moves meanwhile. */
 function EyeMeanwhile() {
+  const ways = Object.entries(EYE_WAYS).filter(([way]) => moves.value || OF_FIXED.includes(way as EyeWay));
   return (
     <select
-      aria-label="The eye meanwhile"
-      title="Once around from where the first look is seen, or from where each look is seen to the next"
-      value={eyeWay.value}
+      aria-label="What moves meanwhile"
+      title="The eye once around from where the first look is seen, or from where each look is seen to the next; or, before an eye that stays, the object under light that stays too, or the environment alone"
+      value={wayNow.value}
       onChange={(event) => (eyeWay.value = event.currentTarget.value as EyeWay)}
     >
-      {Object.entries(EYE_WAYS).map(([way, words]) => (
+      {ways.map(([way, words]) => (
         <option key={way} value={way}>
           {words}
         </option>
@@ -59,8 +69,9 @@ function EyeMeanwhile() {
 
 /** What is said where nothing plays yet. */
 function hint(): string | null {
-  const missing = 2 - keyframes.value.length;
-  if (missing > 0) return missing === 2 ? "Add two looks to see what lies between them." : "Add one more look.";
+  const [known, missing] = [keyframes.value.length, fewestKeyframes.value - keyframes.value.length];
+  if (missing === 2) return "Add two looks to see what lies between them, or one and what turns.";
+  if (missing === 1) return known === 0 ? "Add a look." : "Add one more look, or choose what turns.";
   return frames.value === null ? "Finding what lies between…" : null;
 }
 
@@ -110,7 +121,7 @@ function Transport() {
         s in all
       </label>
       <Switch icon="loop" label="Again from the beginning" of={loops} />
-      {moves.value && <EyeMeanwhile />}
+      <EyeMeanwhile />
     </div>
   );
 }

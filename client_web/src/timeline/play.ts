@@ -7,9 +7,9 @@ import { frameLooks } from "../net/api";
 import type { Look, LooksBody, RenderRequest } from "../protocol";
 import { bake } from "../state/bakes";
 import { timelineOpen } from "../state/panels";
-import { moves, viewName } from "../state/views";
+import { viewName } from "../state/views";
 import { attempt } from "../ui/toasts";
-import { between, eyeWay, keyframes, loops, seconds, type EyeWay } from "../looks/keyframes";
+import { between, fewestKeyframes, keyframes, loops, seconds, wayNow, type EyeWay } from "../looks/keyframes";
 
 export const FPS = 25;
 const ASK_MS = 120; // after the last change of the time line
@@ -25,12 +25,14 @@ export const numFrames = computed(() => Math.max(2, Math.round(seconds.value * F
 
 const words = (share: number) => `The time line at ${(share * seconds.peek()).toFixed(1)} s`;
 
-/** The way that the eye goes while `num` frames are shown; null where it stays, or has been baked from one place. */
+/** What goes where while `num` frames are shown; null where nothing does. */
 export function pathOf(way: EyeWay, num: number): NonNullable<RenderRequest["path"]> | null {
   const eye = eyeOf(viewName.peek());
+  if (way === "environment") return { turntable: num, turns: way, start: eye?.frame ?? null };
   if (eye === null || way === "still") return null;
   const eyes = keyframes.peek().map((key): Frame => key.eye ?? eye.first);
-  return way === "around" ? { turntable: num, start: eyes[0] ?? eye.first } : { eyes };
+  if (way === "along") return { eyes };
+  return { turntable: num, turns: way === "object" ? way : "eye", start: eyes[0] ?? eye.first };
 }
 
 function show(): void {
@@ -108,10 +110,10 @@ let newest = 0;
 effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
   const body = { frames: Math.max(numFrames.value, looks.length), between: between.value, view: viewName.value };
-  const way = moves.value ? eyeWay.value : "still";
+  const way = wayNow.value;
   const asked = ++newest;
   frames.value = null;
-  if (!timelineOpen.value || id === null || looks.length < 2) {
+  if (!timelineOpen.value || id === null || looks.length < fewestKeyframes.value) {
     playing.value = false;
     return;
   }
@@ -121,7 +123,7 @@ effect(() => {
       const path = pathOf(way, body.frames);
       const found = await frameLooks({ bake: id, looks: looks.map((look) => ({ ...look })), path, ...body });
       if (asked !== newest) return;
-      cameras.value = found.cameras;
+      cameras.value = way === "environment" ? null : found.cameras; // hands may move an eye that stays
       frames.value = found.looks as unknown as Look[];
       if (passing.peek() !== null) show();
     });

@@ -19,14 +19,26 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
     sigmas = [sigma()]
     add = page.get_by_label("Add a look to the time line")
     add.select_option("live")
-    expect(page.locator(".timeline-hint")).to_have_text("Add one more look.")
+    expect(page.locator(".timeline-hint")).to_have_text("Add one more look, or choose what turns.")
+    moves = page.get_by_label("What moves meanwhile")
+    moves.select_option("environment")
+    time = page.get_by_role("slider", name="Time")
+    expect(page.get_by_role("button", name="Play")).to_be_enabled()
+    turned = []
+    for place in ("Home", "PageUp", "Home", "PageUp"):  # the environment turns, under one look
+        time.focus()
+        page.keyboard.press(place)
+        editor.wait_until_exact()
+        turned.append(editor.pixels())
+    assert changed(turned[0], turned[1]) > 0.02
+    assert changed(turned[0], turned[2]) == changed(turned[1], turned[3]) == 0
+    moves.select_option("still")
     editor.drag(editor.slider(SIGMA), 0.3, 0.9)
     add.select_option("live")
     expect(page.locator(".keyframe")).to_have_count(2)
     rough = editor.pixels()
     sigmas.append(sigma())
     assert sigmas[0] != sigmas[1]
-    time = page.get_by_role("slider", name="Time")
     for _ in range(2):
         before = time.get_attribute("aria-valuetext")
         page.get_by_role("button", name="Play").click()

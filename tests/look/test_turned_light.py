@@ -1,0 +1,31 @@
+"""Looks under light that is turned about an upright line, against the geometry of their lamps."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from relume.light.local import rectangle
+from relume.look import complete, validate
+from relume.look.turned import with_turned_light, with_turned_sky
+
+MIDDLE = [1.0, 2.0, -3.0]
+PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "size": [0.5, 1.5]}
+
+
+@pytest.mark.parametrize("direction", [[0.3, -1.0, 0.2], [0.0, -1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0]], ids=str)
+@pytest.mark.parametrize("degrees", [70.0, 500.0, -30.0])
+def test_a_panel_turns_as_a_whole(default, direction, degrees):
+    document = complete({"lights": {"Sheet": {**PANEL, "direction": direction}}}, default)
+    lit, turned = (validate(of, default) for of in (document, with_turned_light(document, degrees, MIDDLE)))
+    before, after = (rectangle(look.lights["Sheet"].geometry) for look in (lit, turned))
+    turn = Rotation.from_euler("y", degrees, degrees=True)
+    np.testing.assert_allclose(after[0], MIDDLE + turn.apply(before[0] - MIDDLE), atol=1e-9)
+    np.testing.assert_allclose(after[1], turn.apply(before[1]), atol=1e-9)
+    assert turned.environment.rotation == pytest.approx(degrees % 360)
+
+
+def test_a_sky_alone_turns_further_than_it_was(default):
+    document = complete({"environment": {"rotation": 350.0}}, default)
+    turned = validate(with_turned_sky(document, 30.0), default)
+    assert turned.environment.rotation == pytest.approx(20)
+    assert turned.lights == validate(document, default).lights
