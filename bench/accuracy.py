@@ -15,8 +15,9 @@ import numpy as np
 from bench.figure import Figure
 from bench.points import Lit, frame_radiance, lit_points
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
-from bench.standard_error import Estimated, over_points
+from bench.standard_error import over_points
 from relume.brdf.document import complete_term
+from relume.estimated import Estimated
 from relume.reference import reference_radiance, texels_of
 from relume.trace.embree import EmbreeScene
 from relume.trace.visibility import trace_visibility

@@ -23,7 +23,8 @@ from bench import cycles, mitsuba
 from bench.figure import Figure, skipped
 from bench.gather import FLOOR, bake, edit_frames_s, opened, recipe_of, settle
 from bench.indirect import mitsuba_job, reflected, reflected_by_mitsuba
-from bench.standard_error import Estimated, over_passes
+from bench.standard_error import over_passes
+from relume.estimated import Estimated
 from relume.look.document import MAX_BOUNCES
 from relume.memory import Memory
 from relume.methods.registry import open_transfer

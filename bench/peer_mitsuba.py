@@ -25,9 +25,10 @@ from bench.figure import Figure, skipped
 from bench.mitsuba import bsdf, missing, render
 from bench.points import frame_radiance, lit_points
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
-from bench.standard_error import Estimated, over_points
+from bench.standard_error import over_points
 from relume.bake import Recipe
 from relume.brdf.document import complete_term
+from relume.estimated import Estimated
 from relume.look import validate
 from relume.memory import Memory
 from relume.methods.direct import DirectMethod

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from bench.figure import Figure
 from bench.points import Lit
 from bench.scenes import LAMBERT, cook_torrance
-from bench.standard_error import Estimated, over_points
+from bench.standard_error import over_points
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
+from relume.estimated import Estimated
 from relume.light.tiles import Tiles, choose_tiles
 from relume.light.triangles import TriangleLights, weigh
 from relume.operators.shade import shade

@@ -14,8 +14,8 @@ from bench.figure import Figure
 from bench.points import lit_points
 from bench.relit import bake, compare, documents, figures
 from bench.scenes import LAMBERT, environments, teapot_on_table
-from bench.standard_error import Estimated
 from relume.environments.model import Environment
+from relume.estimated import Estimated
 from relume.light.tiles import MIN_LIGHTS
 
 _TURNS = (0, 1 / 32, 1 / 8, 1 / 4, 1 / 2)  # whole texels of any map as wide as a multiple of 32

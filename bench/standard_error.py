@@ -7,17 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.estimated import Estimated, jackknife, root_of_shares
 from relume.reference.truth import error_squared
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-
-
-class Estimated(NamedTuple):
-    """A value and its standard error, both of the same unit."""
-
-    value: float
-    standard_error: float
 
 
 class NoiseFree(NamedTuple):
@@ -62,8 +56,7 @@ def over_points(found: NDArray[np.floating], truth: NDArray[np.floating]) -> Est
     """
     truth = truth.astype(np.float64)
     squares, of = ((found - truth) ** 2).sum(axis=1), (truth**2).sum(axis=1)
-    without = np.sqrt(np.maximum(squares.sum() - squares, 0.0) / (of.sum() - of))
-    return Estimated(float(np.sqrt(squares.sum() / of.sum())), _jackknife(without))
+    return root_of_shares(squares, of)
 
 
 def over_passes(ours: F64, passes: F32) -> NoiseFree:
@@ -83,12 +76,7 @@ def over_passes(ours: F64, passes: F32) -> NoiseFree:
     spread = ((passes - passes.mean(axis=0, dtype=np.float64)) ** 2).mean() / (num - 1)
     return NoiseFree(
         Estimated(float(error), float(np.sqrt(max(0.0, square) + deviation) - error)),
-        Estimated(float(ours.mean() / means.mean() - 1), _jackknife(biases)),
+        Estimated(float(ours.mean() / means.mean() - 1), jackknife(biases)),
         float(np.sqrt(spread / mean_square)),
         float(np.sqrt(max(0.0, square) + 2 * deviation)),
     )
-
-
-def _jackknife(without: F64) -> float:
-    """Standard error of an estimate from its values without each part. (parts,)"""
-    return float(np.sqrt((len(without) - 1) * np.mean((without - without.mean()) ** 2)))

@@ -9,7 +9,7 @@ from bench.figure import Figure
 from bench.points import lit_points
 from bench.relit import bake, compare, documents, figures
 from bench.scenes import LAMBERT, environments, teapot_on_table
-from bench.standard_error import Estimated
+from relume.estimated import Estimated
 from relume.light.tiles import MIN_LIGHTS
 
 

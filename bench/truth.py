@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.mitsuba import averaged, bsdf, missing, passes_of, render
 from bench.scenes import cook_torrance, sky, teapot_on_table
-from bench.standard_error import Estimated, over_passes
+from bench.standard_error import over_passes
 from relume.brdf.document import complete_term
 from relume.environments.model import Environment
+from relume.estimated import Estimated
 from relume.look import default_look, validate
 from relume.reference import reference_image
 from relume.reference.truth import Estimate, compare

@@ -118,6 +118,8 @@ def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
     typer.echo(f"{status.bytes / 1e6:,.1f} MB in {seconds:.1f} s", err=True)
     if status.recipe.method == "direct":
         _report_rays(fetched(bake_path(settings.data, status.id)))
+    if status.recipe.method == "surface":
+        _report_moving_error(fetched(bake_path(settings.data, status.id)))
     return 0
 
 
@@ -131,6 +133,16 @@ def _report_rays(store: Path) -> None:
         f"wrong by the bake's own check: {100 * rays.wrong_share:.2g} %",
         err=True,
     )
+
+
+def _report_moving_error(store: Path) -> None:
+    from relume.methods.store_io import read_moving_error
+    from relume.store import open_store
+
+    found = read_moving_error(open_store(store))
+    if found is not None:
+        off, deviation = 100 * found.value, 100 * found.standard_error
+        typer.echo(f"while the eye moves: {off:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact", err=True)
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:

@@ -429,7 +429,7 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. `moving_error`: null where no eye moves, of bakes of before, and where it could not be measured. */
 export interface HelloMessage {
   type: "hello";
   session: string;
@@ -448,6 +448,7 @@ export interface HelloMessage {
   resume: string;
   role: "view" | "edit" | "admin";
   room: RoomInfo | null;
+  moving_error: MovingError | null;
 }
 
 /** An image that terms of looks may name as their `texture`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. */
@@ -567,6 +568,12 @@ export interface ModelBody {
   data_prefix: string | null;
   parameters: ParameterBody[];
   curves: CurveBody[];
+}
+
+/** How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces that a few eyes see, in the scene's own look. */
+export interface MovingError {
+  value: number;
+  standard_error: number;
 }
 
 /** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values are multiples of `step`, where it is given. */

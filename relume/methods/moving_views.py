@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
 from relume.brdf.channels import Images
+from relume.estimated import Estimated
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
@@ -52,11 +53,13 @@ class MovingViews:
         lit: the light of the bake, in which no view was baked.
         surface: what the eye sees.
         views: where eyes begin.
+        moving_error: how far pictures are off while an eye moves, measured in the bake; None where that is not known.
     """
 
     lit: BouncedViews
     surface: Surface
     views: dict[str, FreeView]
+    moving_error: Estimated | None = None
 
     eyes = Eyes.FREE
     axes = BouncedViews.axes | {Axis.EYE}

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.brdf.channels import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
+from relume.estimated import Estimated
 from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
@@ -22,6 +23,7 @@ from relume.trace.cutouts import Cutouts, check_cutouts
 F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
+MOVING_ERROR = "error/moving"
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
@@ -102,6 +104,14 @@ def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
     if corner >= len(uvs) or len(material) != len(faces) or not 0 <= material.min(initial=0) <= last < len(names):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
     return Holes.of(faces, uvs, material, cutouts)
+
+
+def read_moving_error(store: StoreReader) -> Estimated | None:
+    """How far moving pictures of a bake are off, relative RMS; None where that is not known, as of bakes of before."""
+    if not store.attributes.get("has_moving_error"):
+        return None
+    error, standard_error = store.read(MOVING_ERROR).tolist()
+    return Estimated(error, standard_error) if np.isfinite([error, standard_error]).all() else None
 
 
 def read_rays(store: StoreReader) -> RayCounts:

@@ -2,7 +2,8 @@
 
 What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
 and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
-points, the cells), then "visibility and gather rays" (rows of cells and of points), then "harmonics of light".
+points, the cells), then "visibility and gather rays" (rows of cells and of points), then "harmonics of light", then
+"error of moving pictures", which looks at the bake.
 
     scene/positions, faces, face_material, uvs, textures, …  what the eye sees: relume.moving.points.surface
     lights/…                                                 as in relume.methods.sampled_views
@@ -12,11 +13,13 @@ points, the cells), then "visibility and gather rays" (rows of cells and of poin
     points/position, normal, tangent, material               relume.moving.points.lattice.Placed
     points/visibility, points/links                          lights that a point sees, cells that its rays hit
     harmonics/…                                              relume.methods.harmonic_light
+    error/moving                                             relume.methods.moving_error
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,12 +29,12 @@ from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
-from relume.methods import bounds
+from relume.methods import bounds, moving_error
 from relume.methods.harmonic_light import harmonic_bytes, make_harmonic_light
 from relume.methods.last_read import LastRead
 from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
-from relume.methods.store_io import read_gather_samples, read_tree
+from relume.methods.store_io import MOVING_ERROR, read_gather_samples, read_moving_error, read_tree
 from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.points.surface import pattern_of_points, read_surface_points, tangents_of, textures_of
@@ -61,7 +64,7 @@ class SurfaceMethod:
     """Implements `relume.methods.base.TransferMethod`."""
 
     name = "surface"
-    stages = ("points", "visibility and gather rays", "harmonics of light")
+    stages = ("points", "visibility and gather rays", "harmonics of light", "error of moving pictures")
 
     def __init__(self) -> None:
         self._views = SampledViews()
@@ -73,7 +76,7 @@ class SurfaceMethod:
 
     def open(self, store: StoreReader, key: str, memory: Memory) -> MovingViews:
         """Views from anywhere, lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
-        return MovingViews.of(store, key, memory)
+        return replace(MovingViews.of(store, key, memory), moving_error=read_moving_error(store))
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
@@ -88,6 +91,7 @@ class SurfaceMethod:
         nodes = most_nodes(bounds.num_triangles(scene), recipe.num_points)
         triangles = bounds.num_triangles(scene)
         textures = bounds.texture_bytes(scene)
+        alone = max(nodes * _MAKING_BYTES_A_NODE, moving_error.BYTES + points * moving_error.POINT_BYTES)
         num_rays = points * (recipe.num_lights + rays) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT)
         return Plan(
             num_view_samples=points,
@@ -105,11 +109,11 @@ class SurfaceMethod:
             + bounds.lights_bytes(scene, recipe)
             + (1 << 20),
             peak_bytes=checked.peak_bytes
-            + nodes * _MAKING_BYTES_A_NODE
+            + alone
             + num_cells * _MAKING_BYTES_A_CELL
             + ROWS_A_SHARD * 3 * 2 * rays  # links: traced, joined, written
             + textures,
-            lone_bytes=nodes * _MAKING_BYTES_A_NODE,
+            lone_bytes=alone,
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -118,6 +122,7 @@ class SurfaceMethod:
             **self._views.attributes(scene, recipe),
             "gather_seed": int(scene.id[:7], 16),
             "has_harmonics": True,
+            "has_moving_error": True,
             **textures_of(scene).described,
         }
 
@@ -127,6 +132,8 @@ class SurfaceMethod:
             return [Task(0, index, part, 0, 0) for index, part in enumerate(("lights", "points", "cells"))]
         if stage == 2:
             return [Task(2, 0, "harmonics", 0, 0)]
+        if stage == 3:
+            return [Task(3, 0, "moving error", 0, 0)]
         rows = {part: store.shape(f"{part}/material")[0] for part in ("cells", "points")}
         ranges = [
             (part, start, min(start + ROWS_A_SHARD, num))
@@ -163,6 +170,8 @@ class SurfaceMethod:
             return Written(make[task.view](scene, recipe), 0, 0.0)
         if task.view == "harmonics":
             return Written(make_harmonic_light(store, int(scene.id[:7], 16)), 0, 0.0)
+        if task.view == "moving error":
+            return Written({MOVING_ERROR: moving_error.measured(store, scene)}, 0, 0.0)
         if task.view not in ("cells", "points"):
             raise ValueError(f"{task.view!r} is not in the stage")
         return self._rows(scene, recipe, task, store)

@@ -272,17 +272,17 @@ class MovingPicture:
         """What its rays see."""
         return self._look_around()
 
-    def along_middles(self, size: tuple[int, int]) -> tuple[F32, Seen]:
+    def along_middles(self, size: tuple[int, int], *, is_fine: bool = True) -> tuple[F32, Seen]:
         """What it shows along the rays through the middles of the pixels of a picture of another size.
 
         Args:
-            size: width and height in pixels.
+            size: width and height in pixels. is_fine: with highlights as where the eye rests, not as while it moves.
         Returns:
             Linear radiance (height, width, 3) float32, and what the rays see.
         """
         assert self._look is not None
         seen = self._looked(size).middles(size[0] * size[1])
-        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))._replace(is_fine=True)
+        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))._replace(is_fine=is_fine)
         of = self._transfer.solid, seen, self._camera, size
         shares = [shares_seen(*of, beam.targets) for beam in wanted.arriving.beams]
         return frame_of(self._transfer, wanted, seen, self._camera, size, shares).image, seen

@@ -38,10 +38,11 @@ from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
 from server.running.leave import Leave
 from server.traces import Traces
-from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, ViewInfo
+from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, MovingError, ViewInfo
 from worker.database.faults import AWAY, told
 
 if TYPE_CHECKING:
+    from relume.methods.moving_views import MovingViews
     from relume.moving.view import FreeView
 
 log = logging.getLogger(__name__)
@@ -149,7 +150,15 @@ def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bo
         resume=token,
         role=state.caller.role.word,
         room=None if state.guest is None else state.guest.info(),
+        moving_error=_moving_error(transfer),
     )
+
+
+def _moving_error(transfer: Opened) -> MovingError | None:
+    if transfer.eyes is not Eyes.FREE:
+        return None
+    found = cast("MovingViews", transfer).moving_error
+    return None if found is None else MovingError(value=found.value, standard_error=found.standard_error)
 
 
 def _view_info(view: AnyView, transfer: Opened) -> ViewInfo:

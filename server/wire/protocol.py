@@ -208,12 +208,21 @@ class ViewInfo(Message):
     bounds: tuple[list[float], list[float]] | None = None
 
 
+class MovingError(Message):
+    """How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces
+    that a few eyes see, in the scene's own look."""
+
+    value: float
+    standard_error: float
+
+
 class HelloMessage(Message):
     """server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null.
 
     `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
     light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`:
-    where others share the look, null for a session of one.
+    where others share the look, null for a session of one. `moving_error`: null where no eye moves, of bakes of before,
+    and where it could not be measured.
     """
 
     type: Literal["hello"] = "hello"
@@ -233,6 +242,7 @@ class HelloMessage(Message):
     resume: str
     role: RoleWord
     room: RoomInfo | None
+    moving_error: MovingError | None = None
 
 
 class StatusMessage(Message):

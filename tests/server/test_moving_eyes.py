@@ -101,6 +101,7 @@ def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: S
     assert (view["eye"], found["method"], "eye" in found["axes"]) == ("free", "surface", True)
     lowest, highest = np.array(view["bounds"])
     np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
+    assert 0 < found["moving_error"]["standard_error"] < found["moving_error"]["value"] < 0.5
 
 
 def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -> None:

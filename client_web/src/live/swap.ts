@@ -8,6 +8,7 @@ import { decodeIds } from "../picture/png16";
 import { stage } from "../picture/stage";
 import { axes, bake, coming, method } from "../state/bakes";
 import { connection, freezing } from "../state/connection";
+import { bakedError, movingError } from "../state/fidelity";
 import { forgetWaiting } from "../state/latency";
 import { shownViews, viewName, views } from "../state/views";
 import { attempt, note, showError } from "../ui/toasts";
@@ -62,11 +63,13 @@ async function showArrived(of: BakeConnection, view: string): Promise<void> {
 /** Follow a connection from now on: its bake and views. */
 export function showBake(of: BakeConnection): void {
   if (of.hello === null) return;
-  const { views: baked, method: light, axes: changeable } = of.hello;
+  const { views: baked, method: light, axes: changeable, moving_error: error } = of.hello;
   const shown = shownOf(of.hello);
   batch(() => {
     views.value = baked;
     shownViews.value = shown;
+    if (bake.peek() !== of.bake) movingError.value = null; // of another
+    bakedError.value = error;
     if (!shown.includes(viewName.peek())) viewName.value = shown[0] as string;
     bake.value = of.bake;
     method.value = light;

@@ -1,6 +1,6 @@
 /** How near the shown pictures are to the look. */
 import { effect, signal } from "@preact/signals";
-import type { Fidelity } from "../protocol";
+import type { Fidelity, HelloMessage } from "../protocol";
 
 /** Whether every shown picture equals the look. */
 export const exact = signal(false);
@@ -11,6 +11,8 @@ export const fidelity = signal<Fidelity>("exact");
 
 /** How far the moving picture was from the exact one where an eye rested last, relative RMS; null before. */
 export const movingError = signal<number | null>(null);
+/** The same as it was measured in the bake, in the scene's own look; null where that is not known. */
+export const bakedError = signal<HelloMessage["moving_error"]>(null);
 
 /** As the server ranks them, worst first. */
 const ORDER: Fidelity[] = ["preview", "approximate", "followed", "near", "exact"];

@@ -2,7 +2,7 @@
  * that nothing flickers while a hand drags. */
 import { computed, effect, signal } from "@preact/signals";
 import type { Fidelity } from "../protocol";
-import { fidelity, movingError, settled } from "../state/fidelity";
+import { bakedError, fidelity, movingError, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
 import { moves } from "../state/views";
 
@@ -25,15 +25,17 @@ const OTHER_LIGHT: Mark = {
 const WHY_MOVING = "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer.";
 const THEN = "Where the eye rests the exact picture follows.";
 
-/** With how far it was off where the exact picture is known. */
+const percents = (share: number) => (share < 0.095 ? (100 * share).toFixed(1) : `${Math.round(100 * share)}`);
+
+/** With how far it is off: where the eye rested last, else as it was measured in the bake. */
 function movingMark(): Mark {
-  const off = movingError.value;
+  const [rested, baked] = [movingError.value, bakedError.value];
+  const off = rested ?? baked?.value ?? null;
   if (off === null) return { words: "Moving view, approximate", title: `${WHY_MOVING} ${THEN}` };
-  const percent = Math.max(1, Math.round(100 * off));
-  return {
-    words: `Moving view, about ${percent} % off`,
-    title: `${WHY_MOVING} Where the eye rested last this was ${percent} % of the picture (RMS). ${THEN}`,
-  };
+  const measured =
+    baked === null ? "" : ` In the bake, in the scene's own look, it was ${percents(baked.value)} ± ${percents(baked.standard_error)} % off (RMS of surfaces, standard error).`;
+  const here = rested === null ? "" : ` Where the eye rested last this was ${percents(rested)} % of the picture (RMS).`;
+  return { words: `Moving view, about ${percents(off)} % off`, title: `${WHY_MOVING}${measured}${here} ${THEN}` };
 }
 
 const SHOWN_AFTER_MS = 300;

@@ -1,0 +1,28 @@
+/** What is said of a moving picture: how far it is off, where it rested last or as its bake was measured. */
+import { beforeEach, expect, test, vi } from "vitest";
+import { bakedError, fidelity, movingError } from "../src/state/fidelity";
+import { shownViews, viewName, views } from "../src/state/views";
+import { marks } from "../src/viewport/fidelityMarks";
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  shownViews.value = ["front"];
+  views.value = [{ name: "front", eye: "free" } as never];
+  viewName.value = "front";
+  fidelity.value = "exact";
+  fidelity.value = "approximate";
+  vi.advanceTimersByTime(1000);
+});
+
+const words = () => marks().map((mark) => mark.words);
+
+test("until the eye has rested it is what the bake has measured, with its standard error", () => {
+  [bakedError.value, movingError.value] = [null, null];
+  expect(words()).toContain("Moving view, approximate");
+  bakedError.value = { value: 0.0312, standard_error: 0.0021 };
+  expect(words()).toContain("Moving view, about 3.1 % off");
+  expect(marks()[0]?.title).toContain("3.1 ± 0.2 %");
+  movingError.value = 0.217;
+  expect(words()).toContain("Moving view, about 22 % off");
+  expect(marks()[0]?.title).toContain("3.1 ± 0.2 %");
+});

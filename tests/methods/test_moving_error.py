@@ -1,0 +1,51 @@
+"""What a bake says that its moving pictures are off by, against whole pictures."""
+
+import numpy as np
+from sessions import relative_rmse
+from tiny_scenes import scene_of
+
+from relume import look as looks
+from relume.bake import Recipe
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.methods.stills import Stills
+from relume.moving.picture import MovingPicture
+from relume.render.image import render_image
+from relume.store import bake_here
+
+SIZE = (80, 60)
+
+
+def baked(scene, folder, num_points):
+    recipe = Recipe("surface", ("front",), SIZE, 100, num_points=num_points)
+    return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / f"{num_points}.zarr"), Memory(1 << 30))
+
+
+def off_in_a_whole_picture(transfer, scene):
+    look, view = looks.validate(transfer.default_look, transfer.default_look), transfer.views["front"]
+    moving = MovingPicture(transfer, "front")
+    moving.set_look(look)
+    moving.set_eye(view.camera, SIZE)
+    moving.advance(None)
+    exact = render_image(transfer, "front", look, stills=Stills(transfer.lit, scene))
+    return relative_rmse(moving.image(), exact)
+
+
+def test_a_bake_knows_what_its_pictures_are_off_by(corner, tmp_path):
+    few, many = (baked(corner, tmp_path, num) for num in (80, 1500))
+    for transfer in (few, many):
+        error = transfer.moving_error
+        assert 0 < error.standard_error < 0.5 * error.value
+        # a small picture errs along edges, besides
+        assert 0.7 * error.value < off_in_a_whole_picture(transfer, corner) < 2 * error.value
+    assert few.moving_error.value > 1.5 * many.moving_error.value
+
+
+def test_what_is_dark_is_off_by_nothing_that_is_known(corner, tmp_path):
+    dark = scene_of(
+        *corner.meshes,
+        camera=corner.cameras[0],
+        environment=np.zeros((16, 32, 3), np.float32),
+        materials=corner.materials,
+    )
+    assert baked(dark, tmp_path, 100).moving_error is None
