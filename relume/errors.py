@@ -50,7 +50,7 @@ class PlanError(RelumeError):
     """A bake or render cannot be planned as asked."""
 
 
-class MemoryBudgetError(PlanError):
+class BudgetError(PlanError):
     """A plan needs more than the budget allows; refused before anything is computed."""
 
     def __init__(self, what: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
@@ -58,6 +58,14 @@ class MemoryBudgetError(PlanError):
             f"{what} needs {needed_bytes / 1e6:,.0f} MB and {allowed_bytes / 1e6:,.0f} MB are allowed; {remedy}"
         )
         self.needed_bytes, self.allowed_bytes = needed_bytes, allowed_bytes
+
+
+class MemoryBudgetError(BudgetError):
+    """It is memory that it needs more of."""
+
+
+class DiskBudgetError(BudgetError):
+    """It is room on the disk that it needs more of."""
 
 
 class NotMadeError(RelumeError):

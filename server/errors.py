@@ -128,6 +128,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.ParameterError, Row(422, "parameter", "Value not allowed", CLOSE_POLICY)),
     (relume_errors.ShapeMismatchError, Row(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
     (relume_errors.MemoryBudgetError, Row(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),
+    (relume_errors.DiskBudgetError, Row(507, "disk", "Disk is too full", CLOSE_INTERNAL)),
     (relume_errors.PlanError, Row(422, "plan", "Cannot be planned", CLOSE_INTERNAL)),
     (relume_errors.StoreNotFoundError, Row(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
     (relume_errors.StoreError, Row(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),

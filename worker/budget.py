@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from relume.bake import Plan
-from relume.errors import MemoryBudgetError
+from relume.errors import DiskBudgetError, MemoryBudgetError
 
 REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
@@ -46,7 +46,8 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
         data_dir: on whose disk the store will stand.
         num_processes: worker processes on this machine at once; 0 where they run elsewhere.
     Raises:
-        MemoryBudgetError: it does not fit; the message says what is needed, what there is, and what to do.
+        MemoryBudgetError, DiskBudgetError: it does not fit; the message says what is needed, what there is, and what
+            to do.
     """
     memory = int(available_bytes() * MEMORY_SHARE)
     needed = (plan.peak_bytes - plan.lone_bytes) * num_processes + plan.lone_bytes
@@ -55,6 +56,6 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
         raise MemoryBudgetError(what, needed, memory, f"{REMEDY}, or a scene of fewer triangles")
     free = max(0, shutil.disk_usage(data_dir).free - DISK_RESERVE_BYTES)
     if plan.store_bytes > free:
-        raise MemoryBudgetError(
+        raise DiskBudgetError(
             "the store of this bake on disk", plan.store_bytes, free, f"free some disk, or {REMEDY}"
         )

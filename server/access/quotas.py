@@ -116,6 +116,16 @@ class Quotas:
             if session.get(OwnedRow, (kind, thing)) is None:
                 session.add(OwnedRow(kind=kind, object=thing, owner=who, bytes=num_bytes))
 
+    @contextmanager
+    def owning(self, who: str, kind: Kind, thing: str, num_bytes: int) -> Iterator[None]:
+        """What is queued inside is somebody's before anybody works on it; nobody's where that fails."""
+        self.own(who, kind, thing, num_bytes)
+        try:
+            yield
+        except BaseException:
+            self.disown(kind, thing)
+            raise
+
     def measured(self, kind: Kind, thing: str, num_bytes: int) -> None:
         """What was planned to take so many bytes is finished and takes these."""
         with self._sessions.begin() as session:

@@ -81,6 +81,11 @@ class Work(Generic[Request]):
     problem: str | None
 
 
+def new_id() -> str:
+    """A name for a work."""
+    return secrets.token_hex(8)
+
+
 class WorkQueue(ABC, Generic[Request]):
     """Work of one kind; its files lie in `folder`/<id>/.
 
@@ -149,18 +154,25 @@ class WorkQueue(ABC, Generic[Request]):
         self._wake.set()
         self._thread.join(timeout=30)
 
-    def submit(self, request: Request, client: str = "", prepare: Callable[[Path], object] | None = None) -> str:
+    def submit(
+        self,
+        request: Request,
+        client: str = "",
+        prepare: Callable[[Path], object] | None = None,
+        identity: str | None = None,
+    ) -> str:
         """Queue a request that was checked.
 
         Args:
             request: what is asked for. client: who asks; clients have their turns one after another.
             prepare: puts what the work needs into its folder, quickly.
+            identity: from `new_id`, where somebody has to know it before the work may begin.
         Returns:
             The id of the work.
         Raises:
             BusyError: enough is waiting already, of this client or of all.
         """
-        identity, row, quota = secrets.token_hex(8), self.row, self._quota
+        identity, row, quota = identity or new_id(), self.row, self._quota
         with self._sessions.begin() as session:
             waiting = session.scalars(select(row.client).where(row.state.in_(_ACTIVE))).all()
             if len(waiting) >= quota.of_all:

@@ -19,6 +19,7 @@ from server.apart.animation import check_animation, document_of, look_of
 from server.errors import NotReadyError
 from server.files.video import check_encoder
 from server.queues.renders import Render, planned_bytes
+from server.queues.work_queue import new_id
 from server.routes.bakes import ready_bake
 from server.services import Services, Shared
 from server.wire.body import MAX_NAME, Id
@@ -59,9 +60,9 @@ def _queue(request: RenderRequest, most_bytes: int, caller: Caller, services: Se
     quotas = services.access.quotas
     with quotas.deciding:
         quotas.check_bytes(caller.name, most_bytes)
-        identity = services.renders.submit(request, caller.name)
-        quotas.own(caller.name, "render", identity, most_bytes)
-    return identity
+        identity = new_id()
+        with quotas.owning(caller.name, "render", identity, most_bytes):
+            return services.renders.submit(request, caller.name, identity=identity)
 
 
 @router.post("/looks")

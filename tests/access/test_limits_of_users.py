@@ -17,6 +17,7 @@ from relume.bake import Recipe
 from server.access.access import Access
 from server.access.audit import Audit, Change
 from server.access.buckets import Buckets
+from server.errors import BusyError
 from server.settings import Settings
 from worker.scenes import register_scene
 from worker.service import BakeService
@@ -136,6 +137,32 @@ class TestBytes:
         assert client.delete(f"{url}?forget=true", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == kept
         assert client.delete(f"/api/materials/btf/{body['material']}", headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_a_work_is_its_owners_before_it_can_be_done_and_nobodys_where_it_is_refused(
+        self,
+        client: TestClient,
+        bearer: Bearer,
+        access: Access,
+        settings: Settings,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        settings.max_bytes_each = 1_000_000
+        owned: list[int] = []
+
+        def refuse(*args: object, **kwargs: object) -> str:
+            owned.append(access.quotas.used_bytes("Ann"))
+            raise BusyError("100 BTFs are waiting; try again when some are done")
+
+        monkeypatch.setattr(client.app.state.services.btfs, "submit", refuse)
+        images = zipped(tmp_path / "a.zip")
+        with images.open("rb") as file:
+            sent = client.post(
+                "/api/materials/btf-works", files={"images": ("a.zip", file)}, headers=bearer("edit", "Ann")
+            )
+        assert sent.status_code == 503
+        assert owned == [images.stat().st_size]
         assert access.quotas.used_bytes("Ann") == 0
 
 

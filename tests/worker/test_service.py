@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.errors import DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
+from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease
 from worker.scenes import delete_scene, register_scene
@@ -155,11 +155,12 @@ def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, ca
 
 
 def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
-    for cost in ({"peak_bytes": 1 << 60}, {"store_bytes": 1 << 60}):
-        with open_service(tmp_path, **cost) as service:
-            with pytest.raises(MemoryBudgetError, match="fewer lights"):
+    lacking: dict[str, type[BudgetError]] = {"peak_bytes": MemoryBudgetError, "store_bytes": DiskBudgetError}
+    for cost, refusal in lacking.items():
+        with open_service(tmp_path, **{cost: 1 << 60}) as service:
+            with pytest.raises(refusal, match="fewer lights"):
                 service.plan(SCENE.id, RECIPE)
-            with pytest.raises(MemoryBudgetError):
+            with pytest.raises(refusal):
                 service.submit(SCENE.id, RECIPE)
             assert service.bakes() == []
 

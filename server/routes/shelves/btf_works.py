@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,7 @@ from server.apart.btfs import IMAGES
 from server.files.importing import UPLOAD_PREFIX
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
+from server.queues.work_queue import new_id
 from server.services import Services, Shared
 from server.wire.body import Id
 from server.wire.btfs import BOUND, Bound, BtfRequest, BtfWorkBody, SyntheticBtfRequest
@@ -42,16 +44,30 @@ async def import_btf(
     quotas, sent_bytes = services.access.quotas, upload_bytes(images)
     await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
     async with services.import_slots:
-        identity = await run_in_threadpool(_submit_images, images, name, error, caller, services)
-    await run_in_threadpool(quotas.own, caller.name, "btf-work", identity, sent_bytes)
+        identity = await run_in_threadpool(_submit_images, images, sent_bytes, name, error, caller, services)
     return _answer(identity, services, response)
 
 
-def _submit_images(images: UploadFile, name: str, error: float, caller: Caller, services: Services) -> str:
+def _submit_images(
+    images: UploadFile, sent_bytes: int, name: str, error: float, caller: Caller, services: Services
+) -> str:
     request = BtfRequest(name=check_name(name or plain_stem(images.filename) or "BTF"), error=error)
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(images, Path(folder) / IMAGES)
-        return services.btfs.submit(request, caller.name, prepare=lambda into: shutil.move(path, into / IMAGES))
+        return _submit(request, sent_bytes, caller, services, lambda into: shutil.move(path, into / IMAGES))
+
+
+def _submit(
+    request: BtfRequest,
+    num_bytes: int,
+    caller: Caller,
+    services: Services,
+    prepare: Callable[[Path], object] | None = None,
+) -> str:
+    """Queue a work that is its caller's from the beginning: it may be done before the next line is reached."""
+    identity = new_id()
+    with services.access.quotas.owning(caller.name, "btf-work", identity, num_bytes):
+        return services.btfs.submit(request, caller.name, prepare, identity)
 
 
 @router.post("/synthetic", status_code=202)
@@ -63,8 +79,7 @@ async def make_synthetic_btf(
     wanted = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
     quotas = services.access.quotas
     await run_in_threadpool(quotas.check_bytes, caller.name, 1)  # how many it will take is known when it is made
-    identity = await run_in_threadpool(services.btfs.submit, wanted, caller.name)
-    await run_in_threadpool(quotas.own, caller.name, "btf-work", identity, 0)
+    identity = await run_in_threadpool(_submit, wanted, 0, caller, services)
     return _answer(identity, services, response)
 
 
