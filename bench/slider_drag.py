@@ -119,7 +119,8 @@ def _follow(
     picture.set_look(looks[0])
     _settle(picture)
     picture.touch(f"{_TERM}/{touched}")
-    picture.freeze(lambda share: None, lambda: False)
+    while picture.next_job() is not None:  # a rough operator may come first
+        picture.freeze(lambda share: None, lambda: False)
     errors, taken = [], []
     for look, right in zip(looks[1:], exact[1:], strict=True):
         began = time.perf_counter()

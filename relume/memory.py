@@ -161,6 +161,13 @@ class Memory:
         with self._room.lock:
             return key in self._room.passing or key in self._room.lasting
 
+    def forget(self, key: Hashable) -> None:
+        """Drop an entry that is of no use any more, where there is one."""
+        with self._room.lock:
+            for part in (self._room.passing, self._room.lasting):
+                if key in part:
+                    part.drop(key)
+
     def check(self, num_bytes: int) -> None:
         """Raises MemoryBudgetError where an entry of so many bytes is larger than the budget."""
         if num_bytes > self.budget_bytes:

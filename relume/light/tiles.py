@@ -27,8 +27,8 @@ MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
 
 # Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
 # here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
-_SOLID_ANGLE_EXPONENT = 0.4
-_UNIFORM_SHARE = 1e-2
+SOLID_ANGLE_EXPONENT = 0.4
+UNIFORM_SHARE = 1e-2
 # Light that may come to any azimuth has more dim places where a lamp may arrive (docs/adr/0013-relightable-bakes.md).
 _RELIGHTABLE_UNIFORM_SHARE = 0.1
 
@@ -42,6 +42,13 @@ _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 def unit(v: F64) -> F64:
     """Scale vectors to length one, along the last axis."""
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
+
+
+def solid_angles(corners: F64) -> F64:
+    """Compute those of spherical triangles (M, 3, 3), sr (van Oosterom and Strackee 1983). (M,)"""
+    a, b, c = corners.transpose(1, 0, 2)
+    dots = 1 + np.sum(a * b + b * c + c * a, axis=1)
+    return np.asarray(2 * np.arctan2(np.sum(a * np.cross(b, c), axis=1), dots))
 
 
 @dataclass(frozen=True)
@@ -70,10 +77,8 @@ class Tiles:
 
     @cached_property
     def solid_angles(self) -> F64:
-        """Of each tile, sr (van Oosterom and Strackee 1983). (M,)"""
-        a, b, c = self.corners.transpose(1, 0, 2)
-        dots = 1 + np.sum(a * b + b * c + c * a, axis=1)
-        return np.asarray(2 * np.arctan2(np.sum(a * np.cross(b, c), axis=1), dots))
+        """Of each tile, sr. (M,)"""
+        return solid_angles(self.corners)
 
     @cached_property
     def centroids(self) -> F64:
@@ -183,7 +188,7 @@ class _Subdivision:
     def _push(self, code: int, corners: F64, texels: NDArray[np.int64]) -> None:
         light = float(self.luminous[texels].sum())
         extent = float(self.solid_angles[texels].sum())
-        metric = light * max(extent, 1e-12) ** _SOLID_ANGLE_EXPONENT + self.uniform * extent
+        metric = light * max(extent, 1e-12) ** SOLID_ANGLE_EXPONENT + self.uniform * extent
         # fewer than two texels hold nothing more to resolve: last in the queue
         can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
         heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, corners, texels))
@@ -218,7 +223,7 @@ def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> T
         ring = radiance.mean(axis=1, keepdims=True, dtype=np.float64).astype(np.float32)
         tree = _Subdivision(np.broadcast_to(ring, radiance.shape), _RELIGHTABLE_UNIFORM_SHARE)
     else:
-        tree = _Subdivision(radiance, _UNIFORM_SHARE)
+        tree = _Subdivision(radiance, UNIFORM_SHARE)
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
     leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,18 @@ _TANGENT_COSINE = (
 )
 
 
+class Parts(NamedTuple):
+    """What merged triangles are made of: M of a finer division, which points see or do not.
+
+    Attributes:
+        group: the merged triangle that each is in. (M,) int32
+        share: of that triangle's light. (M,) float32
+    """
+
+    group: NDArray[np.int32]
+    share: F32
+
+
 @dataclass(frozen=True)
 class TriangleLights:
     """M spherical triangles with the environment's light.
@@ -34,11 +46,13 @@ class TriangleLights:
         nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32
         direction: mean direction of the light; shadow rays go there. (M, 3) float32
         irradiance: ∫ L dω over the tile, what the light brings to a surface across its way; per channel. (M, 3) float32
+        parts: where each is merged of several, which are what points see.
     """
 
     nodes: F32
     direction: F32
     irradiance: F32
+    parts: Parts | None = None
 
     @property
     def num_lights(self) -> int:
@@ -71,8 +85,8 @@ def _sums(place: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
 
 
 @dataclass(frozen=True)
-class _Texels:
-    """The texels of an environment and the tiles they lie in.
+class Texels:
+    """The texels of an environment, or other small places, and the tiles they lie in.
 
     Attributes:
         tile: that each lies in. (n,) luminous: luminance × solid angle. (n,) directions: unit. (n, 3)
@@ -109,7 +123,7 @@ def _power_of(moments: F64, exponent: float) -> F64:
     return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
 
 
-def _matched(corners: F64, texels: _Texels) -> tuple[F64, F64]:
+def matched(corners: F64, texels: Texels) -> tuple[F64, F64]:
     """Find the triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
 
     Args:
@@ -133,14 +147,14 @@ def _matched(corners: F64, texels: _Texels) -> tuple[F64, F64]:
     return matched, mean
 
 
-def _moments(texels: _Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
+def _moments(texels: Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
     """Compute first (F, 2) and second central (F, 2, 2) moments of tiles' light in the planes that touch at `mean`.
 
     Args:
         total: luminous light of all tiles. (M,) mean: its directions. (M, 3) fitted: the tiles in question. (F,)
     """
     is_fitted = np.isin(texels.tile, fitted)
-    chosen = _Texels(*(values[is_fitted] for values in vars(texels).values()))
+    chosen = Texels(*(values[is_fitted] for values in vars(texels).values()))
     place = np.searchsorted(fitted, chosen.tile)
     frames, weight = _tangent_frames(mean[fitted]), chosen.luminous / total[chosen.tile]
 
@@ -176,9 +190,9 @@ def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
     solid_angles = np.repeat(texel_solid_angles(height, width), width)
     light = radiance.reshape(-1, 3).astype(np.float64) * solid_angles[:, None]
     luminous = luminance(light.astype(np.float32)).astype(np.float64)
-    texels = _Texels(tiles.locate(directions), luminous, directions, solid_angles)
+    texels = Texels(tiles.locate(directions), luminous, directions, solid_angles)
     irradiance = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
-    corners, mean = _matched(tiles.corners, texels)
+    corners, mean = matched(tiles.corners, texels)
     return TriangleLights(nodes_of(corners), mean.astype(np.float32), irradiance.astype(np.float32))
 
 

@@ -28,7 +28,8 @@ MOVING_ERROR = "error/moving"
 
 def read_lights(store: StoreReader) -> TriangleLights:
     """The light triangles of a store."""
-    return TriangleLights(*(store.read(f"lights/{name}") for name in ("nodes", "direction", "power")))
+    nodes, direction, power = (store.read(f"lights/{name}") for name in ("nodes", "direction", "power"))
+    return TriangleLights(nodes, direction, power)
 
 
 def read_tiles(store: StoreReader) -> Tiles:

@@ -18,6 +18,7 @@ from relume.environments.equirect import lookup, shrunk, turned
 from relume.errors import ParameterError, StoreError
 from relume.light.blur import blurred, reduced
 from relume.light.local import num_samples
+from relume.light.merged import merge, num_merged
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
@@ -112,6 +113,14 @@ class BakedViews:
     def lights_of(self, light: Light) -> TriangleLights:
         """Those of them by which light comes straight to the picture."""
         return shown_of(self.lights_in(light.environment), light)
+
+    def merged(self, light: Light) -> TriangleLights:
+        """The same, merged into a few. See `Transfer`."""
+
+        def merged() -> TriangleLights:
+            return merge(self.lights_in(light.environment), self.tiles, num_merged(self.num_lights))
+
+        return shown_of(self.memory.keep((self.key, "merged lights", light.environment), merged), light)
 
     def preview_lights_of(self, light: Light) -> TriangleLights:
         """The same, found quickly."""

@@ -60,6 +60,13 @@ class Frozen(Operator):
         return self.transport[tile, :, :, offset].astype(np.float64)
 
 
+class Rough(Frozen):
+    """An operator of merged lights: how an image changes, nearly, until the exact one is there."""
+
+    is_whole = False
+    is_exact = False
+
+
 def tiles_of(num_samples: int) -> tuple[int, int]:
     """Number of tiles, and samples a tile, that hold so many samples: tiles alike, none much larger than needed."""
     tiles = max(1, -(-num_samples // TILE_SAMPLES))

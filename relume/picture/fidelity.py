@@ -12,7 +12,8 @@ class Fidelity(IntEnum):
 
     NOTHING: nothing has been made. PREVIEW: interpolated between few samples. FOLLOWED: an exact image and what has
     changed of light since, evaluated roughly. COARSE: an exact image and what has changed of a curve since, found at
-    some of its samples. NEAR: a sum along the few nodes of a parameter, or of packed columns. EXACT: the whole sum.
+    some of its samples or in merged lights. NEAR: a sum along the few nodes of a parameter, or of packed columns.
+    EXACT: the whole sum.
     """
 
     NOTHING = 0

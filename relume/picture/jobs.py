@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
-from relume.operators.frozen import Frozen
+from relume.operators.frozen import Frozen, Rough
 from relume.operators.operator import Operator
 from relume.operators.packed import Packed
 from relume.operators.shade import Shaded, shade, shaded_bytes
@@ -27,7 +27,7 @@ from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
 from relume.picture.shown import Shown
 from relume.picture.thinning import Form, freeze_some
-from relume.picture.view_images import ViewImages
+from relume.picture.view_images import ROUGHLY, ViewImages
 from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
@@ -115,7 +115,8 @@ class Freeze:
             place: of the term. basis: what is free in it. form: from `form_for`.
         """
         images, material, live = place
-        key, is_seen = images.key_of_operator(material, live, basis, live.target), live.is_seen()
+        key = images.key_of_operator(material, live, basis, live.target, is_rough=form.is_rough)
+        is_seen = live.is_seen()
         return cls(place, basis, key, live.term, live.target, live.light, form, is_seen)
 
     @property
@@ -139,6 +140,9 @@ class Freeze:
                 watched = progress, cancelled
                 return self.basis.freeze(self.term, self.bands, lights, some, *watched, is_packed=self.form.is_packed)
 
+            if self.form.is_rough:
+                lights = images.transfer.merged(self.light)
+                return Rough(**vars(freeze(receivers)))
             if self.form.step == 1:
                 return freeze(receivers)
             return freeze_some(images.view, material.index, self.form.step, receivers, freeze)
@@ -152,7 +156,11 @@ class Freeze:
         not exact goes on from the image as it is, if that differs in nothing else.
         """
         images, material, live = self.place
-        if not self.place.is_there() or self.key != images.key_of_operator(material, live, self.basis, live.target):
+        is_rough = self.form.is_rough
+        if not is_rough:
+            images.cache.forget((*self.key, ROUGHLY))
+        wanted = images.key_of_operator(material, live, self.basis, live.target, is_rough=is_rough)
+        if not self.place.is_there() or self.key != wanted:
             return
         ready, differing = live.ready, set(live.differing())
         is_known = live.is_firm and ready.basis == self.basis  # its coefficients hold, also where only some were moved

@@ -1,6 +1,9 @@
 """What a term's operator is made of: all of its samples in float32 where the memory has room for that, else less.
 
-What a hand is on is followed whatever the picture's size. An operator along a curve of 256 bands takes 3 kB a sample,
+What a hand is on is followed whatever the picture's size. Where an operator would take a hand's patience, a rough one
+is there first, by which the picture goes on (docs/adr/0089-operators-of-merged-lights.md).
+
+ An operator along a curve of 256 bands takes 3 kB a sample,
 6.4 GB where a material fills 1920×1080 pixels. In 16 bits it is half of that, to 10⁻⁴; where that is too much, one
 sample of each square of pixels says how the picture changes. At rest every sample is shaded
 (docs/adr/0083-operators-of-some-samples.md).
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 from relume.operators.frozen import Frozen, frozen_bytes, packed_bytes
 from relume.operators.packed import Packed
 from relume.operators.thin import NUM_NEAR, Thin, thin_bytes
+from relume.parallel import num_threads
 from relume.picture.material_image import MaterialImage
 from relume.project.receivers import GatherRays, Rays, Receivers
 from relume.views.sharing import sharing
@@ -28,6 +32,8 @@ _SPARE = 8  # of the budget, left beside a packed one: an image that is shaded a
 _SHARE = 2  # an operator of some samples takes the budget over this: images have room beside it, another one follows
 _LARGEST_STEP = 8
 _FEWEST = 256  # samples; fewer do not say where a highlight is
+_LONG = 12_000_000  # pairs of samples and lights a thread, of which it takes a third of a second and more
+_FEW = 800  # lights, of which less than half would be left to merge into
 _SOFT = 0.05  # pixels²; what a chosen sample's own neighbours have of it
 
 
@@ -36,10 +42,12 @@ class Form(NamedTuple):
 
     Attributes:
         step: one sample of each square of so many pixels; 1: all. is_packed: in 16 bits.
+        is_rough: of merged lights.
     """
 
     step: int
     is_packed: bool
+    is_rough: bool = False
 
     def num_bytes(self, material: MaterialImage, num_columns: int) -> int:
         """Memory that it takes of a material's term. num_columns: in each channel."""
@@ -50,6 +58,7 @@ class Form(NamedTuple):
 
 EXACT = Form(1, is_packed=False)
 PACKED = Form(1, is_packed=True)
+ROUGH = Form(1, is_packed=False, is_rough=True)
 
 
 def form_for(material: MaterialImage, num_columns: int, budget_bytes: int) -> Form | None:
@@ -67,6 +76,16 @@ def form_for(material: MaterialImage, num_columns: int, budget_bytes: int) -> Fo
         if form.num_bytes(material, num_columns) <= budget_bytes // _SHARE:
             return form if material.num_squares(step) >= _FEWEST else None
     return None
+
+
+def comes_roughly(material: MaterialImage, num_columns: int, num_lights: int, budget_bytes: int) -> bool:
+    """Whether an exact operator takes so long to be made that a rough one is to be there first, and both fit.
+
+    Args:
+        material, num_columns, budget_bytes: as in `form_for`. num_lights: that its samples may see.
+    """
+    is_long = num_lights >= _FEW and material.num_samples * num_lights > _LONG * num_threads()
+    return is_long and 2 * EXACT.num_bytes(material, num_columns) <= budget_bytes
 
 
 def freeze_some(

@@ -139,6 +139,7 @@ class Transfer(Opened, Protocol):
     """One opened bake of fixed views.
 
     Attributes:
+        num_lights: triangles that its environment was divided into, about.
         derived, edited: images of the look that the scene was imported with, and of others.
         reflected: light between surfaces; None where none was baked.
     """
@@ -147,6 +148,8 @@ class Transfer(Opened, Protocol):
     def store(self) -> StoreReader: ...
     @property
     def views(self) -> Mapping[str, View]: ...
+    @property
+    def num_lights(self) -> int: ...
     @property
     def derived(self) -> ImageFiles: ...
     @property
@@ -165,6 +168,10 @@ class Transfer(Opened, Protocol):
         Args:
             view: whose samples. material: index of the material. memory: keeps shadows that must be traced.
         """
+        ...
+
+    def merged(self, light: Light) -> TriangleLights:
+        """The triangles by which light comes straight to a picture, merged into a few that know their parts."""
         ...
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> Few:

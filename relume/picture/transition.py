@@ -10,11 +10,12 @@ before, with the background, the shining surfaces and the gain of that light.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from relume.look import Look
 from relume.look.model import Rgb
 from relume.operators.edit_basis import CurveBasis, EditBasis
+from relume.operators.frozen import Rough
 from relume.operators.shade import shaded_bytes
 from relume.picture.fidelity import Fidelity
 from relume.picture.hand import Hand
@@ -26,7 +27,7 @@ from relume.picture.routes.follow import Follow
 from relume.picture.routes.mix import Mix
 from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared
 from relume.picture.routes.recall import Recall
-from relume.picture.thinning import EXACT, Form, form_for
+from relume.picture.thinning import EXACT, ROUGH, Form, comes_roughly, form_for
 from relume.picture.view_images import ViewImages
 from relume.project.levels import contract_levels
 
@@ -107,7 +108,9 @@ class Transition:
 
     def next_job(self, hand: Hand, look: Look) -> Job | None:
         """The most urgent job; None where nothing is lacking. hand: what the user is on. look: as it is now."""
-        stages = (self._rows_wanted, self._preview_wanted, self._elements_wanted, self._lacking, self._touched)
+        stages: Sequence[Callable[[Hand], Job | None]] = (
+            self._rows_wanted, self._preview_wanted, self._elements_wanted, self._lacking, self._touched, self._awaited,
+        )  # fmt: skip
         for stage in stages:
             found = stage(hand)
             if found is not None:
@@ -162,7 +165,7 @@ class Transition:
         place, basis = min(candidates, key=lambda item: _cost(item[0], item[1], hand))
         form = None if basis is None else self._form(place, basis)
         if basis is not None and form is not None:
-            return Freeze.of(place, basis, form)
+            return self._freeze(place, basis, form)
         # where no operator fits, an image that shows older curves stands until the hand rests
         return Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
 
@@ -214,7 +217,25 @@ class Transition:
             return None
         has_operator = active is not None and self._images.operator(touched.place.material, live) is not None
         is_enough = active is not None and (active == basis or (active.is_complete and active.moves == basis.moves))
-        return None if has_operator and is_enough else Freeze.of(touched.place, basis, form)
+        return None if has_operator and is_enough else self._freeze(touched.place, basis, form)
+
+    def _awaited(self, hand: Hand) -> Job | None:
+        """The exact operator of what is followed by a rough one; frames go on meanwhile."""
+        for place in self._places():
+            basis = place.live.ready.basis
+            if basis is not None and isinstance(self._images.operator(place.material, place.live), Rough):
+                return Freeze.of(place, basis, EXACT)
+        return None
+
+    def _freeze(self, place: Place, basis: EditBasis, form: Form) -> Freeze:
+        """An operator; the rough one first, where a hand would wait long for the exact one, and can go on by it."""
+        images, (_, material, live) = self._images, place
+        if form != EXACT or images.cache.holds(images.key_of_operator(material, live, basis, live.target)):
+            return Freeze.of(place, basis, form)
+        lights = images.transfer.num_lights if live.light.shows_sky else 0
+        is_first = comes_roughly(material, basis.num_columns, lights, images.cache.budget_bytes)
+        can_go_on = goes_on_from(live.ready, live.differing(), basis)
+        return Freeze.of(place, basis, ROUGH if is_first and can_go_on else form)
 
     def _refining(self) -> Job | None:
         """What makes an image exact that is near it already."""

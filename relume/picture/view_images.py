@@ -28,6 +28,9 @@ from relume.project.receivers import Receivers
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
+ROUGHLY = "roughly"
+"""Ends the names of operators of merged lights."""
+
 _WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
 
 
@@ -144,14 +147,20 @@ class ViewImages:
         return self.transfer.key, self.view.name, material.index  # the store comes first: a memory asks whose it is
 
     def key_of_operator(
-        self, material: MaterialImage, live: LiveTerm, basis: EditBasis, bands: Mapping[str, F64]
+        self,
+        material: MaterialImage,
+        live: LiveTerm,
+        basis: EditBasis,
+        bands: Mapping[str, F64],
+        *,
+        is_rough: bool = False,
     ) -> tuple[Hashable, ...]:
         """Name of the operator of a material's live term along a basis in the memory.
 
         Args:
-            bands: of the term's curves, (3, J) each; those that it moves are free.
+            bands: of the term's curves, (3, J) each; those that it moves are free. is_rough: of that of merged lights.
         """
-        return *self._place(material), live.key_of_operator(basis, bands)
+        return *self._place(material), live.key_of_operator(basis, bands), *((ROUGHLY,) if is_rough else ())
 
     def key_of_image(self, material: MaterialImage, live: LiveTerm, light: Light) -> tuple[Hashable, ...]:
         """Name of the image of a material's live term, of its target in some light."""
@@ -167,9 +176,10 @@ class ViewImages:
         return self.cache.find(key, Shaded) is not None or self.transfer.has_image(key[1:])
 
     def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
-        """The operator that a term follows now, unless the memory has dropped it."""
+        """The operator that a term follows now, a rough one until the other is there; none if the memory dropped it."""
         ready = live.ready
         if ready.basis is None or not live.is_firm:
             return None
         key = self.key_of_operator(material, live, ready.basis, ready.bands)
-        return self.cache.find(key, Operator)  # type: ignore[type-abstract]
+        found = (self.cache.find(name, Operator) for name in (key, (*key, ROUGHLY)))  # type: ignore[type-abstract]
+        return next((operator for operator in found if operator is not None), None)

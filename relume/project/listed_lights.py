@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.angles import ALPHA, BETA, THETA_H, TILT_X, TILT_Y
 from relume.brdf.term import Term
-from relume.light.triangles import TriangleLights
+from relume.light.merged import see_parts, weigh_by_parts
+from relume.light.triangles import Parts, TriangleLights
 from relume.project.contraction import Contraction
 from relume.project.light_culling import list_lights
 from relume.project.receivers import Receivers
@@ -58,6 +59,7 @@ class ListedLights:
         radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
         self._kinds, self._support = with_half_angle(contraction.kinds, radians)
         capacity = POINTS_A_BLOCK * lights.num_lights
+        self._seen = np.empty((POINTS_A_BLOCK, lights.num_lights if lights.parts is not None else 0), np.float32)
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
         self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
@@ -68,12 +70,20 @@ class ListedLights:
         Returns:
             q cos θi of each entry (1 or 3, K), and the local wo (3, K) that it belongs to.
         """
-        r, lights = self._receivers, self._lights
+        r, lights, some = self._receivers, self._lights, slice(start, stop)
+        visible = r.visible[some] if lights.parts is None else self._see_parts(lights.parts, start, stop)
         num = list_lights(
-            r.normal, r.tangent, r.wo, r.visible, lights.direction, lights.radius, self._kinds,
-            self._support, start, stop, self.first, self.light, self._wi, self._wo,
+            r.normal[some], r.tangent[some], r.wo[some], visible, lights.direction, lights.radius, self._kinds,
+            self._support, 0, stop - start, self.first, self.light, self._wi, self._wo,
         )  # fmt: skip
         wi, wo = self._wi[:, :num], self._wo[:, :num]
         shading = self._term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
         shading *= wi[2]
+        if lights.parts is not None:
+            weigh_by_parts(self.first[: stop - start + 1], self.light, self._seen, shading)
         return shading, wo
+
+    def _see_parts(self, parts: Parts, start: int, stop: int) -> NDArray[np.uint8]:
+        """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
+        see_parts(self._receivers.visible, parts.group, parts.share, start, stop, self._seen)
+        return np.packbits(self._seen[: stop - start] > 0, axis=1, bitorder="little")

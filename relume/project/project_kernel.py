@@ -28,6 +28,7 @@ _TOLERANCE_BANDS = np.float32(0.04)
 _TOLERANCE_SHARE = np.float32(0.015)
 _QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
 _MAX_DEPTH = 6
+FINE, ROUGH = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
@@ -107,22 +108,23 @@ def _append(gamma, which, count, nodes, bent, origin, share, leaves, shares, of_
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _sort_out(gamma, bend, num_triangles, level, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
+def _sort_out(gamma, bend, num_triangles, level, fine, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
     """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
 
     Args:
-        origin: light that each triangle is a part of.
+        fine: see `project_points`. origin: light that each triangle is a part of.
         lists: scratch for the numbers of triangles; those that must be divided further are left in lists[2].
     Returns:
         The new number of leaves, and how many must be divided.
     """
     num_whole = num_quartered = num_divided = 0
-    is_last = level == _MAX_DEPTH - 1
+    bend_of_whole, last_level = fine
+    bend_of_quartered, is_last = _QUARTERED_BEND * bend_of_whole, level == last_level
     for n in range(num_triangles):
         lists[0, num_whole] = n
         lists[1, num_quartered] = n
         lists[2, num_divided] = n
-        is_whole, is_simple = bend[n] <= 1, bend[n] <= _QUARTERED_BEND or is_last
+        is_whole, is_simple = bend[n] <= bend_of_whole, bend[n] <= bend_of_quartered or is_last
         num_whole += (bend[n] >= 0) & is_whole
         num_quartered += is_simple & (not is_whole)
         num_divided += (not is_simple) & (not is_whole)
@@ -304,7 +306,7 @@ def _spend(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, wo, support, local, gamma, origin, count, parts, lists, bend, leaves, shares, of_entry, num
+    kinds, scale, wo, support, fine, local, gamma, origin, count, parts, lists, bend, leaves, shares, of_entry, num
 ):  # fmt: skip
     """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
 
@@ -314,12 +316,12 @@ def _divide(  # type: ignore[no-untyped-def]
         The new number of leaves.
     """
     part_local, part_gamma, part_origin = parts
-    for level in range(1, _MAX_DEPTH):
+    for level in range(1, fine[1] + 1):
         to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
         num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
         _angles(kinds, scale, wo, to_local, 3, num_parts, to_gamma)
         _bends(to_gamma, support, num_parts, bend)
-        num, count = _sort_out(to_gamma, bend, num_parts, level, to_origin, leaves, shares, of_entry, num, lists)
+        num, count = _sort_out(to_gamma, bend, num_parts, level, fine, to_origin, leaves, shares, of_entry, num, lists)
         local, gamma, origin = to_local, to_gamma, to_origin
     return num
 
@@ -351,7 +353,7 @@ def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-u
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, irradiance,
-    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, start, stop, out,
+    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, fine, start, stop, out,
 ):  # fmt: skip
     """Project the listed lights of points [start, stop).
 
@@ -361,6 +363,8 @@ def project_points(  # type: ignore[no-untyped-def]
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
         nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
         kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active: see `Contraction`.
+        fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
+            division. `FINE` or `ROUGH`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.
     """
@@ -386,7 +390,7 @@ def project_points(  # type: ignore[no-untyped-def]
             _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
         _angles(kinds, scale, scaled_wo, local, 0, num_entries, gamma)
         _bends(gamma, support, num_entries, bend)
-        num, num_divided = _sort_out(gamma, bend, num_entries, 0, origin, leaves, shares, of_entry, 0, lists)
+        num, num_divided = _sort_out(gamma, bend, num_entries, 0, fine, origin, leaves, shares, of_entry, 0, lists)
         divided[:num_divided] = lists[2, :num_divided]
         for batch in range(0, num_divided, _BATCH):
             if num + _MOST_LEAVES > capacity:
@@ -399,7 +403,7 @@ def project_points(  # type: ignore[no-untyped-def]
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
             num = _divide(
-                kinds, scale, scaled_wo, support, local, gamma, origin, count, parts, lists, bend,
+                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, parts, lists, bend,
                 leaves, shares, of_entry, num,
             )  # fmt: skip
         _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight)

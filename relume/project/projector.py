@@ -15,7 +15,7 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
 from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
-from relume.project.project_kernel import project_points
+from relume.project.project_kernel import FINE, ROUGH, project_points
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
 from relume.vector_code import NUM as EIGHT
@@ -58,5 +58,5 @@ class Projector:
         project_points(
             r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.nodes, listed.irradiance,
             c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
-            start, stop, out,
+            FINE if self._lights.parts is None else ROUGH, start, stop, out,
         )  # fmt: skip
