@@ -12,7 +12,8 @@ from bench.indirect import PASSES
 from bench.mitsuba import missing
 from bench.standard_error import over_passes
 
-_SPP = 16  # of each pass: errors of some per cent are told from the noise
+_SPP = {"still_life": 128}  # of each pass: errors of some per cent are told from the noise; its highlights have most
+_SPP_OF_OTHERS = 16
 _UNIT = "%"
 
 
@@ -20,10 +21,11 @@ def measure(tiny: bool) -> list[Figure]:
     """A bake and a render of each."""
     if (why := missing()) is not None:
         return skipped(tuple(f"gather.full_{kind}_{name}" for name in SIZES for kind in ("rmse", "bias")), _UNIT, why)
-    return [figure for name in SIZES for figure in _figures(name, 2 if tiny else _SPP, tiny)]
+    return [figure for name in SIZES for figure in _figures(name, tiny)]
 
 
-def _figures(name: str, spp: int, tiny: bool) -> list[Figure]:
+def _figures(name: str, tiny: bool) -> list[Figure]:
+    spp = 2 if tiny else _SPP.get(name, _SPP_OF_OTHERS)
     pair = rendered(name, spp, tiny, is_full=True)
     found = over_passes(*pair)
     about = {"size": list(pair.ours.shape[1::-1]), "spp": PASSES * spp, "noise": found.noise, "limit": found.limit}

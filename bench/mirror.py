@@ -104,7 +104,7 @@ def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
 
 
 def _bsdf(name: str) -> dict[str, object]:
-    """A material as Mitsuba's own plugins have it: diffuse, a smooth conductor, or so much of each as ours adds up."""
+    """A material as Mitsuba has it: diffuse, a smooth conductor, or so much of each as ours adds up."""
 
     def rgb(value: tuple[float, ...]) -> dict[str, object]:
         return {"type": "rgb", "value": list(value)}
@@ -113,9 +113,4 @@ def _bsdf(name: str) -> dict[str, object]:
         return {"type": "diffuse", "reflectance": rgb(_DIFFUSE[name])}
     if name not in _DIFFUSE:
         return {"type": "conductor", "material": "none", "specular_reflectance": rgb(_MIRRORS[name])}
-    share = _MIRRORS[name][0]
-    below = tuple(value / (1 - share) for value in _DIFFUSE[name])
-    return {
-        "type": "blendbsdf", "weight": share, "below": {"type": "diffuse", "reflectance": rgb(below)},
-        "above": {"type": "conductor", "material": "none", "specular_reflectance": rgb((1.0, 1.0, 1.0))},
-    }  # fmt: skip
+    return {"type": "mirror_over_diffuse", "albedo": rgb(_DIFFUSE[name]), "share": _MIRRORS[name][0]}

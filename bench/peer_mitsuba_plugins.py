@@ -119,6 +119,52 @@ class LambertBlinnPhong(_TwoLobes):
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
+class MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
+    """`share` of a smooth mirror beside albedo/π.
+
+    Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of 0.3
+    sends 0.363 (3.9.1), as densities of what it samples lack the weights.
+    """
+
+    def __init__(self, props: Any) -> None:
+        mi.BSDF.__init__(self, props)
+        self.albedo, self.share = mi.Color3f(props["albedo"]), float(props["share"])
+        flags = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection)
+        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
+        self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        bs, is_mirror = mi.BSDFSample3f(), sample1 < self.share
+        bs.wo = dr.select(is_mirror, mi.reflect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
+        bs.pdf = dr.select(is_mirror, self.share, self.pdf(ctx, si, bs.wo, active))
+        bs.eta, bs.sampled_component = 1.0, dr.select(is_mirror, mi.UInt32(1), mi.UInt32(0))
+        types = (mi.UInt32(+mi.BSDFFlags.DeltaReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection))
+        bs.sampled_type = dr.select(is_mirror, *types)
+        weight = dr.select(is_mirror, mi.Color3f(1), self.albedo / (1 - self.share))
+        return bs, dr.select(_above(si.wi, bs.wo, active), weight, 0)
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return dr.select(_above(si.wi, wo, active), self.albedo / dr.pi * mi.Frame3f.cos_theta(wo), 0)
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        density = (1 - self.share) * mi.warp.square_to_cosine_hemisphere_pdf(wo)
+        return dr.select(_above(si.wi, wo, active), density, 0)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def to_string(self) -> str:
+        """Mitsuba's interface."""
+        return "MirrorOverDiffuse[]"
+
+
+mi.register_bsdf("mirror_over_diffuse", lambda props: MirrorOverDiffuse(props))
+
+
 class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
     """Light that surfaces have reflected onto what the camera sees: one step, then Mitsuba's own path tracer.
 
