@@ -122,8 +122,8 @@ mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 class MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
     """`share` of a smooth mirror beside albedo/π.
 
-    Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of 0.3
-    sends 0.363 (3.9.1), as densities of what it samples lack the weights.
+    Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of
+    0.3 sends 0.363 (3.9.1), as densities of what it samples lack the weights.
     """
 
     def __init__(self, props: Any) -> None:
