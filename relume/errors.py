@@ -96,6 +96,15 @@ class StaleStoreError(StoreError):
         self.stored, self.current = stored, current
 
 
+class StoreGoneError(StoreNotFoundError):
+    """A store was deleted while it was open."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the bake was deleted while it was shown; bake the scene again, import it where it is gone, too"
+        )
+
+
 class ChunkDamagedError(StoreError):
     """A chunk of a store is missing or fails its checksum."""
 

@@ -164,7 +164,7 @@ export interface RenderRequest {
   exact?: boolean;
 }
 
-/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name. */
+/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name; `sizes`: of their pictures, pixels, where they are not as large as was baked. */
 export interface ShareRequest {
   bake: string;
   view: string;
@@ -174,6 +174,7 @@ export interface ShareRequest {
   solo_light?: string | null;
   paths?: SharedPaths | null;
   eyes?: Record<string, CameraFrame>;
+  sizes?: Record<string, [number, number]>;
 }
 
 /** Light paths that are looked at; as a look's `transport`. */
@@ -743,6 +744,7 @@ export interface ShareBody {
   solo_light: string | null;
   paths: SharedPaths | null;
   eyes: Record<string, CameraFrame>;
+  sizes: Record<string, [number, number]>;
   id: string;
   created: string;
   scene: string;

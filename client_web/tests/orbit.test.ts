@@ -3,10 +3,10 @@ import { freeName } from "../src/cameras/calls";
 import { Fingers } from "../src/cameras/fingers";
 import { keepAs } from "../src/cameras/keeping";
 import { Pictures } from "../src/cameras/pictures";
-import { approached, between, frameOf, isNear, orbitOf, panned, turned, withAngle, type Orbit } from "../src/cameras/orbit";
+import { approached, between, frameOf, isNear, levelled, orbitOf, panned, turned, withAngle, type Orbit } from "../src/cameras/orbit";
 
 const bounds = { lowest: [-1, 0, -1] as const, highest: [1, 2, 1] as const } as never;
-const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, yfov: 40 };
+const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, roll: 0, yfov: 40 };
 const eyeOf = (of: Orbit) => [3, 7, 11].map((k) => frameOf(of).to_world[k] as number);
 const column = (of: Orbit, k: number) => [0, 4, 8].map((row) => frameOf(of).to_world[row + k] as number);
 const dot = (a: number[], b: number[]) => a.reduce((sum, value, k) => sum + value * (b[k] as number), 0);
@@ -32,6 +32,20 @@ describe("a camera that goes round a place", () => {
     const again = orbitOf(frameOf(orbit), bounds);
     frameOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(frameOf(orbit).to_world[k] as number, 9));
     expect(again.yfov).toBe(40);
+  });
+
+  it("is found again from a tilted frame and from one that looks straight down", () => {
+    for (const of of [{ ...orbit, roll: 0.5 }, { ...orbit, roll: -3 }]) {
+      const again = orbitOf(frameOf(of), bounds);
+      expect(again.roll).toBeCloseTo(of.roll, 9);
+      frameOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(frameOf(of).to_world[k] as number, 9));
+      expect(between(orbit, of, 1)).toEqual(of);
+      expect(isNear(orbit, of)).toBe(false);
+      expect(frameOf(levelled(again)).to_world[4]).toBe(0); // its right is level
+    }
+    const [cosine, sine] = [Math.cos(0.7), Math.sin(0.7)];
+    const down = { to_world: [cosine, -sine, 0, 0, 0, 0, 1, 5, -sine, -cosine, 0, 0, 0, 0, 0, 1], yfov: 40 };
+    frameOf(orbitOf(down, bounds)).to_world.forEach((value, k) => expect(value).toBeCloseTo(down.to_world[k] as number, 1));
   });
 
   it("turns about what the middle of the picture shows", () => {

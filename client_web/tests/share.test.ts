@@ -1,4 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
+import { eyeOf } from "../src/cameras/eye";
 import { openShare, share } from "../src/looks/share";
 import type { ShareBody, ShareRequest } from "../src/protocol";
 import { seenPaths } from "../src/seen/paths";
@@ -28,7 +29,7 @@ beforeEach(() => {
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
   vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {
     if (init?.method !== "POST") {
-      const body: ShareBody = { solo: null, solo_light: null, paths: null, eyes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
+      const body: ShareBody = { solo: null, solo_light: null, paths: null, eyes: {}, sizes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
       return Promise.resolve(Response.json(body));
     }
     saved = JSON.parse(init.body as string) as ShareRequest;
@@ -58,4 +59,13 @@ test("a link carries from where a view is seen whose eye moves", async () => {
   expect(Object.keys(saved.eyes ?? {})).toEqual(["front"]);
   expect(saved.eyes?.front?.to_world).toEqual(turned.to_world);
   expect(saved.eyes?.front?.yfov).toBeCloseTo(30);
+  expect(saved.sizes).toEqual({});
+  vi.stubGlobal("requestAnimationFrame", () => 1);
+  vi.stubGlobal("cancelAnimationFrame", () => undefined);
+  eyeOf("front")?.resize([60, 90]);
+  await share();
+  expect(saved.sizes).toEqual({ front: [60, 90] });
+  eyeOf("front")?.resize(null);
+  await openShare("a", { room: null, watch: null });
+  await vi.waitFor(() => expect(eyeOf("front")?.chosen).toEqual([60, 90]));
 });

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from zarr.storage import LocalStore
 
 from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, StoreError, StoreNotFoundError
+from relume.errors import ChunkDamagedError, StoreError, StoreGoneError, StoreNotFoundError
 from relume.folders import folder_bytes
 from relume.store.files import read_json
 from relume.store.schema import (
@@ -61,9 +61,18 @@ class Reader:
         Args:
             path: of the array inside the store. start, stop: rows; all without them.
         Raises:
+            StoreGoneError: the whole store was deleted.
             ChunkDamagedError: a shard is missing or cut, or a checksum fails.
             StoreError: there is no such array, or the rows lie outside it.
         """
+        try:
+            return self._rows(path, start, stop)
+        except StoreError as error:
+            if not (self.path / "zarr.json").is_file():
+                raise StoreGoneError from error
+            raise
+
+    def _rows(self, path: str, start: int, stop: int | None) -> NDArray[Any]:
         spec, array = self._open(path)
         stop = spec.shape[0] if stop is None else stop
         if not 0 <= start <= stop <= spec.shape[0]:

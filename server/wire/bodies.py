@@ -286,7 +286,8 @@ class ShareRequest(Body):
     """What a link shows: a look of a bake, the views beside each other and the one in hand.
 
     `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
-    paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name.
+    paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name;
+    `sizes`: of their pictures, pixels, where they are not as large as was baked.
     """
 
     bake: Id
@@ -297,6 +298,7 @@ class ShareRequest(Body):
     solo_light: Annotated[str, Field(max_length=256)] | None = None
     paths: SharedPaths | None = None
     eyes: Annotated[dict[Name, CameraFrame], Field(default_factory=dict, max_length=MAX_VIEWS_SHOWN)]
+    sizes: Annotated[dict[Name, tuple[Side, Side]], Field(default_factory=dict, max_length=MAX_VIEWS_SHOWN)]
 
 
 class ShareEntry(Body):

@@ -43,9 +43,11 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
 
 def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
     eyes = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
-    made = client.post("/api/shares", json=body(baked, eyes=eyes))
-    assert client.get(made.headers["location"]).json()["eyes"] == eyes
+    made = client.post("/api/shares", json=body(baked, eyes=eyes, sizes={"left": [90, 60]}))
+    found = client.get(made.headers["location"]).json()
+    assert (found["eyes"], found["sizes"]) == (eyes, {"left": [90, 60]})
     assert client.post("/api/shares", json=body(baked, eyes={"left": {"to_world": [], "yfov": 1}})).status_code == 422
+    assert client.post("/api/shares", json=body(baked, sizes={"left": [10**6, 1]})).status_code == 422
 
 
 def test_the_same_again_is_the_same_link_and_another_look_another(client: TestClient, baked: Baked) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 import threading
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreNotFoundError
+from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreGoneError, StoreNotFoundError
 from relume.store import StoreWriter, create_store, open_store, publish
 from relume.store.publish import verify_manifest
 
@@ -119,6 +120,16 @@ def test_missing_shard_is_damage_not_zeros(tmp_path: Path) -> None:
         reader.read(SPEC.path)
     with pytest.raises(ChunkDamagedError):
         open_store(store)
+
+
+def test_a_store_deleted_under_a_reader_is_gone_not_damaged(tmp_path: Path) -> None:
+    store = build(tmp_path)
+    opened, fresh = open_store(store), open_store(store)
+    opened.read(SPEC.path, 0, 32)
+    shutil.rmtree(store)
+    for reader in (opened, fresh):
+        with pytest.raises(StoreGoneError, match="deleted while it was shown"):
+            reader.read(SPEC.path)
 
 
 def test_unfinished_bake_is_not_published(tmp_path: Path) -> None:

@@ -12,10 +12,11 @@ import { useClosing } from "../ui/useClosing";
 import { freeName, listCameras, MAX_NAME } from "./calls";
 import { lookFrom, type Eye } from "./eye";
 import { keepAs, removeCamera } from "./keeping";
-import { MAX_YFOV, MIN_YFOV, withAngle } from "./orbit";
+import { levelled, MAX_YFOV, MIN_YFOV, withAngle } from "./orbit";
 
 const LEAST_SIDE = 16;
 const MOST_SIDE = 4096;
+const UPRIGHT = 1e-3; // radians
 
 /** Width and height; what would be too many pixels takes from the other side. */
 function PictureSize({ eye }: { eye: Eye }) {
@@ -101,6 +102,11 @@ export function CameraMenu({ scene, eye, name }: ListProps) {
             scale="log"
             onChange={(yfov) => eye.change((now) => withAngle(now, yfov))}
           />
+          {Math.abs(eye.orbit.roll) > UPRIGHT && (
+            <button title="Stand the picture upright" onClick={() => eye.change(levelled)}>
+              Level
+            </button>
+          )}
           <PictureSize eye={eye} />
           <Cameras scene={scene} eye={eye} name={name} />
         </div>

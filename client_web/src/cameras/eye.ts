@@ -16,7 +16,7 @@ type View = HelloMessage["views"][number];
 
 const DEGREES = 180 / Math.PI;
 
-type Size = [width: number, height: number];
+export type Size = [width: number, height: number];
 
 /** Of one view of one bake. */
 export class Eye {
@@ -52,6 +52,11 @@ export class Eye {
     return this.motion.target;
   }
 
+  /** Of its pictures, where somebody chose it. */
+  get chosen(): Size | null {
+    return this.chosenSize;
+  }
+
   get size(): Size {
     return this.chosenSize ?? [this.view.width, this.view.height];
   }
@@ -83,7 +88,7 @@ export class Eye {
     this.change((now) => ({ ...now, target: place }));
   }
 
-  /** Go back to where it began; its first camera may have been tilted, which no orbit is. */
+  /** Go back to where it began; its first camera may look straight down, which no orbit does. */
   restart(): void {
     this.motion.end();
     this.motion = this.from(this.begun);
@@ -200,9 +205,10 @@ export function cameraOf(name: string): Frame | null {
   return view?.eye === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
 }
 
-/** See a view from there, if its eye moves. */
-export function lookFrom(name: string, camera: Frame): void {
+/** See a view from there, if its eye moves, in a picture of a size; null: as large as was baked, undefined: as it is. */
+export function lookFrom(name: string, camera: Frame, size?: Size | null): void {
   const eye = eyeOf(name);
+  if (size !== undefined) eye?.resize(size);
   eye?.change(() => orbitOf(camera, eye.bounds));
 }
 

@@ -9,6 +9,8 @@ export interface Orbit {
   azimuth: number;
   /** Above the horizon. */
   elevation: number;
+  /** About the line of sight, counter-clockwise as the eye sees itself turn; 0 stands upright. */
+  roll: number;
   /** Vertical field of view, degrees. */
   yfov: number;
 }
@@ -32,11 +34,20 @@ const FARTHEST = 50;
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
 
-function axes({ azimuth, elevation }: Orbit): { right: Triple; up: Triple; backward: Triple } {
+type Axes = { right: Triple; up: Triple; backward: Triple };
+
+function levelAxes(azimuth: number, elevation: number): Axes {
   const flat = Math.cos(elevation);
   const backward: Triple = [Math.sin(azimuth) * flat, Math.sin(elevation), Math.cos(azimuth) * flat];
   const right: Triple = [Math.cos(azimuth), 0, -Math.sin(azimuth)];
   return { right, up: cross(backward, right), backward };
+}
+
+function axes({ azimuth, elevation, roll }: Orbit): Axes {
+  const { right, up, backward } = levelAxes(azimuth, elevation);
+  const [cosine, sine] = [Math.cos(roll), Math.sin(roll)];
+  const turned = add(scaled(right, cosine), scaled(up, sine));
+  return { right: turned, up: add(scaled(up, cosine), scaled(right, -sine)), backward };
 }
 
 export const sizeOf = ({ lowest, highest }: Bounds): number => Math.max(1e-6, length(subtract(highest, lowest)));
@@ -49,7 +60,7 @@ export function frameOf(orbit: Orbit): Frame {
   return { to_world: [...rows, 0, 0, 0, 1], yfov: orbit.yfov };
 }
 
-/** The orbit that sees what a camera sees, level, about `place` in the middle of its picture; null where that is empty:
+/** The orbit that sees what a camera sees, about `place` in the middle of its picture; null where that is empty:
  * about the middle of the scene's depth. */
 export function orbitOf({ to_world: m, yfov }: Frame, bounds: Bounds, place: Triple | null = null): Orbit {
   const column = (k: number): Triple => [m[k] as number, m[4 + k] as number, m[8 + k] as number];
@@ -57,13 +68,11 @@ export function orbitOf({ to_world: m, yfov }: Frame, bounds: Bounds, place: Tri
   const backward = unit(column(2));
   const depth = dot(subtract(eye, place ?? centreOf(bounds)), backward);
   const distance = clamp(depth, (place === null ? 0.05 : NEAREST) * sizeOf(bounds), FARTHEST * sizeOf(bounds));
-  return {
-    target: subtract(eye, scaled(backward, distance)),
-    distance,
-    azimuth: Math.atan2(backward[0], backward[2]),
-    elevation: clamp(Math.asin(clamp(backward[1], -1, 1)), -HIGHEST, HIGHEST),
-    yfov,
-  };
+  const azimuth = Math.atan2(backward[0], backward[2]);
+  const elevation = clamp(Math.asin(clamp(backward[1], -1, 1)), -HIGHEST, HIGHEST);
+  const [level, right] = [levelAxes(azimuth, elevation), unit(column(0))];
+  const roll = Math.atan2(dot(right, level.up), dot(right, level.right));
+  return { target: subtract(eye, scaled(backward, distance)), distance, azimuth, elevation, roll, yfov };
 }
 
 export function turned(orbit: Orbit, azimuth: number, elevation: number): Orbit {
@@ -84,17 +93,23 @@ export function approached(orbit: Orbit, factor: number, bounds: Bounds): Orbit 
   return { ...orbit, distance: clamp(orbit.distance * factor, NEAREST * size, FARTHEST * size) };
 }
 
+export const levelled = (orbit: Orbit): Orbit => ({ ...orbit, roll: 0 });
+
 export const withAngle = (orbit: Orbit, yfov: number): Orbit => ({ ...orbit, yfov: clamp(yfov, MIN_YFOV, MAX_YFOV) });
 
-/** A share of the way from one to another; azimuths go the short way round. */
+/** From one angle to another, the short way round. */
+const turnTo = (from: number, to: number) =>
+  ((((to - from + Math.PI) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI)) - Math.PI;
+
+/** A share of the way from one to another. */
 export function between(from: Orbit, to: Orbit, share: number): Orbit {
   const mix = (a: number, b: number) => a + share * (b - a);
-  const turn = ((((to.azimuth - from.azimuth + Math.PI) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI)) - Math.PI;
   return {
     target: from.target.map((value, k) => mix(value, to.target[k] as number)) as Triple,
     distance: from.distance * (to.distance / from.distance) ** share,
-    azimuth: from.azimuth + share * turn,
+    azimuth: from.azimuth + share * turnTo(from.azimuth, to.azimuth),
     elevation: mix(from.elevation, to.elevation),
+    roll: from.roll + share * turnTo(from.roll, to.roll),
     yfov: mix(from.yfov, to.yfov),
   };
 }
@@ -102,6 +117,7 @@ export function between(from: Orbit, to: Orbit, share: number): Orbit {
 /** Whether both show the same, to a fraction of a pixel. */
 export function isNear(a: Orbit, b: Orbit): boolean {
   const apart = length(subtract(a.target, b.target)) / a.distance + Math.abs(Math.log(a.distance / b.distance));
-  const turn = Math.abs(Math.sin((a.azimuth - b.azimuth) / 2)) + Math.abs(a.elevation - b.elevation);
+  const half = (angle: number) => Math.abs(Math.sin(angle / 2));
+  const turn = half(a.azimuth - b.azimuth) + Math.abs(a.elevation - b.elevation) + half(a.roll - b.roll);
   return apart + turn + Math.abs(a.yfov - b.yfov) / 60 < 5e-4;
 }

@@ -1,6 +1,6 @@
 /** Links that carry the look: saved on the server, never changed, opened as a step that can be undone. */
 import { effect, signal } from "@preact/signals";
-import { cameraOf, lookFrom } from "../cameras/eye";
+import { cameraOf, eyeOf, lookFrom, type Size } from "../cameras/eye";
 import type { Frame } from "../cameras/orbit";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
@@ -19,14 +19,16 @@ import { attempt, note } from "../ui/toasts";
 /** A link that the browser did not let us copy: it is shown to be copied by hand. */
 export const linkToCopy = signal<string | null>(null);
 
-/** Where the eyes of the shown views are; those that were baked from one place have none. */
-function eyesNow(): Record<string, Frame> {
-  const eyes: Record<string, Frame> = {};
+/** Where the eyes of the shown views are, and how large somebody made their pictures; those that were baked from one place
+ * have none. */
+function eyesNow(): { eyes: Record<string, Frame>; sizes: Record<string, Size> } {
+  const [eyes, sizes]: [Record<string, Frame>, Record<string, Size>] = [{}, {}];
   for (const name of shownViews.value) {
-    const camera = cameraOf(name);
+    const [camera, size] = [cameraOf(name), eyeOf(name)?.chosen ?? null];
     if (camera !== null) eyes[name] = camera;
+    if (size !== null) sizes[name] = size;
   }
-  return eyes;
+  return { eyes, sizes };
 }
 
 /** Save what is seen now. */
@@ -41,7 +43,7 @@ export async function saveShare(): Promise<ShareEntry> {
     solo: solo.value,
     solo_light: soloLight.value,
     paths: seenPaths.value,
-    eyes: eyesNow(),
+    ...eyesNow(),
   });
 }
 
@@ -74,14 +76,14 @@ function takeOver(shared: ShareBody): void {
 }
 
 /** See the views from where they were shared, once they are there: the look is, before. */
-function lookFromThere(eyes: ShareBody["eyes"]): void {
+function lookFromThere({ eyes, sizes }: ShareBody): void {
   let waits = true;
   const stop = effect(() => {
     if (!waits || bake.value === null || !views.value.some(({ name }) => name in eyes)) return;
     waits = false;
     queueMicrotask(() => {
       stop();
-      for (const [name, camera] of Object.entries(eyes)) lookFrom(name, camera);
+      for (const [name, camera] of Object.entries(eyes)) lookFrom(name, camera, sizes[name] ?? null);
     });
   });
 }
@@ -95,7 +97,7 @@ export async function openShare(id: string, { room, watch }: Pick<Place, "room" 
     watched.value = mayEdit.value ? null : { scene: shared.scene, share: id };
     const arrived = () => {
       if (isAlone && mayEdit.value) takeOver(shared);
-      lookFromThere(shared.eyes);
+      lookFromThere(shared);
     };
     await openScene(shared.scene, placeOf(shared, room, watch), undefined, arrived);
     if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
