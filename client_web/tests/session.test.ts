@@ -131,6 +131,23 @@ test("the first edit goes at once, more of them once in an animation frame", () 
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
 });
 
+test("another server in place of one that is gone knows of no edit: its first frame can be exact", () => {
+  greet();
+  const look = edit(LOOK, SIGMA, 0.3);
+  expect(session.revision).toBe(1);
+  socket().onclose({ code: 1006, reason: "" });
+  vi.runOnlyPendingTimers();
+  socket().hello(structuredClone(look), 0); // somebody else has brought it
+  animate();
+  expect(socket().edits).toEqual([]);
+  expect(session.pending).toBe(false);
+  expect(session.revision).toBe(0);
+  edit(look, SIGMA, 0.4);
+  animate();
+  expect(socket().edits).toMatchObject([{ revision: 2 }]);
+  expect(session.revision).toBe(2);
+});
+
 test("while two edits wait for a frame the next grows newer, until one comes or a tenth of a second has passed", () => {
   greet();
   let look = LOOK;

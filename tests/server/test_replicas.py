@@ -2,50 +2,29 @@
 
 from __future__ import annotations
 
-import re
 import secrets
-import shutil
-import socket
-import subprocess
-import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from threading import Thread
 
 import pytest
+from replicas_proxy import proxied
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
 from server.live.rooms.door import MIN_PLACED, watch_of
 
-CONFIGURATION = Path(__file__).parents[2] / "docker" / "replicas" / "nginx.conf"
 NUM_SERVERS = 3
-NGINX = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
 
 
 @pytest.fixture(scope="module")
 def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """Port of nginx before servers that say which of them they are, and what they were told."""
-    if NGINX is None:
-        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
     folder = tmp_path_factory.mktemp("nginx")
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number)) for number in range(NUM_SERVERS)]
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        text = CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
-        text = text.replace("listen 8420", f"listen 127.0.0.1:{port}")
-        (line,) = re.findall(r"server server:8420[^;]*;", text)
-        lines = "".join(line.replace("server:8420", f"127.0.0.1:{each}") for each in ports)
-        (folder / "nginx.conf").write_text(text.replace(line, lines))
-        command = [NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", "daemon off;"]
-        process = subprocess.Popen(command)
-        stack.callback(process.wait)
-        stack.callback(process.terminate)
-        _wait_for(port)
-        yield port
+        yield stack.enter_context(proxied(folder, ports))
 
 
 class _server:  # noqa: N801  (a context)
@@ -68,14 +47,6 @@ class _server:  # noqa: N801  (a context)
 
     def __exit__(self, *_: object) -> None:
         self._server.shutdown()
-
-
-def _wait_for(port: int) -> None:
-    while True:
-        try:
-            return socket.create_connection(("127.0.0.1", port), timeout=1).close()
-        except OSError:
-            time.sleep(0.02)
 
 
 def session(port: int, bake: str, query: str) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import Any
 
+import jsonpatch
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from session_client import SIGMA, Baked, Session, open_session
+from session_client import IOR, SIGMA, Baked, Session, open_session
 
 from server.live.rooms.door import watch_of
 from server.settings import Settings
@@ -233,6 +234,51 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
 def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
     for query in ("?room=", "?room=a%20b", f"?room={'a' * 65}", "?watch=ä", f"{ROOM}&name={'a' * 41}"):
         assert refused(client, baked, query)[0] == 1008
+
+
+class Person:
+    """What an editor keeps of a shared look: what is confirmed, and its own edits that are not."""
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.last = session, 0
+        self.look = session.text("hello")["look"]
+        self._sent: list[tuple[int, list[dict[str, Any]]]] = []
+
+    def edit(self, path: str, value: float) -> None:
+        self.last += 1
+        self._sent.append((self.last, [{"op": "replace", "path": path, "value": value}]))
+        self.session.edit(self.last, path, value, hand=path)
+
+    def hear(self) -> None:
+        """The next word on what the look has become, on top of one's own edits up to its revision."""
+        message = self.session.text("shared")
+        own = [patch for revision, patch in self._sent if revision <= message["revision"]]
+        self._sent = self._sent[len(own) :]
+        for patch in [*own, message["patch"]]:
+            jsonpatch.apply_patch(self.look, patch, in_place=True)
+
+    @property
+    def is_confirmed(self) -> bool:
+        return not self._sent
+
+
+def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClient, baked: Baked) -> None:
+    rng = np.random.default_rng(4)
+    with ExitStack() as stack:
+        opened = [stack.enter_context(open_session(client, baked.bake, query=ROOM)) for _ in range(2)]
+        people = [Person(session) for session in opened]
+        for _ in range(60):
+            for person, own in zip(people, (EXTINCTION, IOR), strict=True):
+                path = own if rng.random() < 0.6 else SIGMA  # which everybody pulls at, too
+                person.edit(path, round(float(rng.uniform(1.2, 2.0) if path != SIGMA else rng.uniform(0.1, 0.4)), 3))
+        for person in people:
+            while not person.is_confirmed:
+                person.hear()
+        late = stack.enter_context(open_session(client, baked.bake, query=ROOM))
+        everybodys = late.text("hello")["look"]
+        for person in people:
+            while person.look["materials"] != everybodys["materials"]:
+                person.hear()
 
 
 def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, baked: Baked) -> None:

@@ -74,7 +74,10 @@ export class EditQueue {
   private confirmed: Look | null = null;
   /** Others edit the look as well: the server tells what has become of it, and frames say nothing of that. */
   private isShared = false;
+  /** Of the newest edit of all. */
   revision = 0;
+  /** Of the newest edit that this server knows of: another one, in place of one that is gone, has had none. */
+  known = 0;
 
   /** Start afresh: the server holds `look` at `revision` (null: unknown, so the next edit is the whole look), and shows
    * these sources of light. */
@@ -84,6 +87,7 @@ export class EditQueue {
     this.way = null;
     this.confirmed = look;
     this.revision = Math.max(this.revision, revision);
+    this.known = revision;
     this.outstanding = [];
     this.isShared = isShared;
   }
@@ -165,7 +169,7 @@ export class EditQueue {
     if (patch.length === 0 && this.isSoloSent(this.wanted)) return [];
     this.sentSolo = solo;
     return splitPatch(patch).map((part) => {
-      this.revision += 1;
+      this.known = this.revision += 1;
       this.outstanding.push({ revision: this.revision, look, patch: part });
       return { revision: this.revision, patch: part, hand, solo, inputTime };
     });

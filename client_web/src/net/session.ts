@@ -88,9 +88,9 @@ export class Session {
     };
   }
 
-  /** Of the newest edit that was sent. */
+  /** Of the newest edit that was sent to the server that is there. */
   get revision(): number {
-    return this.queue.revision;
+    return this.queue.known;
   }
 
   /** Whether the server has yet to hear of the newest edit. */
