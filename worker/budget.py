@@ -56,6 +56,4 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
         raise MemoryBudgetError(what, needed, memory, f"{REMEDY}, or a scene of fewer triangles")
     free = max(0, shutil.disk_usage(data_dir).free - DISK_RESERVE_BYTES)
     if plan.store_bytes > free:
-        raise DiskBudgetError(
-            "the store of this bake on disk", plan.store_bytes, free, f"free some disk, or {REMEDY}"
-        )
+        raise DiskBudgetError("the store of this bake on disk", plan.store_bytes, free, f"free some disk, or {REMEDY}")
