@@ -16,7 +16,7 @@ def with_turned_sky(document: Mapping[str, Any], degrees: float) -> dict[str, An
         document: a complete look. degrees: any number.
     """
     environment = document["environment"]
-    return {**document, "environment": {**environment, "rotation": (environment["rotation"] + degrees) % 360}}
+    return {**document, "environment": {**environment, "rotation": _half_turn(environment["rotation"] + degrees)}}
 
 
 def with_turned_light(document: Mapping[str, Any], degrees: float, middle: Sequence[float]) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def _turned_lamp(light: Mapping[str, Any], degrees: float, middle: Sequence[floa
         found["direction"] = _turned(light["direction"], degrees)
         x, y, z = light["direction"]
         if "rotation" in light and x * x + z * z < _VERTICAL * y * y:  # its height then lies along z, which turns not
-            found["rotation"] = math.fmod(light["rotation"] + (degrees if y > 0 else -degrees), 360)
+            found["rotation"] = _half_turn(light["rotation"] + (degrees if y > 0 else -degrees))
     return found
 
 
@@ -46,3 +46,8 @@ def _turned(vector: Sequence[float], degrees: float) -> list[float]:
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     x, y, z = vector
     return [cosine * x + sine * z, y, cosine * z - sine * x]
+
+
+def _half_turn(degrees: float) -> float:
+    """The same angle as sliders have it, in [-180, 180)."""
+    return (degrees + 180) % 360 - 180

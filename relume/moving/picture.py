@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
-from relume.errors import EditNotSupportedError, ParameterError
+from relume.errors import NotMadeError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
 from relume.moving.beams.beam import Beam
@@ -386,8 +386,6 @@ class MovingPicture:
             pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
 
         Raises:
-            EditNotSupportedError: always.
+            NotMadeError: always.
         """
-        raise EditNotSupportedError(
-            self._transfer.method, "a brush over a curve; open a fixed view of the scene for it"
-        )
+        raise NotMadeError("which pixels a curve lights is known where the eye rests; ask when its picture is exact")

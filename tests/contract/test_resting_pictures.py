@@ -6,7 +6,7 @@ from looks_of_pictures import EDITS, LOBE, drawn, light, lit, painted, transport
 from sessions import look_of, make_next, relative_rmse
 
 from relume.bake import Recipe
-from relume.errors import CancelledError
+from relume.errors import CancelledError, NotMadeError
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.methods.stills import Stills, Tracing
@@ -270,3 +270,9 @@ def test_reflected_light_asked_for_while_a_still_without_it_is_made(moving, pict
     assert picture.advance(None).fidelity == "approximate"
     assert rested(picture).exact
     assert traced == sorted(traced)
+
+
+def test_while_the_eye_moves_no_curve_tells_what_it_lights(picture):
+    picture.advance(None)
+    with pytest.raises(NotMadeError, match="where the eye rests"):
+        picture.brush("/materials/Floor/terms/0/curves/theta_i", 0.0, 9.0)

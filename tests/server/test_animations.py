@@ -83,7 +83,7 @@ def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     told = client.post(
         "/api/renders/looks", json=of_fixed | {"looks": [{}], "path": {"turntable": 3, "turns": "environment"}}
     )
-    assert [frame["environment"]["rotation"] for frame in told.json()["looks"]] == [0, 120, 240]
+    assert [frame["environment"]["rotation"] for frame in told.json()["looks"]] == [0, 120, -120]
     assert told.json()["cameras"] is None
 
 

@@ -57,7 +57,7 @@ function WhatTurns() {
   return (
     <li>
       <label>
-        Turntable:{" "}
+        Turntable
         <select value={turns.value} onChange={(event) => (turns.value = event.currentTarget.value as Turns)}>
           {Object.entries(TURNS).map(([value, words]) => (
             <option key={value} value={value}>

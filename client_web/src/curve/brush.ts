@@ -2,11 +2,14 @@
 import { send } from "../live/connections";
 import { stage } from "../picture/stage";
 import { brushed } from "../state/curveShape";
+import { fidelity } from "../state/fidelity";
 import { curvePath } from "../state/selection";
+import { moves } from "../state/views";
 import { lights } from "./settings";
 
 const DWELL_MS = 120;
 const EVERY_MS = 50;
+const AGAIN_MS = 300;
 let timer = 0;
 let last = 0;
 
@@ -16,15 +19,24 @@ export function clearBrush(): void {
   if (brushed.peek() !== null) stage.clearBrush();
 }
 
-/** Ask for the pixels of a stretch; at first only when the pointer rests, then at most every `EVERY_MS`. */
+/** Whether the picture is of points, of which no curve is frozen: where the eye rests another takes its place. */
+const isOnItsWay = () => moves.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
+
+/** Ask for the pixels of a stretch; at first only when the pointer rests, then at most every `EVERY_MS`; of a view whose eye
+ * moves when that has come to rest. */
 export function brush(from: number, to: number): void {
   const curve = curvePath.peek();
   if (!lights.peek() || curve === null) return;
   clearTimeout(timer);
   const wait = brushed.peek() === null ? DWELL_MS : Math.max(0, last + EVERY_MS - performance.now());
-  timer = window.setTimeout(() => {
+  const ask = () => {
+    if (isOnItsWay()) {
+      timer = window.setTimeout(ask, AGAIN_MS);
+      return;
+    }
     last = performance.now();
     brushed.value = [from, to];
     send({ type: "brush", curve, from: Math.max(0, from), to: Math.min(90, to) });
-  }, wait);
+  };
+  timer = window.setTimeout(ask, wait);
 }

@@ -205,7 +205,7 @@ class RestingPicture:
         Args:
             pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
         Raises:
-            EditNotSupportedError: no still is shown.
+            NotMadeError: no still is shown.
         """
         return self._shown.brush(pointer, from_deg, to_deg)
 

@@ -1,0 +1,25 @@
+/** Pointing at a curve: of a view whose eye moves nothing is asked before that has come to rest. */
+import { expect, test, vi } from "vitest";
+
+const send = vi.hoisted(() => vi.fn());
+vi.hoisted(() => vi.stubGlobal("window", { setTimeout: (run: () => void, ms: number) => setTimeout(run, ms) }));
+vi.mock("../src/live/connections", () => ({ send, connections: { shown: null, incoming: null } }));
+vi.mock("../src/picture/stage", () => ({ stage: { clearBrush: () => undefined } }));
+vi.mock("../src/state/selection", () => ({ curvePath: { peek: () => "/materials/A/terms/0/curves/theta_h" } }));
+vi.mock("../src/state/views", () => ({ moves: { peek: () => true } }));
+
+test("a stretch is asked about when the eye rests, and not at all where the pointer has left", async () => {
+  vi.useFakeTimers();
+  const [{ brush, clearBrush }, { fidelity }] = [await import("../src/curve/brush"), await import("../src/state/fidelity")];
+  fidelity.value = "approximate";
+  for (let k = 0; k < 2; k += 1) {
+    brush(3, 7);
+    vi.advanceTimersByTime(5000);
+    expect(send).not.toHaveBeenCalled();
+    clearBrush();
+  }
+  brush(3, 7);
+  fidelity.value = "exact";
+  vi.advanceTimersByTime(1000);
+  expect(send.mock.calls).toEqual([[{ type: "brush", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
+});
