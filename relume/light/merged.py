@@ -82,23 +82,28 @@ def _inner_nodes(tiles: Tiles, luminous: F64) -> tuple[Codes, F64]:
     return nodes, light * extent**SOLID_ANGLE_EXPONENT + uniform * extent
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def see_parts(visible, group, share, start, stop, seen):  # type: ignore[no-untyped-def]
     """Sum up how much of each merged triangle's light comes from parts that points [start, stop) see.
 
     Args:
         visible: part m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        group, share: see `Parts`. seen: written. (≥ stop - start, C) float32
+        group, share: see `Parts`. seen: written, points last: they are done together. (C, ≥ stop - start) float32
     """
-    for p in range(start, stop):
-        row = seen[p - start]
-        row[:] = 0
-        for byte in range(visible.shape[1]):
-            bits = visible[p, byte]
-            if bits == 0:  # many in a row are hidden together
-                continue
-            for m in range(8 * byte, min(8 * byte + 8, group.shape[0])):
-                row[group[m]] += ((bits >> (m & 7)) & 1) * share[m]
+    num = stop - start
+    bits = np.empty(num, np.uint8)
+    seen[:, :num] = 0
+    for byte in range(visible.shape[1]):
+        any_bit = np.uint8(0)
+        for p in range(num):
+            bits[p] = visible[start + p, byte]
+            any_bit |= bits[p]
+        if any_bit == 0:  # many in a row are hidden from neighbours
+            continue
+        for m in range(8 * byte, min(8 * byte + 8, group.shape[0])):
+            of_group, of_part, shift = np.uint64(group[m]), share[m], np.uint8(m & 7)
+            for p in range(num):
+                seen[of_group, p] += np.float32((bits[p] >> shift) & np.uint8(1)) * of_part
 
 
 def see_parts_numpy(visible: NDArray[np.uint8], parts: Parts, num: int) -> F64:
@@ -114,10 +119,10 @@ def weigh_by_parts(first, light, seen, shading):  # type: ignore[no-untyped-def]
     """Weigh what listed merged lights bring by the share that is seen of them.
 
     Args:
-        first, light: from `relume.project.light_culling.list_lights`. seen: from `see_parts`.
+        first, light: from `relume.project.light_culling.list_lights`. seen: from `see_parts`. (C, ≥ points)
         shading: of each entry, multiplied. (1 or 3, K) float32
     """
     for p in range(first.shape[0] - 1):
         for row in range(shading.shape[0]):
             for entry in range(first[p], first[p + 1]):
-                shading[row, entry] *= seen[p, light[entry]]
+                shading[row, entry] *= seen[light[entry], p]

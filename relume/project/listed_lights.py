@@ -59,7 +59,7 @@ class ListedLights:
         radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
         self._kinds, self._support = with_half_angle(contraction.kinds, radians)
         capacity = POINTS_A_BLOCK * lights.num_lights
-        self._seen = np.empty((POINTS_A_BLOCK, lights.num_lights if lights.parts is not None else 0), np.float32)
+        self._seen = np.empty((lights.num_lights if lights.parts is not None else 0, POINTS_A_BLOCK), np.float32)
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
         self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
@@ -86,4 +86,4 @@ class ListedLights:
     def _see_parts(self, parts: Parts, start: int, stop: int) -> NDArray[np.uint8]:
         """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
         see_parts(self._receivers.visible, parts.group, parts.share, start, stop, self._seen)
-        return np.packbits(self._seen[: stop - start] > 0, axis=1, bitorder="little")
+        return np.packbits(self._seen[:, : stop - start].T > 0, axis=1, bitorder="little")

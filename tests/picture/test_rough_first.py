@@ -68,9 +68,9 @@ def test_those_that_a_coarser_division_would_have_are_merged(transfer):
 def test_points_see_the_share_of_the_parts_that_they_see(transfer):
     merged = merge(transfer.lights, transfer.tiles, 100)
     visible = transfer.views["front"].receivers(0).visible
-    seen = np.full((len(visible), merged.num_lights), np.nan, np.float32)
+    seen = np.full((merged.num_lights, len(visible)), np.nan, np.float32)
     see_parts(visible, *merged.parts, 0, len(visible), seen)
-    np.testing.assert_allclose(seen, see_parts_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
+    np.testing.assert_allclose(seen.T, see_parts_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
 
 
 @pytest.mark.parametrize(
