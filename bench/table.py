@@ -17,7 +17,8 @@ HEAD = ["| figure | value | target | how it came about |", "|---|---|---|---|"]
 TARGETS = {
     "frame.bandwidth_ratio": "≥ 0.8",
     "frame.incremental_rmse": "≤ 1e-4",
-    "freeze.curve_switch_s": "≤ 1 s",
+    "freeze.curve_switch_s": "≤ 0.3 s",
+    "freeze.terms_s": "≤ 0.8 s",
     "shade.pairs_per_s_vs_limit": "≥ 0.3",
     "session.edit_to_socket_ms.p50": "≤ 10 ms",
     "session.edit_to_socket_ms.p95": "≤ 20 ms",
