@@ -23,7 +23,7 @@ from relume.estimated import Estimated, root_of_shares
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.stills import Stills
-from relume.moving.paths import turntable
+from relume.moving.paths import looked_at, turntable
 from relume.moving.picture import MovingPicture
 from relume.moving.rest.still_jobs import ExactView
 from relume.scene.model import Camera, Scene
@@ -71,7 +71,7 @@ def _measured(transfer: MovingViews, stills: Stills) -> Estimated:
 def _eyes(transfer: MovingViews) -> Sequence[Camera]:
     """Where eyes begin, and, of the first, where a hand may turn it to."""
     views = list(transfer.views.values())[:_MOST_VIEWS]
-    around = turntable(views[0].camera, views[0].bounds, _TURN)
+    around = turntable(views[0].camera, looked_at(views[0].camera, views[0].bounds), _TURN)
     return [*(view.camera for view in views), around[1], around[-1]]
 
 

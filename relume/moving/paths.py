@@ -15,19 +15,34 @@ from relume.scene.model import Camera
 F64 = NDArray[np.float64]
 
 
-def turntable(camera: Camera, bounds: tuple[F64, F64], num: int) -> list[Camera]:
-    """Go once around the upright line through the middle of a scene, to the right, ending one step before the start.
+def looked_at(camera: Camera, bounds: tuple[F64, F64]) -> F64:
+    """What is likely in the middle of a camera's picture: straight before it, as deep as the middle of the scene is.
+
+    The middle itself where that is behind. A scene's table or backdrop is often far larger than what it is about.
+
+    Args:
+        camera: any. bounds: lowest and highest corner of the scene, metres. (3,) each.
+    Returns:
+        Metres. (3,)
+    """
+    middle, forward, place = (bounds[0] + bounds[1]) / 2, -camera.to_world[:3, 2], camera.to_world[:3, 3]
+    depth = (middle - place) @ forward
+    found: F64 = place + depth * forward if depth > 0 else middle
+    return found
+
+
+def turntable(camera: Camera, about: F64, num: int) -> list[Camera]:
+    """Go once around an upright line, to the right, ending one step before the start.
 
     Args:
         camera: that it begins at; height, distance and what is above stay.
-        bounds: lowest and highest corner of the scene, metres. (3,) each. num: of cameras, at least 1.
+        about: a place on the line, metres. (3,). num: of cameras, at least 1.
     """
-    middle = (bounds[0] + bounds[1]) / 2
     cameras = []
     for angle in 2 * np.pi * np.arange(num) / num:
         turn, to_world = Rotation.from_rotvec([0.0, angle, 0.0]).as_matrix(), camera.to_world.copy()
         to_world[:3, :3] = turn @ to_world[:3, :3]
-        to_world[:3, 3] = middle + turn @ (to_world[:3, 3] - middle)
+        to_world[:3, 3] = about + turn @ (to_world[:3, 3] - about)
         cameras.append(replace(camera, to_world=to_world))
     return cameras
 

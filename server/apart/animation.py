@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from relume import look as looks
 from relume.errors import ParameterError
 from relume.look import Look
@@ -16,6 +18,8 @@ from server.wire.cameras import CameraFrame
 from server.wire.renders import Animation, EyePath, Keyframes, Turntable
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from relume.moving.view import FreeView
     from relume.scene.model import Camera
 
@@ -52,15 +56,26 @@ def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera 
     if request.path is None:
         return [view.camera] * request.num_frames
 
-    def placed(eye: CameraFrame) -> Camera:
-        return placed_camera(view.name, eye.to_world, eye.yfov).camera
-
     if isinstance(request.path, Turntable):
-        start = view.camera if request.path.start is None else placed(request.path.start)
+        start = _start_of(request.path, view)
         if request.path.turns == "environment":
             return [start] * request.num_frames
-        return turntable(start, view.bounds, request.num_frames)
-    return along([placed(eye) for eye in request.path.eyes], request.num_frames)
+        return turntable(start, _pivot_of(request.path, view), request.num_frames)
+    return along([_placed(view, eye) for eye in request.path.eyes], request.num_frames)
+
+
+def _placed(view: FreeView, eye: CameraFrame) -> Camera:
+    return placed_camera(view.name, eye.to_world, eye.yfov).camera
+
+
+def _start_of(path: Turntable, view: FreeView) -> Camera:
+    return view.camera if path.start is None else _placed(view, path.start)
+
+
+def _pivot_of(path: Turntable, view: FreeView) -> NDArray[np.float64]:
+    from relume.moving.paths import looked_at
+
+    return looked_at(_start_of(path, view), view.bounds) if path.about is None else np.array(path.about)
 
 
 def look_of(request: Animation, view: str, transfer: Opened, index: int) -> Look:
@@ -77,8 +92,8 @@ def document_of(request: Animation, view: str | None, transfer: Opened, index: i
     degrees = 360 * index / request.num_frames
     if request.path.turns == "environment":
         return with_turned_sky(document, degrees)
-    lowest, highest = cast("FreeView", transfer.views[cast("str", view)]).bounds
-    return with_turned_light(document, degrees, ((lowest + highest) / 2).tolist())
+    pivot = _pivot_of(request.path, cast("FreeView", transfer.views[cast("str", view)]))
+    return with_turned_light(document, degrees, pivot.tolist())
 
 
 def _key_or_between(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:

@@ -19,18 +19,20 @@ MAX_TOLD = 600  # frames whose looks are told at once
 MAX_TOLD_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
 Turns = Literal["eye", "object", "environment"]
+Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class Turntable(Body):
-    """Once around the upright line through the middle of the scene, in so many frames; `start`: the first of them, by
-    default where the view begins.
+    """Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins.
 
+    `about`: a place on the line, metres; by default straight before the start, as deep as the middle of the scene.
     `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps
     that stay, too; or the `environment` alone, which needs no bake whose eye moves.
     """
 
     turntable: Frames
     start: CameraFrame | None = None
+    about: Annotated[list[Metres], Field(min_length=3, max_length=3)] | None = None
     turns: Turns = "eye"
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.moving.paths import along, turntable
+from relume.moving.paths import along, looked_at, turntable
 from relume.scene.model import Camera
 
 
@@ -16,8 +16,7 @@ def camera(place, turn=0.0, yfov=0.7):
 
 
 def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
-    bounds = np.array([-1.0, 0, 2]), np.array([3.0, 2, 4])
-    found = turntable(camera([1, 1.5, 9]), bounds, 12)
+    found = turntable(camera([1, 1.5, 9]), np.array([1.0, 1, 3]), 12)
     np.testing.assert_array_equal(found[0].to_world, camera([1, 1.5, 9]).to_world)
     middle = np.array([1.0, 1, 3, 1])
     seen = np.array([np.linalg.inv(one.to_world) @ middle for one in found])
@@ -25,6 +24,12 @@ def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
     steps = [np.linalg.norm(found[k].to_world - found[k - 1].to_world) for k in range(12)]
     np.testing.assert_allclose(steps, steps[0])
     assert found[3].to_world[0, 3] > 3  # to the right first
+
+
+def test_what_a_camera_looks_at_is_before_it_as_deep_as_the_scene():
+    bounds = np.array([-1.0, 0, 2]), np.array([3.0, 2, 4])
+    np.testing.assert_allclose(looked_at(camera([2, 1.5, 9]), bounds), [2, 1.5, 3], atol=1e-12)
+    np.testing.assert_allclose(looked_at(camera([2, 1.5, -9]), bounds), [1, 1, 3], atol=1e-12)
 
 
 def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():

@@ -116,6 +116,8 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
         {"path": {"eyes": []}},
         {"path": {"turntable": 3}, "frames": 4},
         {"path": {"turntable": 3, "turns": "moon"}},
+        {"path": {"turntable": 3, "about": [0, 0]}},
+        {"path": {"turntable": 3, "about": [0, 0, 1e9]}},
         {"path": {"eyes": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
         {"path": {"eyes": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
         {"frames": 0},
