@@ -7,8 +7,8 @@
     directional  w = 1                                             emission W/m²
     surface      w = A cos θl / (N d²),  N samples spread evenly   emission W/m²/sr
 
-A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are the rows of a pattern that is shifted
-for each receiver, as gather rays are: what noise is left is as fine as the pixels.
+A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are spread over its strata and shifted in
+these for each receiver (`relume.light.strata`): what noise is left is as fine as the pixels.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.gather_rays import Pattern, make_pattern
+from relume.light.strata import LampParts, Strata, halvings, make_parts, make_strata, side_by_side
 from relume.look import LightGeometry
 
 F32 = NDArray[np.float32]
@@ -80,9 +80,17 @@ def num_samples(geometry: LightGeometry, of_rectangle: int) -> int:
     return _SHARES.get(geometry.kind, 0) * of_rectangle or 1
 
 
-def pattern_of(geometry: LightGeometry, of_rectangle: int) -> Pattern:
-    """Make the samples of a light. of_rectangle: how many a rectangle has"""
-    return make_pattern(num_samples(geometry, of_rectangle), 0, _SEED)
+def strata_of(light: LocalLight, of_rectangle: int) -> Strata:
+    """Make the samples of a light. of_rectangle: how many a rectangle has, a power of four"""
+    share = _SHARES["rectangle" if light.is_rectangle else "mesh"]
+    num = share * of_rectangle if light.kind == SURFACE else 1
+    return make_strata(halvings(len(light.share), num), _SEED)
+
+
+def parts_of(light: LocalLight, strata: Strata) -> LampParts:
+    """Find the parts of a lamp's surface that samples stand for. strata: from `strata_of`"""
+    along = halvings(len(light.share), len(strata.uv))
+    return make_parts(along, light.corner, light.edges, light.share, is_rectangle=light.is_rectangle)
 
 
 def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> LocalLight:
@@ -93,7 +101,8 @@ def make_local(geometry: LightGeometry, triangles: Triangles | None = None) -> L
     areas = np.linalg.norm(across, axis=1) * (1.0 if is_rectangle else 0.5)
     if triangles is not None:
         areas = areas * triangles.shares
-    kept, area = areas > 0, areas.sum()
+    kept, area = np.flatnonzero(areas > 0), areas.sum()
+    kept = kept[side_by_side((corner + edges.sum(axis=1) / 3)[kept])]
     across = across[kept] / np.linalg.norm(across[kept], axis=1, keepdims=True)
     scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
     return LocalLight(
@@ -159,12 +168,12 @@ def _cone(inner: float, outer: float) -> tuple[float, float]:
 
 # inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
 @nb.njit(nogil=True, cache=True, inline="always")
-def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
+def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
     """Find a sample of a light as a point sees it.
 
     Args:
-        light: a `LocalLight`. pattern: its samples, from `pattern_of`. sample: which of them.
-        shift_u, shift_v: the point's shift of the pattern, from `shift_of`. px, py, pz: the point, metres.
+        light: a `LocalLight`. strata: its samples, from `strata_of`. sample: which of them.
+        shift_u, shift_v: the point's shift within the strata, from `shift_of`. px, py, pz: the point, metres.
     Returns:
         Unit direction towards it (three), distance, w, and the normal of its surface on the point's side (three; zeros
         where it has none).
@@ -183,9 +192,9 @@ def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type:
         return dx, dy, dz, distance, falloff * falloff / (nearest * nearest), zero, zero, zero
     if light.area == 0:
         return one, zero, zero, one, zero, zero, zero, zero
-    u, v = pattern.uv[sample, 0] + shift_u, pattern.uv[sample, 1] + shift_v
-    u -= np.float32(u >= one)
-    v -= np.float32(v >= one)
+    u, v = strata.uv[sample, 0] + shift_u, strata.uv[sample, 1] + shift_v
+    u = strata.corner[sample, 0] + strata.size[0] * (u - np.float32(u >= one))
+    v = strata.corner[sample, 1] + strata.size[1] * (v - np.float32(v >= one))
     piece = 0
     if not light.is_rectangle:
         piece = min(np.searchsorted(light.share, u, side="right"), light.share.shape[0] - 1)
@@ -203,7 +212,7 @@ def light_sample(light, pattern, sample, shift_u, shift_v, px, py, pz):  # type:
     cosine = -(dx * nx + dy * ny + dz * nz)
     if cosine < 0 and light.is_two_sided:
         nx, ny, nz, cosine = -nx, -ny, -nz, -cosine
-    area = light.area / np.float32(pattern.uv.shape[0])
+    area = light.area / np.float32(strata.uv.shape[0])
     # a patch of this area that is as near as it is wide fills the half space: it gives no more than that
     weight = area * max(cosine, zero) / max(distance * distance, area / _PI)
     return dx, dy, dz, distance, weight, nx, ny, nz

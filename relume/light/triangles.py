@@ -79,6 +79,9 @@ class TriangleLights:
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
 
 
+NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
+
+
 def _sums(place: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
     """Sum the values (n,) that have the same place (n,), in [0, num). (num,)"""
     return np.asarray(np.bincount(place, values, num), np.float64)

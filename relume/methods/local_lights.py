@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.light.local import LocalLight, Triangles, make_local, pattern_of, shadow_geometry
+from relume.light.local import LocalLight, Triangles, make_local, shadow_geometry, strata_of
+from relume.light.strata import Strata
 from relume.look import LightGeometry
 from relume.memory import Memory
 from relume.methods.store_io import has_holes, read_gather_samples, read_holes
@@ -93,8 +94,7 @@ class LocalLights:
         find = shadows_of or self.shadows
         return [
             LocalRays(
-                self._light(geometry),
-                pattern_of(geometry, SAMPLES),
+                *self._sampled(geometry, SAMPLES),
                 np.array(gain, np.float32),
                 find(shadow_geometry(geometry), points).visible,
             )
@@ -103,24 +103,22 @@ class LocalLights:
 
     def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
         """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
-        pattern = pattern_of(geometry, PREVIEW_SAMPLES)
-        return preview_light(self.embree, self._off_surface, self._light(geometry), pattern, points)
+        return preview_light(self.embree, self._off_surface, *self._sampled(geometry, PREVIEW_SAMPLES), points)
 
     def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
         """Make rays of a previewed light, for terms that ask where light comes from. seen: `PreviewLight.visible`"""
-        light, pattern = self._light(source.geometry), pattern_of(source.geometry, PREVIEW_SAMPLES)
-        return LocalRays(light, pattern, np.array(source.gain, np.float32), seen)
+        return LocalRays(*self._sampled(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), seen)
 
     def unhidden_rays(self, geometry: LightGeometry, points: Points) -> LocalRays:
         """What would come to points from a light of unit emission if nothing were in its way, as rays."""
-        pattern = pattern_of(geometry, SAMPLES)
-        seen = np.full((points.num_points, -(-len(pattern.uv) // 8)), 255, np.uint8)
-        return LocalRays(self._light(geometry), pattern, _ONES, seen)
+        light, strata = self._sampled(geometry, SAMPLES)
+        seen = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
+        return LocalRays(light, strata, _ONES, seen)
 
     def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
         """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
         rays = self.unhidden_rays(geometry, points)
-        return arriving(rays.light, rays.pattern, points, rays.visible)
+        return arriving(rays.light, rays.strata, points, rays.visible)
 
     def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""
@@ -140,8 +138,8 @@ class LocalLights:
         return self._memory.keep((self._key, "light on cells", geometry), lambda: self._irradiance(geometry))
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
-        points, pattern = self._gather_samples, pattern_of(geometry, SAMPLES_OF_CELLS)
-        of_points = arriving(self._light(geometry), pattern, points, self._seen_by_cells(geometry))
+        points, sampled = self._gather_samples, self._sampled(geometry, SAMPLES_OF_CELLS)
+        of_points = arriving(*sampled, points, self._seen_by_cells(geometry))
         return np.asarray(of_points.reshape(-1, POINTS_A_CELL).mean(axis=1, dtype=np.float64), np.float32)
 
     def _seen_by_cells(self, geometry: LightGeometry) -> NDArray[np.uint8]:
@@ -158,7 +156,7 @@ class LocalLights:
         """
         seen = self._seen_by_cells(geometry)
         bits = seen.reshape(-1, POINTS_A_CELL, seen.shape[1])[rows].reshape(-1, seen.shape[1])
-        return LocalRays(self._light(geometry), pattern_of(geometry, SAMPLES_OF_CELLS), _ONES, bits)
+        return LocalRays(*self._sampled(geometry, SAMPLES_OF_CELLS), _ONES, bits)
 
     def preview_irradiance(self, geometry: LightGeometry) -> F32:
         """Preview what comes to every gather cell from a light of unit emission, at one of its points. (C,) float32"""
@@ -184,8 +182,12 @@ class LocalLights:
         return is_front(self.embree, self.positions, self.faces, eye, position)
 
     def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
-        light, pattern = self._light(geometry), pattern_of(geometry, num_samples)
-        return trace_local(self.embree, self._off_surface, light, pattern, points)
+        return trace_local(self.embree, self._off_surface, *self._sampled(geometry, num_samples), points)
+
+    def _sampled(self, geometry: LightGeometry, of_rectangle: int) -> tuple[LocalLight, Strata]:
+        """Make a light, and its samples. of_rectangle: see `strata_of`"""
+        light = self._light(geometry)
+        return light, strata_of(light, of_rectangle)
 
     def _light(self, geometry: LightGeometry) -> LocalLight:
         return self._memory.keep((self._key, "local light", geometry), lambda: self._make(geometry))

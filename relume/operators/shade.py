@@ -7,7 +7,7 @@ The sums that freezing makes, by another quadrature (`relume.project.shader`); p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.operators.frozen import tiles_of
 from relume.parallel import for_steps
+from relume.project.contraction import Contraction
 from relume.project.levels import contract_levels, project_levels
 from relume.project.receivers import Receivers
 from relume.project.shader import Shader
@@ -57,6 +58,25 @@ def shaded_bytes(num_samples: int) -> int:
     return tiles * samples * 3 * 4
 
 
+def shaded_rows(
+    term: Term,
+    contractions: Sequence[Contraction],
+    lights: TriangleLights,
+    receivers: Receivers,
+    start: int,
+    stop: int,
+) -> F32:
+    """Contract all curves of a term at receivers [start, stop). (stop - start, 3)
+
+    Args:
+        contractions: of the term's curves, none of them free, from `contract_levels`.
+        lights, receivers: what arrives, and where.
+    """
+    if term.texels is not None and receivers.uv is not None:
+        return texel_rows(term.texels, lights, receivers, start, stop)
+    return project_levels(term, contractions, lights, receivers, start, stop, Shader)[:, 0]
+
+
 def shade(
     term: Term,
     bands: Mapping[str, NDArray[np.float64]],
@@ -79,10 +99,7 @@ def shade(
     contractions = contract_levels(term, bands, None)
 
     def step(start: int, stop: int) -> None:
-        if term.texels is not None and receivers.uv is not None:
-            rows[start:stop] = texel_rows(term.texels, lights, receivers, start, stop)
-        else:
-            rows[start:stop] = project_levels(term, contractions, lights, receivers, start, stop, Shader)[:, 0]
+        rows[start:stop] = shaded_rows(term, contractions, lights, receivers, start, stop)
 
     grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
     for_steps(step, num_samples, grain, progress, cancelled, "shading")

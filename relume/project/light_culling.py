@@ -67,7 +67,7 @@ def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
+def keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
     """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end."""
     for k in range(kinds.shape[0]):
         limit = support[k] + _SLACK
@@ -132,7 +132,7 @@ def list_lights(  # type: ignore[no-untyped-def]
         ox = tx * wo[p, 0] + ty * wo[p, 1] + tz * wo[p, 2]
         oy = bx * wo[p, 0] + by * wo[p, 1] + bz * wo[p, 2]
         oz = nx * wo[p, 0] + ny * wo[p, 1] + nz * wo[p, 2]
-        end = _keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
+        end = keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
         out[0, begin:end], out[1, begin:end], out[2, begin:end] = ox, oy, oz
     first[stop - start] = end
     return end

@@ -1,4 +1,7 @@
-"""The lights of a few points at a time, as projectors want them: listed, turned, weighed by the quotient."""
+"""The lights of a few points at a time, as projectors want them: listed, turned, weighed by the quotient.
+
+Those of the environment are the same for all points; parts of a lamp are other triangles for each of them.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,13 @@ from relume.brdf.term import Term
 from relume.light.merged import see_parts, weigh_by_parts
 from relume.light.triangles import Parts, TriangleLights
 from relume.project.contraction import Contraction
+from relume.project.lamp_kernel import list_lamp
 from relume.project.light_culling import list_lights
-from relume.project.receivers import Receivers
+from relume.project.receivers import LocalRays, Receivers
 
 F32 = NDArray[np.float32]
 
+_TRIANGLES_A_BLOCK = 4096  # of lamps, at least those of one point
 POINTS_A_BLOCK = 48  # directions of a block stay in a core's second-level cache
 
 _HALF_PI = np.float32(np.pi / 2)
@@ -40,6 +45,12 @@ def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.
     return np.append(kinds, THETA_H), np.append(support, np.float32(bound))
 
 
+def _support_of(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
+    """Angles of curves, and radians beyond which each is nothing."""
+    radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
+    return with_half_angle(contraction.kinds, radians)
+
+
 class ListedLights:
     """Lists the lights of blocks of receivers; holds the scratch memory of one thread.
 
@@ -56,8 +67,7 @@ class ListedLights:
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
         self._term, self._lights, self._receivers = term, lights, receivers
         self.irradiance = lights.irradiance * contraction.constant
-        radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
-        self._kinds, self._support = with_half_angle(contraction.kinds, radians)
+        self._kinds, self._support = _support_of(contraction)
         capacity = POINTS_A_BLOCK * lights.num_lights
         self._seen = np.empty((lights.num_lights if lights.parts is not None else 0, POINTS_A_BLOCK), np.float32)
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
@@ -87,3 +97,52 @@ class ListedLights:
         """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
         see_parts(self._receivers.visible, parts.group, parts.share, start, stop, self._seen)
         return np.packbits(self._seen[:, : stop - start].T > 0, axis=1, bitorder="little")
+
+
+class ListedLamp:
+    """Lists the parts of a lamp that blocks of receivers see; holds the scratch memory of one thread.
+
+    Args:
+        term: the BRDF term. contraction: its curves, from `contract`.
+        receivers: all points. rays: from a light that has a surface.
+
+    Attributes:
+        triangles_a_point, points_a_block: the most of both that are listed at once.
+        first, light: written by `list`, see `list_lamp`.
+    """
+
+    def __init__(self, term: Term, contraction: Contraction, receivers: Receivers, rays: LocalRays) -> None:
+        self._term, self._receivers, self._rays = term, receivers, rays
+        self._kinds, self._support = _support_of(contraction)
+        self._gain = np.asarray(rays.gain * contraction.constant, np.float32)
+        self.triangles_a_point = 2 * len(rays.strata.uv)
+        self.points_a_block = max(1, _TRIANGLES_A_BLOCK // self.triangles_a_point)
+        capacity = self.points_a_block * self.triangles_a_point
+        self.first, self.light = np.empty(self.points_a_block + 1, np.int64), np.empty(capacity + 1, np.int32)
+        self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
+        self._nodes, self._brings = np.empty((capacity, 6, 3), np.float32), np.empty((capacity, 4), np.float32)
+
+    def list(self, start: int, stop: int) -> tuple[F32, F32, F32, F32]:
+        """List the triangles of points [start, stop), a block of them at most.
+
+        Returns:
+            q cos θi of each entry (1 or 3, K), the local wo (3, K) that it belongs to, nodes of triangles (M, 6, 3),
+            and what they bring and how wide they are (M, 4).
+        """
+        r, rays = self._receivers, self._rays
+        num, num_triangles = list_lamp(
+            r.points, r.wo, (rays.light, rays.strata, rays.parts, self._gain), rays.visible, self._kinds,
+            self._support, start, stop, self.first, self.light, self._wi, self._wo, self._nodes, self._brings,
+        )  # fmt: skip
+        wi, wo = self._wi[:, :num], self._wo[:, :num]
+        shading = self._term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
+        shading *= wi[2]
+        return shading, wo, self._nodes[:num_triangles], self._brings[:num_triangles]
+
+
+def listed_lamps(term: Term, contraction: Contraction, receivers: Receivers) -> list[ListedLamp]:
+    """Make room for all lamps that are listed as triangles: those with an extent, where any curve asks for it."""
+    if contraction.kinds.size == 0:
+        return []
+    lamps = [rays for rays in receivers.rays if isinstance(rays, LocalRays) and rays.has_extent]
+    return [ListedLamp(term, contraction, receivers, rays) for rays in lamps]

@@ -14,8 +14,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import angles_into
-from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight
-from relume.project.overlap import overlap_of
+from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight, overlap_of
 from relume.vector_code import NUM as EIGHT
 
 _QUARTER = np.float32(0.25)
@@ -326,6 +325,17 @@ def _divide(  # type: ignore[no-untyped-def]
     return num
 
 
+@nb.njit(nogil=True, cache=True)
+def scratch_of(num_curves, num_lights, num_settings):  # type: ignore[no-untyped-def]
+    """Make room for what `project_points` is in the middle of: it need not be made, and zeroed, for every few points.
+
+    Args:
+        num_curves: C. num_lights: the most that it is asked to list triangles of. num_settings: see `Contraction`.
+    """
+    capacity = 4 * num_lights + _MOST_LEAVES
+    return _scratch_of_lights(num_curves, num_lights), _scratch_of_leaves(num_curves, capacity, num_settings)
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
     """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends."""
@@ -353,7 +363,8 @@ def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-u
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, irradiance,
-    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, fine, start, stop, out,
+    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, fine, start, stop, scratch,
+    out,
 ):  # fmt: skip
     """Project the listed lights of points [start, stop).
 
@@ -365,18 +376,17 @@ def project_points(  # type: ignore[no-untyped-def]
         kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active: see `Contraction`.
         fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
             division. `FINE` or `ROUGH`.
+        scratch: from `scratch_of`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.
     """
-    num_curves, num_lights = kinds.shape[0], nodes.shape[2]
+    num_curves = kinds.shape[0]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    local, gamma, parts, origin, lists, bend, divided = _scratch_of_lights(num_curves, num_lights)
-    capacity = 4 * num_lights + _MOST_LEAVES
-    leaves, shares, of_entry, overlap, weight, mean, product = _scratch_of_leaves(
-        num_curves, capacity, settings.shape[2]
-    )  # fmt: skip
+    local, gamma, parts, origin, lists, bend, divided = scratch[0]
+    leaves, shares, of_entry, overlap, weight, mean, product = scratch[1]
+    capacity = shares.shape[0]
     scaled_wo = np.empty((num_curves, 3), np.float32)
     for p in range(start, stop):
         row = p - start

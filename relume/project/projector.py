@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
-from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
-from relume.project.project_kernel import FINE, ROUGH, project_points
+from relume.project.listed_lights import POINTS_A_BLOCK, ListedLamp, ListedLights, listed_lamps
+from relume.project.project_kernel import FINE, ROUGH, project_points, scratch_of
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
 from relume.vector_code import NUM as EIGHT
@@ -36,6 +36,10 @@ class Projector:
         self._contraction, self._lights, self._receivers = contraction, lights, receivers
         self._listed = ListedLights(term, contraction, lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
+        self._lamps = listed_lamps(term, contraction, receivers)
+        most = max([lights.num_lights, *(lamp.triangles_a_point for lamp in self._lamps)])
+        self._fine = FINE if lights.parts is None else ROUGH
+        self._scratch = scratch_of(contraction.kinds.size, most, contraction.settings.shape[2])
 
     def project(self, start: int, stop: int) -> F32:
         """Project points [start, stop): their transport along the free curve, in its bands.
@@ -50,7 +54,21 @@ class Projector:
             end = min(block + POINTS_A_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
         self._rays.add(start, stop, out)
+        for lamp in self._lamps:
+            self._add_lamp(lamp, start, stop, out)
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
+
+    def _add_lamp(self, lamp: ListedLamp, start: int, stop: int, out: F32) -> None:
+        r, c = self._receivers, self._contraction
+        for block in range(start, stop, lamp.points_a_block):
+            end = min(block + lamp.points_a_block, stop)
+            shading, wo, nodes, brings = lamp.list(block, end)
+            by_axis, irradiance = np.ascontiguousarray(nodes.transpose(2, 1, 0)), np.ascontiguousarray(brings[:, :3])
+            project_points(
+                r.normal, r.tangent, lamp.first, lamp.light, shading, wo, by_axis, irradiance,
+                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
+                self._fine, block, end, self._scratch, out[block - start : end - start],
+            )  # fmt: skip
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         r, c, listed = self._receivers, self._contraction, self._listed
@@ -58,5 +76,5 @@ class Projector:
         project_points(
             r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.nodes, listed.irradiance,
             c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
-            FINE if self._lights.parts is None else ROUGH, start, stop, out,
+            self._fine, start, stop, self._scratch, out,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """The kernels of `relume.project.ray_projector`: rays listed with their light, weighed, put into bands.
 
-A ray is a direction, where a light triangle has an extent: it falls into one band of every curve.
+A ray is a direction, where a light triangle has an extent: it falls into one band of every curve. Samples of lamps are
+listed where no curve asks where light comes from; else see `relume.project.lamp_kernel`.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from relume.project.gathered_kernel import in_frame
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def list_local(  # type: ignore[no-untyped-def]
-    points, wo, light, pattern, gain, visible, start, stop, first, wi, out, irradiance
+    points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
 ):
     """List the samples of a local light that points [start, stop) see.
 
     Args:
         points: `Points`. wo: towards the viewer. (n, 3) float32
-        light, pattern, gain, visible: as in `LocalRays`.
+        light, strata, gain, visible: as in `LocalRays`.
         start, stop: the points.
         first, wi, out, irradiance: written, as by `relume.project.gathered_kernel.list_gathered`; the irradiance of a
             ray is w · cos θi · gain.
@@ -37,12 +38,12 @@ def list_local(  # type: ignore[no-untyped-def]
         first[p - start] = end
         n, t = normal[p], tangent[p]
         (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
-        shift_u, shift_v = shift_of(pattern, seed[p])
-        for sample in range(pattern.uv.shape[0]):
+        shift_u, shift_v = shift_of(strata, seed[p])
+        for sample in range(strata.uv.shape[0]):
             if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
                 continue
             dx, dy, dz, _, weight, _, _, _ = light_sample(
-                light, pattern, sample, shift_u, shift_v, position[p, 0], position[p, 1], position[p, 2]
+                light, strata, sample, shift_u, shift_v, position[p, 0], position[p, 1], position[p, 2]
             )
             z = n[0] * dx + n[1] * dy + n[2] * dz
             weight *= z

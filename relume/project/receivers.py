@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.light.gather_rays import Pattern
-from relume.light.local import LocalLight
+from relume.light.local import SURFACE, LocalLight, parts_of
+from relume.light.strata import LampParts, Strata
 from relume.points import Points
 from relume.project.gathered_kernel import list_gathered, sum_gathered
 from relume.project.ray_kernel import list_local
@@ -92,20 +94,30 @@ class LocalRays:
     """Rays that bring a local light.
 
     Attributes:
-        light: of unit emission. pattern: its samples, shifted by the points' seeds.
+        light: of unit emission. strata: its samples, shifted by the points' seeds.
         gain: times the light's unit emission. (3,) float32
         visible: sample k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
     """
 
     light: LocalLight
-    pattern: Pattern
+    strata: Strata
     gain: F32
     visible: NDArray[np.uint8]
 
     @property
+    def has_extent(self) -> bool:
+        """Whether the light is a surface."""
+        return self.light.kind == SURFACE and bool(self.light.area > 0)
+
+    @cached_property
+    def parts(self) -> LampParts:
+        """LampParts of that surface."""
+        return parts_of(self.light, self.strata)
+
+    @property
     def rays_a_point(self) -> int:
         """The most rays that any point has."""
-        return len(self.pattern.uv)
+        return len(self.strata.uv)
 
     def alone(self, chosen: NDArray[np.integer]) -> LocalRays:
         """Choose those of some points; see `Rays`."""
@@ -113,7 +125,7 @@ class LocalRays:
 
     def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
-        arriving = self.light, self.pattern, self.gain, self.visible
+        arriving = self.light, self.strata, self.gain, self.visible
         return int(list_local(receivers.points, receivers.wo, *arriving, start, stop, *listed))
 
 

@@ -347,7 +347,7 @@ def shade_points(  # type: ignore[no-untyped-def]
         nodes: of the lights. (M, 6, 3) float32 brings: their irradiance and, in radians, radius. (M, 4) float32
         axes: `Curve.axes` of each. (C, 3) float32
         curves: see `_evaluate`.
-        out: added to. (points, 3, ≥ 1) float32
+        out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
     """
     num_curves, num_rows = axes.shape[0], 1
     scale, wo = np.empty(num_curves, np.float32), np.empty((num_curves, 3), np.float32)
@@ -378,6 +378,8 @@ def shade_points(  # type: ignore[no-untyped-def]
         if num_curves == 0:
             out[p - start, :, 0] += total
             continue
+        for channel in range(3):  # what is there already counts as well
+            total[channel] += abs(out[p - start, channel, 0])
         least = _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2])
         total[:] = 0
         for chunk in range((end - begin + _CHUNK - 1) // _CHUNK):

@@ -15,7 +15,7 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
 from relume.project.lambertian import EvenShader
-from relume.project.listed_lights import POINTS_A_BLOCK, ListedLights
+from relume.project.listed_lights import POINTS_A_BLOCK, ListedLamp, ListedLights, listed_lamps
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
 from relume.project.shade_kernel import shade_points
@@ -39,6 +39,7 @@ class Shader:
         is_even = term.is_lambertian and contraction.kinds.size == 0
         self._even = EvenShader(term, contraction.constant, lights) if is_even else None
         self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
+        self._lamps = listed_lamps(term, contraction, receivers)
 
     def project(self, start: int, stop: int) -> F32:
         """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
@@ -48,7 +49,19 @@ class Shader:
         else:
             out[:, :, 0] = self._even.shade(self._receivers, start, stop)
         self._rays.add(start, stop, out)
+        for lamp in self._lamps:
+            self._add_lamp(lamp, start, stop, out)
         return out.transpose(0, 2, 1)
+
+    def _add_lamp(self, lamp: ListedLamp, start: int, stop: int, out: F32) -> None:
+        r, c = self._receivers, self._contraction
+        for block in range(start, stop, lamp.points_a_block):
+            end = min(block + lamp.points_a_block, stop)
+            shading, wo, nodes, brings = lamp.list(block, end)
+            shade_points(
+                r.normal, r.tangent, lamp.first, lamp.light, shading, wo, nodes, brings,
+                c.axes, c.whole, block, end, out[block - start : end - start],
+            )  # fmt: skip
 
     def _add_listed(self, start: int, stop: int, out: F32) -> None:
         """Add the environment, of which lists are made."""

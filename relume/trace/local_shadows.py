@@ -9,8 +9,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.gather_rays import Pattern, shift_of
+from relume.light.gather_rays import shift_of
 from relume.light.local import LocalLight, light_sample
+from relume.light.strata import Strata
 from relume.parallel import for_ranges
 from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
@@ -37,21 +38,21 @@ def shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface):  # type: ignore[n
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, light, pattern, off_surface, points, start, stop, bits
+    occluded, scene, arguments, light, strata, off_surface, points, start, stop, bits
 ):
     """Trace points [start, stop); start is a multiple of 16."""
     position, normal, _, seed = points
     packet = new_packet(scene, arguments)
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
-        for sample in range(pattern.uv.shape[0]):
+        for sample in range(strata.uv.shape[0]):
             active = 0
             for k in range(LANES):
                 p = first + min(k, width - 1)
                 x, y, z = position[p, 0], position[p, 1], position[p, 2]
-                shift_u, shift_v = shift_of(pattern, seed[p])
+                shift_u, shift_v = shift_of(strata, seed[p])
                 dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
-                    light, pattern, sample, shift_u, shift_v, x, y, z
+                    light, strata, sample, shift_u, shift_v, x, y, z
                 )
                 above = dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2] > 0
                 is_asked = k < width and above and weight > 0
@@ -69,21 +70,21 @@ def _trace(  # type: ignore[no-untyped-def]
 
 
 def trace_local(
-    scene: EmbreeScene, off_surface: float, light: LocalLight, pattern: Pattern, points: Points
+    scene: EmbreeScene, off_surface: float, light: LocalLight, strata: Strata, points: Points
 ) -> NDArray[np.uint8]:
     """Trace every point against every sample of a light that is above its horizon and gives it light.
 
     Args:
         scene: the triangles that may be in the way.
         off_surface: metres by which rays end before the light's own surface.
-        light: the light. pattern: its samples, from `pattern_of`; the points' seeds shift it.
+        light: the light. strata: its samples, from `strata_of`; the points' seeds shift them.
         points: n points that the light may reach.
     Returns:
         Sample k of a point in bit k & 7 of byte k >> 3. (n, ceil(samples / 8)) uint8
     """
-    bits = np.zeros((points.num_points, (len(pattern.uv) + 7) // 8), np.uint8)
+    bits = np.zeros((points.num_points, (len(strata.uv) + 7) // 8), np.uint8)
     arguments = packet_arguments(coherent=True)
-    args = (light, pattern, np.float32(off_surface), points)
+    args = (light, strata, np.float32(off_surface), points)
     for_ranges(
         lambda start, stop: _trace(occluded, scene.handle, arguments.ctypes.data, *args, start, stop, bits),
         points.num_points,
@@ -93,29 +94,29 @@ def trace_local(
 
 
 @nb.njit(nogil=True, cache=True)
-def _arriving(light, pattern, points, visible, start, stop, out):  # type: ignore[no-untyped-def]
+def _arriving(light, strata, points, visible, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum what points [start, stop) see of a light into `out`. (n,)"""
     position, normal, _, seed = points
     for p in range(start, stop):
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
-        shift_u, shift_v = shift_of(pattern, seed[p])
+        shift_u, shift_v = shift_of(strata, seed[p])
         total = 0.0
-        for sample in range(pattern.uv.shape[0]):
+        for sample in range(strata.uv.shape[0]):
             if (visible[p, sample >> 3] >> (sample & 7)) & 1:
-                dx, dy, dz, _, weight, _, _, _ = light_sample(light, pattern, sample, shift_u, shift_v, x, y, z)
+                dx, dy, dz, _, weight, _, _, _ = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
                 total += weight * max(dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2], np.float32(0))
         out[p] = total
 
 
-def arriving(light: LocalLight, pattern: Pattern, points: Points, visible: NDArray[np.uint8]) -> F32:
+def arriving(light: LocalLight, strata: Strata, points: Points, visible: NDArray[np.uint8]) -> F32:
     """Irradiance of points under a light of unit emission.
 
     Args:
-        light, pattern, points: as `trace_local` had them. visible: what it returned. (n, bytes) uint8
+        light, strata, points: as `trace_local` had them. visible: what it returned. (n, bytes) uint8
     Returns:
         E over the unit of emission (see `relume.light.local`). (n,) float32
     """
     out = np.empty(points.num_points, np.float32)
-    args = (light, pattern, points, visible)
+    args = (light, strata, points, visible)
     for_ranges(lambda start, stop: _arriving(*args, start, stop, out), points.num_points, _POINTS_A_RANGE)
     return out

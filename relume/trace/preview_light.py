@@ -14,8 +14,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.gather_rays import Pattern, shift_of
+from relume.light.gather_rays import shift_of
 from relume.light.local import LocalLight, light_sample
+from relume.light.strata import Strata
 from relume.parallel import for_shares
 from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
@@ -83,27 +84,27 @@ def _ask(occluded, packet, position, first, width, rays, given, are_probes, seen
 
 
 @nb.njit(nogil=True, cache=True)
-def _aim(light, pattern, off_surface, points, first, width, rays, given):  # type: ignore[no-untyped-def]
+def _aim(light, strata, off_surface, points, first, width, rays, given):  # type: ignore[no-untyped-def]
     """Aim the rays of a block's points, sample after sample of `BLOCK` each: direction and end, and w · cos θi."""
     position, normal, _, seed = points
     for k in range(width):
         p = first + k
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
-        shift_u, shift_v = shift_of(pattern, seed[p])
-        for sample in range(pattern.uv.shape[0]):
+        shift_u, shift_v = shift_of(strata, seed[p])
+        for sample in range(strata.uv.shape[0]):
             r = sample * BLOCK + k
-            dx, dy, dz, distance, weight, nx, ny, nz = light_sample(light, pattern, sample, shift_u, shift_v, x, y, z)
+            dx, dy, dz, distance, weight, nx, ny, nz = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
             given[r] = weight * (dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2])
             rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3] = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
 
 
 @nb.njit(nogil=True, cache=True)
 def _light(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, light, pattern, off_surface, points, start, stop, arriving, bits
+    occluded, scene, arguments, light, strata, off_surface, points, start, stop, arriving, bits
 ):
     """Light points [start, stop); start is a multiple of `BLOCK`."""
     packet = new_packet(scene, arguments)
-    num_rays = BLOCK * pattern.uv.shape[0]
+    num_rays = BLOCK * strata.uv.shape[0]
     rays, given, seen = (
         np.empty((num_rays, 4), np.float32),
         np.empty(num_rays, np.float32),
@@ -111,14 +112,14 @@ def _light(  # type: ignore[no-untyped-def]
     )
     for first in range(start, stop, BLOCK):
         width = min(BLOCK, stop - first)
-        _aim(light, pattern, off_surface, points, first, width, rays, given)
+        _aim(light, strata, off_surface, points, first, width, rays, given)
         asked, num_seen = _ask(occluded, packet, points.position, first, width, rays, given, True, seen)
         if asked > 0 and num_seen == 0:
             continue
         is_open = asked > 0 and num_seen == asked
         if not is_open:
             _ask(occluded, packet, points.position, first, width, rays, given, False, seen)
-        for sample in range(pattern.uv.shape[0]):
+        for sample in range(strata.uv.shape[0]):
             byte, bit = sample >> 3, np.uint8(1 << (sample & 7))
             for k in range(width):
                 r = sample * BLOCK + k
@@ -128,20 +129,20 @@ def _light(  # type: ignore[no-untyped-def]
 
 
 def preview_light(
-    scene: EmbreeScene, off_surface: float, light: LocalLight, pattern: Pattern, points: Points
+    scene: EmbreeScene, off_surface: float, light: LocalLight, strata: Strata, points: Points
 ) -> PreviewLight:
     """Light points, tracing where shadows end and predicting elsewhere.
 
     Args:
         scene: the triangles that may be in the way.
         off_surface: metres by which rays end before the light's own surface.
-        light: the light. pattern: its samples, from `pattern_of`; the points' seeds shift it.
+        light: the light. strata: its samples, from `strata_of`; the points' seeds shift them.
         points: n points that the light may reach, neighbours in the picture mostly next to each other.
     """
-    num, num_bytes = points.num_points, (len(pattern.uv) + 7) // 8
+    num, num_bytes = points.num_points, (len(strata.uv) + 7) // 8
     found = PreviewLight(np.zeros(num, np.float32), np.zeros((num, num_bytes), np.uint8))
     arguments = packet_arguments(coherent=True)
-    args = (light, pattern, np.float32(off_surface), points)
+    args = (light, strata, np.float32(off_surface), points)
 
     def kernel(start: int, stop: int) -> None:
         first, last = start * BLOCK, min(stop * BLOCK, num)

@@ -7,7 +7,7 @@ import pytest
 from tiny_scenes import points_at, shining
 
 from relume.light.gather_rays import shift_of
-from relume.light.local import light_sample, make_local, pattern_of, rectangle
+from relume.light.local import light_sample, make_local, rectangle, strata_of
 from relume.look import LightGeometry
 from relume.trace.local_shadows import arriving
 
@@ -34,7 +34,7 @@ def unit(v):
     return np.asarray(v, float) / np.linalg.norm(v)
 
 
-def sample_numpy(name, pattern, k, shift, p):
+def sample_numpy(name, light, strata, k, shift, p):
     """Direction and w, from the formulas that the module states."""
     geometry = GEOMETRIES[name]
     axis = unit(geometry.direction)
@@ -47,34 +47,36 @@ def sample_numpy(name, pattern, k, shift, p):
         if geometry.kind == "spot":
             falloff = np.clip((-unit(away) @ axis - outer) / max(inner - outer, 1e-3), 0, 1) ** 2
         return unit(away), falloff / (away @ away)
-    u, v = (np.asarray(pattern.uv[k], float) + shift) % 1
+    u, v = strata.corner[k] + strata.size * ((np.asarray(strata.uv[k], float) + shift) % 1)
     if geometry.kind == "rectangle":
         corner, (e, f) = rectangle(geometry)
         place, normal, area = corner + u * e + v * f, np.cross(e, f), np.linalg.norm(np.cross(e, f))
     else:
-        areas = np.linalg.norm(np.cross(PIECES[:, 1] - PIECES[:, 0], PIECES[:, 2] - PIECES[:, 0]), axis=1) / 2
+        pieces = np.concatenate([light.corner[:, None], light.corner[:, None] + light.edges], axis=1).astype(float)
+        areas = np.linalg.norm(np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1) / 2
         area, upto = areas.sum(), np.cumsum(areas) / areas.sum()
         piece = int(np.searchsorted(upto, u, side="right"))
-        a, b, c = PIECES[piece]
+        a, b, c = pieces[piece]
         root = np.sqrt((u - upto[piece] + areas[piece] / area) / (areas[piece] / area))
         place, normal = a + root * (1 - v) * (b - a) + root * v * (c - a), np.cross(b - a, c - a)
     away = place - p
     cosine = -unit(away) @ unit(normal)
     cosine = abs(cosine) if name == "two-sided" else max(cosine, 0)
-    patch = area / len(pattern.uv)
+    patch = area / len(strata.uv)
     return unit(away), patch * cosine / max(away @ away, patch / np.pi)
 
 
 @pytest.mark.parametrize("name", GEOMETRIES)
 def test_samples_are_those_of_numpy(name):
-    light, pattern = light_of(name), pattern_of(GEOMETRIES[name], 64)
+    light = light_of(name)
+    strata = strata_of(light, 64)
     weights = []
     for number in range(12):
         p = RNG.normal(size=3).astype(np.float32)
-        shift = shift_of(pattern, number)
-        for k in range(len(pattern.uv)):
-            x, y, z, _, weight, *_ = light_sample(light, pattern, k, *shift, *p)
-            direction, expected = sample_numpy(name, pattern, k, shift, p.astype(float))
+        shift = shift_of(strata, number)
+        for k in range(len(strata.uv)):
+            x, y, z, _, weight, *_ = light_sample(light, strata, k, *shift, *p)
+            direction, expected = sample_numpy(name, light, strata, k, shift, p.astype(float))
             np.testing.assert_allclose((x, y, z), direction, atol=2e-4)
             np.testing.assert_allclose(weight, expected, rtol=2e-2 if name == "sharp" else 2e-3, atol=2e-4)
             weights.append(expected)
@@ -97,9 +99,8 @@ def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
     corner, (e, f) = rectangle(geometry)
     points = RNG.uniform([-0.5, 0, -0.5], [0.5, 0.3, 0.5], (200, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (200, 1))
-    pattern = pattern_of(geometry, 64)
-    seen = np.full((200, 8), 255, np.uint8)
-    found = arriving(make_local(geometry), pattern, points_at(points, normals), seen)
+    light, seen = make_local(geometry), np.full((200, 8), 255, np.uint8)
+    found = arriving(light, strata_of(light, 64), points_at(points, normals), seen)
     expected = [
         polygon_irradiance(np.array([corner, corner + e, corner + e + f, corner + f]), p, np.array([0, 1, 0]))
         for p in points.astype(float)
@@ -127,15 +128,9 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
     triangles = np.array([[a, b, c], [a, c, d]], np.float32)
     points = RNG.uniform([-1, -0.5, -1], [1, 0.5, 1], (400, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (400, 1))
-    at, seen = points_at(points, normals), np.full((400, 8), 255, np.uint8)
-    pattern = pattern_of(geometry, 64)
-    as_one = arriving(make_local(geometry), pattern, at, seen)
-    as_two = arriving(
-        make_local(GEOMETRIES["one-sided"], shining(triangles, False)),
-        pattern,
-        at,
-        seen,
-    )
+    at, seen = points_at(points, normals), np.full((400, 32), 255, np.uint8)
+    one, two = make_local(geometry), make_local(GEOMETRIES["one-sided"], shining(triangles, False))
+    as_one, as_two = (arriving(light, strata_of(light, 64), at, seen) for light in (one, two))
     np.testing.assert_allclose(as_two, as_one, rtol=0.05)
     np.testing.assert_allclose(as_two.mean(), as_one.mean(), rtol=2e-3)
 
@@ -143,16 +138,15 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
 @pytest.mark.parametrize("corners", [np.zeros((0, 3, 3)), np.ones((2, 3, 3)), np.zeros((1, 3, 3))])
 def test_emitter_without_area_gives_no_light(corners):
     light = make_local(GEOMETRIES["one-sided"], shining(corners, True))
-    pattern = pattern_of(GEOMETRIES["one-sided"], 64)
+    strata = strata_of(light, 64)
     up = np.array([[0, 1, 0]], np.float32)
     seen = np.full((1, 32), 255, np.uint8)
-    assert arriving(light, pattern, points_at(0 * up, up), seen) == 0
+    assert arriving(light, strata, points_at(0 * up, up), seen) == 0
 
 
 def test_light_that_touches_a_surface_is_finite():
     up = np.array([[0, 1, 0]], np.float32)
     for geometry in (LightGeometry("point"), LightGeometry("rectangle", (0, 0, 0), (0, 1, 0), size=(1e-4, 1e4))):
-        pattern = pattern_of(geometry, 64)
-        seen = np.full((1, 32), 255, np.uint8)
-        found = arriving(make_local(geometry), pattern, points_at(0 * up, up), seen)
+        light, seen = make_local(geometry), np.full((1, 32), 255, np.uint8)
+        found = arriving(light, strata_of(light, 64), points_at(0 * up, up), seen)
         assert np.isfinite(found).all()

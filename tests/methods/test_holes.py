@@ -8,7 +8,7 @@ from sessions import look_of, relative_rmse
 from tiny_scenes import looking, points_at, quad, scene_of, studio
 
 from relume.bake import Recipe
-from relume.light.local import make_local, pattern_of
+from relume.light.local import make_local, strata_of
 from relume.look import LightGeometry
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
@@ -55,7 +55,8 @@ def test_lamps_of_an_opened_bake_shine_through(scene, direct):
     x, z = np.random.default_rng(1).uniform(-1, 1, (2, 2000))
     points = points_at(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
     geometry = merge(scene)
-    wanted = trace_local(geometry.embree, geometry.epsilon, make_local(LAMP), pattern_of(LAMP, 64), points)
+    lamp = make_local(LAMP)
+    wanted = trace_local(geometry.embree, geometry.epsilon, lamp, strata_of(lamp, 64), points)
     found = direct.local.shadows(LAMP, points).visible
     np.testing.assert_array_equal(found, wanted)
     assert 0.3 < (found & 1).mean() < 0.9

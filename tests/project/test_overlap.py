@@ -6,8 +6,7 @@ import numba as nb
 import numpy as np
 import pytest
 
-from relume.project.eight_bands import deposit_eight, mean_of_eight
-from relume.project.overlap import overlap_of
+from relume.project.eight_bands import deposit_eight, mean_of_eight, overlap_of
 from relume.vector_code import NUM
 
 FINE = 250

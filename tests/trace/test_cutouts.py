@@ -11,7 +11,7 @@ from twins import opacity_at, unit
 
 from relume.errors import ChunkDamagedError
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.local import make_local, pattern_of
+from relume.light.local import make_local, strata_of
 from relume.look import LightGeometry
 from relume.scene.model import Glass, Material, Opacity
 from relume.trace.cutout_filter import ANYWHERE, EVERYWHERE
@@ -96,10 +96,8 @@ def test_light_comes_through_holes_to_points_and_from_lamps():
     clear = np.abs(wanted - 0.5) > 1e-3
     seen = trace_visibility(geometry.embree, points, up, -DOWN[None]).visible[:, 0] & 1
     np.testing.assert_array_equal(seen[clear] == 1, (wanted < 0.5)[clear])
-    lamp = LightGeometry("directional", direction=(0.0, 0.0, -1.0))
-    from_lamp = trace_local(
-        geometry.embree, geometry.epsilon, make_local(lamp), pattern_of(lamp, 1), points_at(points, up)
-    )
+    lamp = make_local(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
+    from_lamp = trace_local(geometry.embree, geometry.epsilon, lamp, strata_of(lamp, 1), points_at(points, up))
     np.testing.assert_array_equal((from_lamp[:, 0] & 1)[clear] == 1, (wanted < 0.5)[clear])
 
 

@@ -8,7 +8,7 @@ from tiny_scenes import points_at, quad, shining, still_life
 
 from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.gather_rays import shift_of
-from relume.light.local import light_sample, make_local, pattern_of
+from relume.light.local import light_sample, make_local, strata_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
@@ -52,16 +52,16 @@ def surfaces():
 )
 def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     geometry, position, normal = surfaces
-    made, pattern = make_local(light), pattern_of(light, 20)
+    made = make_local(light)
+    strata = strata_of(made, 16)
     points = points_at(position, normal, first=100)
-    seen = trace_local(geometry.embree, geometry.epsilon, made, pattern, points)
-    bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(pattern.uv)].astype(bool)
+    seen = trace_local(geometry.embree, geometry.epsilon, made, strata, points)
+    bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(strata.uv)].astype(bool)
     triangles = geometry.positions[geometry.faces].astype(float)
     wrong = 0
-    for k in range(len(pattern.uv)):
+    for k in range(len(strata.uv)):
         found = [
-            light_sample(made, pattern, k, *shift_of(pattern, n), *p)
-            for n, p in zip(points.seed, position, strict=True)
+            light_sample(made, strata, k, *shift_of(strata, n), *p) for n, p in zip(points.seed, position, strict=True)
         ]
         direction, distance = np.array([f[:3] for f in found]), np.array([f[3] for f in found])
         end = position + direction * np.minimum(distance, 100)[:, None]
@@ -72,9 +72,10 @@ def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
 
 
 def irradiance(geometry, light, position, normal, triangles=None, num_samples=64):
-    made, pattern = make_local(light, triangles), pattern_of(light, num_samples)
+    made = make_local(light, triangles)
+    strata = strata_of(made, num_samples)
     points = points_at(position, normal)
-    return arriving(made, pattern, points, trace_local(geometry, 1e-5, made, pattern, points))
+    return arriving(made, strata, points, trace_local(geometry, 1e-5, made, strata, points))
 
 
 def embree_of(*meshes):

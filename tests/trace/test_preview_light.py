@@ -7,7 +7,7 @@ import pytest
 from tiny_scenes import points_at, still_life
 
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.local import make_local, pattern_of
+from relume.light.local import make_local, strata_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
@@ -52,11 +52,12 @@ def predicted(seen, asked):
 )
 def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces, light):
     geometry, position, normal = surfaces
-    made, pattern = make_local(light), pattern_of(light, 4)
-    along = (made, pattern, points_at(position, normal))
+    made = make_local(light)
+    strata = strata_of(made, 4)
+    along = (made, strata, points_at(position, normal))
     rough = preview_light(geometry.embree, geometry.epsilon, *along)
     seen, asked = (
-        np.unpackbits(trace_local(scene, geometry.epsilon, *along), axis=1, bitorder="little")[:, : len(pattern.uv)] > 0
+        np.unpackbits(trace_local(scene, geometry.epsilon, *along), axis=1, bitorder="little")[:, : len(strata.uv)] > 0
         for scene in (geometry.embree, FAR)
     )
     expected = np.packbits(predicted(seen, asked), axis=1, bitorder="little")
@@ -69,8 +70,9 @@ def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces,
 
 def test_points_that_no_light_reaches_stay_dark(surfaces):
     geometry, position, normal = surfaces
-    made, pattern = make_local(LightGeometry("point", (0.9, 1.4, 0.6))), pattern_of(LightGeometry("point"), 4)
+    made = make_local(LightGeometry("point", (0.9, 1.4, 0.6)))
+    strata = strata_of(made, 4)
     points = points_at(position, normal)._replace(normal=0 * normal)
-    rough = preview_light(geometry.embree, geometry.epsilon, made, pattern, points)
+    rough = preview_light(geometry.embree, geometry.epsilon, made, strata, points)
     assert not rough.arriving.any()
     assert not rough.visible.any()

@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.light.triangles import NO_LIGHTS
 from relume.look import LightGeometry
-from relume.operators.shade import Shaded, shaded_bytes
+from relume.operators.shade import Shaded, shaded_bytes, shaded_rows
 from relume.parallel import for_shares
 from relume.picture.jobs import Place, weighted_sum
 from relume.picture.light import Light, Source, direct_from
@@ -21,10 +22,8 @@ from relume.picture.material_image import MaterialImage
 from relume.picture.view_images import ViewImages
 from relume.points import Points
 from relume.project.contraction import contract
-from relume.project.levels import contract_levels, runs
-from relume.project.ray_projector import RayProjector
+from relume.project.levels import contract_levels
 from relume.project.receivers import LocalRays, Receivers
-from relume.project.texels import texel_rows
 from relume.trace.local_shadows import arriving
 from relume.trace.preview_light import PreviewLight
 from relume.views.compose import add_even
@@ -71,7 +70,7 @@ class MovedLights:
                 return self._shaded(material, live, rays)
             found, points = np.zeros_like(live.ready.image), self._points().rows(images.view.rows(material.index))
             for of_light in rays:
-                seen = arriving(of_light.light, of_light.pattern, points, of_light.visible)
+                seen = arriving(of_light.light, of_light.strata, points, of_light.visible)
                 add_even(seen, factor * of_light.gain, found)
             return Shaded(found)
 
@@ -103,18 +102,13 @@ class MovedLights:
         """What rays bring a term, in the threads of frames."""
         points = replace(self._receivers(material), rays=rays)
         contractions = contract_levels(live.term, live.target, None)
-        rows = np.zeros((material.num_samples, 3, 1), np.float32)
+        rows = np.empty((material.num_samples, 3), np.float32)
 
         def add(start: int, stop: int) -> None:
-            if live.term.texels is not None and points.uv is not None:
-                rows[start:stop, :, 0] = texel_rows(live.term.texels, None, points, start, stop)
-            else:
-                for level, first, last in runs(points.level, len(contractions), start, stop):
-                    projector = RayProjector(live.term, contractions[level], points, last - first)
-                    projector.add(first, last, rows[first:last])
+            rows[start:stop] = shaded_rows(live.term, contractions, NO_LIGHTS, points, start, stop)
 
         for_shares(add, len(rows))
-        return Shaded.of(rows[:, :, 0])
+        return Shaded.of(rows)
 
     def _receivers(self, material: MaterialImage) -> Receivers:
         view, index = self._images.view, material.index

@@ -1,0 +1,134 @@
+"""Lamps in narrow lobes against a fine quadrature over their surface, and the strata that stand for parts of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import twins
+from tiny_scenes import shining
+
+from relume.brdf.curves import curve_bands
+from relume.brdf.document import complete_term
+from relume.brdf.registry import TERMS
+from relume.light.local import make_local, parts_of, rectangle, strata_of
+from relume.light.strata import NOT_FLAT, halvings, make_strata
+from relume.light.triangles import NO_LIGHTS
+from relume.look import LightGeometry
+from relume.points import Points
+from relume.project.contraction import contract
+from relume.project.projector import Projector
+from relume.project.receivers import LocalRays, Receivers
+from relume.project.shader import Shader
+
+PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=20.0, size=(0.9, 0.5))
+MESH = LightGeometry("mesh", material="Lamp")
+SIDE = 10
+ROOM = {"ggx": {"roughness": 0.1}, "cook_torrance": {"sigma": 0.1}, "ward_anisotropic": {}}
+
+
+def floor_under(lamp, *, is_seen=True):
+    """A floor that is seen from above, and all of a lamp's samples seen, or none."""
+    x, z = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, SIDE), np.linspace(-1.2, 1.2, SIDE)))
+    position = np.stack([x, 0 * x, z], axis=1)
+    normal, tangent = (np.tile(np.array(axis, np.float32), (len(x), 1)) for axis in ([0, 1, 0], [1, 0, 0]))
+    wo = twins.unit(np.array([0, 1.5, 3.0]) - position).astype(np.float32)
+    strata = strata_of(lamp, 64)
+    seen = np.full((len(x), len(strata.uv) // 8), 255 if is_seen else 0, np.uint8)
+    points = Points(position.astype(np.float32), normal, tangent, np.arange(len(x), dtype=np.uint32))
+    rays = LocalRays(lamp, strata, np.ones(3, np.float32), seen)
+    return Receivers(points, wo, np.empty((len(x), 0), np.uint8), (rays,))
+
+
+def curves_of(model, params):
+    document = complete_term(("test",), {"model": model, "params": params}, None)
+    return TERMS[model].settled(document), {c.name: curve_bands(document, c) for c in TERMS[model].curves}
+
+
+def by_quadrature(term, bands, receivers, fine=150):
+    """What a floor gets of `PANEL`, the mean over many places of it at their exact angles. (n, 3)"""
+    corner, (e, f) = rectangle(PANEL)
+    step = (np.arange(fine) + 0.5) / fine
+    place = corner + (step[:, None, None] * e + step[:, None] * f).reshape(-1, 3)
+    normal = np.cross(e, f)
+    out = []
+    for position, wo in zip(receivers.points.position.astype(float), receivers.wo.astype(float), strict=True):
+        away = place - position
+        squared = (away**2).sum(axis=1)
+        x, y, z = twins.unit(away).T
+        wi, o = np.stack([x, -z, y], axis=1), np.array([wo[0], -wo[2], wo[1]])
+        weight = np.maximum(-twins.unit(away) @ normal, 0) / squared / fine**2 * y
+        value = weight[:, None] * term.quotients(*wi.T, *(np.full(len(wi), c) for c in o)).T
+        for curve in term.curves:
+            if not curve.outgoing:
+                value = value * bands[curve.name][:, twins.band_of(curve, wi, o)].T
+        out.append(value.sum(axis=0))
+    return np.array(out)
+
+
+def error(found, expected):
+    """Relative RMSE."""
+    return np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())
+
+
+@pytest.mark.parametrize("model", ROOM)
+def test_lamps_have_no_grain_in_narrow_lobes(model):
+    """Samples without extent err by 37 % in the first of these."""
+    term, bands = curves_of(model, ROOM[model])
+    receivers = floor_under(make_local(PANEL))
+    expected = by_quadrature(term, bands, receivers)
+    found = Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
+    assert error(found, expected) < 0.01
+    for active in (c.name for c in term.curves if not c.outgoing):
+        transport = Projector(term, contract(term, bands, active), NO_LIGHTS, receivers).project(0, SIDE**2)
+        assert error(np.einsum("njc,cj->nc", transport.astype(float), bands[active]), expected) < 0.01
+
+
+def test_a_lamp_that_nobody_sees_gives_nothing():
+    term, bands = curves_of("ggx", {})
+    hidden = floor_under(make_local(PANEL), is_seen=False)
+    assert not Shader(term, contract(term, bands, None), NO_LIGHTS, hidden).project(0, SIDE**2).any()
+
+
+def panel_in(columns, rows):
+    """Triangles that the panel is made of. (2 columns · rows, 3, 3)"""
+    corner, (e, f) = rectangle(PANEL)
+    e, f, triangles = e / columns, f / rows, []
+    for a in (corner + k * e + m * f for k in range(columns) for m in range(rows)):
+        triangles += [[a, a + e, a + e + f], [a, a + e + f, a + f]]
+    return np.array(triangles)
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "roughness", "most"), [(1, 1, 0.1, 0.01), (4, 1, 0.1, 0.02), (24, 16, 0.3, 0.05)]
+)
+def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, most):
+    """Parts of several pieces overlap and leave gaps, of which a narrower lobe would see something."""
+    term, bands = curves_of("ggx", {"roughness": roughness})
+    mesh = make_local(MESH, shining(panel_in(columns, rows), False))
+    expected, found = (
+        Shader(term, contract(term, bands, None), NO_LIGHTS, floor_under(lamp)).project(0, SIDE**2)[:, 0]
+        for lamp in (make_local(PANEL), mesh)
+    )
+    assert error(found, expected) < most
+
+
+@pytest.mark.parametrize(("num_pieces", "num"), [(1, 64), (2, 256), (50, 256), (1000, 256), (3, 4), (1, 1)])
+def test_every_cell_row_and_column_has_its_samples(num_pieces, num):
+    """However samples are shifted within their cells, each N-th of u and, unshifted, of v has one."""
+    strata = make_strata(halvings(num_pieces, num), 1)
+    uv = strata.corner + strata.size * strata.uv
+    for axis in range(2):
+        np.testing.assert_array_equal(np.sort((uv[:, axis] * num).astype(int)), np.arange(num))
+    assert len(np.unique(strata.corner, axis=0)) == num
+
+
+def test_what_does_not_lie_flat_is_asked_sample_by_sample():
+    """A box of twelve triangles: none of its coarse parts is a quadrilateral."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    sides = [corners, corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]]
+    faces = [f for side in sides for f in (side, side[::-1] + np.cross(*np.diff(side, axis=0)[:2]))]
+    triangles = np.array([t for f in faces for t in (f[[0, 1, 2]], f[[0, 2, 3]])])
+    lamp = make_local(MESH, shining(triangles, True))
+    parts = parts_of(lamp, strata_of(lamp, 64))
+    assert np.all(parts.radius[:5] == NOT_FLAT)
+    assert 0.3 < np.mean(parts.radius[85:] < 1) < 1
