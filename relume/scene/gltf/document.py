@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 MAX_COUNT = 2**32 - 1
 Index = Annotated[int, Field(ge=0, lt=2**31, strict=True)]
-Indices = Annotated[list[Index], Field(max_length=100_000, fail_fast=True)]
+Indices = Annotated[tuple[Index, ...], Field(max_length=100_000, fail_fast=True)]
 Bytes = Annotated[int, Field(ge=0, lt=2**40, strict=True)]
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e30, le=1e30)]
 Factor = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
@@ -134,18 +134,19 @@ class Camera(Part):
 
 
 class Node(Part):
-    children: Indices = []
+    children: Indices = ()
     matrix: Annotated[list[Number], Field(min_length=16, max_length=16)] | None = None
-    translation: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
-    rotation: Annotated[list[Number], Field(min_length=4, max_length=4)] = [0.0, 0.0, 0.0, 1.0]
-    scale: Annotated[list[Number], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]
+    # tuples: of a hundred thousand nodes, each would copy a list that stands for what it does not say
+    translation: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+    rotation: tuple[Number, Number, Number, Number] = (0.0, 0.0, 0.0, 1.0)
+    scale: tuple[Number, Number, Number] = (1.0, 1.0, 1.0)
     mesh: Index | None = None
     camera: Index | None = None
     skin: Index | None = None
 
 
 class SceneRoot(Part):
-    nodes: Indices = []
+    nodes: Indices = ()
 
 
 class Document(Part):

@@ -20,8 +20,7 @@ def dimensions(linear: F64) -> int:
 
 def cofactors(linear: F64) -> F64:
     """What normals are multiplied by: the inverse transposed times the determinant, which flat ones have too. (3, 3)"""
-    rows = linear
-    return np.stack([np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])])
+    return np.asarray(np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]))
 
 
 def with_area(positions: F64, faces: U32) -> U32:

@@ -5,7 +5,7 @@ glTF 2.0 specification, section 3.5.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ def rotations(quaternions: F64) -> F64:
     return np.array(rows).transpose(2, 0, 1)
 
 
-def _roots(document: Document) -> list[int]:
+def _roots(document: Document) -> Sequence[int]:
     if document.scenes:
         chosen = document.scene or 0
         if chosen >= len(document.scenes):
