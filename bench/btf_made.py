@@ -30,7 +30,7 @@ class Made:
 
     def __init__(self, name: str, folder: Path, tiny: bool) -> None:
         self.name = name
-        size, self.grid = (8, 1) if tiny else (128, 2)
+        size, self.grid = (8, 1) if tiny else (128, 3)  # as `relume material make-btf` does
         small = SmallGeometry(GEOMETRIES[name](), ubo_rings(), (size, size), self.grid, 1)
         self.values = Values(folder / name, ubo_rings(), (size, size))
         self.values.fill(small.seen_from, lambda share: None, lambda: False)

@@ -29,6 +29,9 @@ F64 = NDArray[np.float64]
 
 _LEAST_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
 _TEXEL = np.float32(0.5)  # side of the texels for a footprint, in footprints: a mean between four is twice as wide
+_MOST_PLACES = 4  # along a footprint
+_APART = np.float32(1.5)  # texels, between them at most
+_LONGEST = np.float32(3)  # footprint, in widths: of longer ones coarser texels are summed
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -137,18 +140,42 @@ def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type: ignore[no-untyped-def]
-    """Sum the weights of texels, seen from one side, by their clusters.
+def along_footprint(footprint, up, finest):  # type: ignore[no-untyped-def]
+    """Find places whose texels, summed, are as long as a footprint, which a slant makes longer than wide.
+
+    Box and tent of texels of side t have a variance of t²/4 about a place, n places d apart one of d² (n² − 1) / 12:
+    both together are that of the footprint's length, a²/12.
+
+    Args:
+        footprint: side of the square of its area, in repeats. up: cosine of the slant. finest: see `level_of`.
+    Returns:
+        How many places; how far apart; the footprint's width, or what stands for it.
+    """
+    slanted = np.float32(math.sqrt(max(up, _LEAST_COSINE)))
+    length: Any = footprint / slanted
+    width: Any = max(footprint * slanted, length / _LONGEST)
+    texel: Any = max(_TEXEL * width, np.float32(1) / finest)
+    beyond: Any = length * length - np.float32(3) * texel * texel
+    if beyond <= 0:
+        return 1, np.float32(0), width
+    num: Any = min(max(np.int64(math.ceil(length / (_APART * texel))), 2), _MOST_PLACES)
+    return num, np.float32(math.sqrt(beyond / np.float32(num * num - 1))), width
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _add_weights(cluster, weight, view, texel, share, num, part, num_found, found, sums):  # type: ignore[no-untyped-def]
+    """Add the weights of texels, seen from one side, by their clusters.
 
     Args:
         cluster, weight: of the BTF. view: the side. texel, share: see `texels_about`. num: of them.
-        found: clusters, written. (8,) int32. sums: of their means' and components' weights, written. (8, ≥ 1 + C)
+        part: that they are of all texels.
+        num_found: clusters that there are yet. found: these, written. (≥ num_found + num,) int32
+        sums: of their means' and components' weights, written. (≥ num_found + num, ≥ 1 + C)
     Returns:
         How many clusters there are.
     """
-    num_found = 0
     for k in range(num):
-        at, w = texel[k], share[k]
+        at, w = texel[k], part * share[k]
         of = cluster[view, at]
         slot = 0
         while slot < num_found and found[slot] != of:
@@ -164,6 +191,25 @@ def sum_weights(cluster, weight, view, texel, share, num, found, sums):  # type:
     return num_found
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _places_in(levels, relief, place, x, y, z, slant, out):  # type: ignore[no-untyped-def]
+    """Find the places that stand for a footprint, and how high the relief is that is seen there.
+
+    Args:
+        levels: of the BTF. relief, place: as of `_send`. x, y, z: the direction to the eye. slant: s of it.
+        out: u, v and height of each, written. (≥ places, 3)
+    Returns:
+        How many; the width of the footprint.
+    """
+    num, apart, width = along_footprint(place[2], z, np.float32(max(levels[0, 1], levels[0, 2])))
+    across: Any = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _LEAST_COSINE)
+    for k in range(num):
+        away = apart * across * (np.float32(k) - np.float32(0.5) * np.float32(num - 1))
+        out[k, 0], out[k, 1] = place[0] + away * x, place[1] - away * y
+        out[k, 2] = height_seen(relief[0], relief[1], relief[2], out[k, 0], out[k, 1], slant)
+    return num, width
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _send(rings, tables, texels, relief, arriving, axes, wo, places, out):  # type: ignore[no-untyped-def]
     """Sum what n points send.
@@ -174,26 +220,30 @@ def _send(rings, tables, texels, relief, arriving, axes, wo, places, out):  # ty
         out: written. (n, 3)
     """
     levels, cluster, weight = texels
-    height, lowest, highest, sides = relief
+    sides = relief[3]
     index, of_view = np.empty(4, np.int32), np.empty(4, np.float32)
     texel, share = np.empty(8, np.int32), np.empty(8, np.float32)
-    found, sums = np.empty(8, np.int32), np.empty((8, tables.shape[2]), np.float32)
+    most = 8 * _MOST_PLACES
+    found, sums = np.empty(most, np.int32), np.empty((most, tables.shape[2]), np.float32)
+    of_places = np.empty((_MOST_PLACES, 3), np.float32)
     for p in range(arriving.shape[0]):
         out[p, :] = 0
         if wo[p, 2] <= 0:
             continue
         vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
         taps(rings, vx, vy, wo[p, 2], index, of_view)
-        u, v, footprint = places[p, 0], places[p, 1], places[p, 2]
         slant = slant_of(rings, vx, vy, wo[p, 2])
-        h = height_seen(height, lowest, highest, u, v, slant)
+        num_places, width = _places_in(levels, relief, places[p], vx, vy, wo[p, 2], slant, of_places)
+        part = np.float32(1) / np.float32(num_places)
         for tap in range(4):
             if of_view[tap] <= 0:
                 continue
-            side = sides[index[tap]]
-            across, up = h * (slant[0] - side[0]), h * (slant[1] - side[1])
-            num = texels_about(levels, u + across, v - up, footprint, texel, share)
-            num_found = sum_weights(cluster, weight, index[tap], texel, share, num, found, sums)
+            side, num_found = sides[index[tap]], 0
+            for k in range(num_places):
+                u, v, h = of_places[k, 0], of_places[k, 1], of_places[k, 2]
+                across, up = h * (slant[0] - side[0]), h * (slant[1] - side[1])
+                num = texels_about(levels, u + across, v - up, width, texel, share)
+                num_found = _add_weights(cluster, weight, index[tap], texel, share, num, part, num_found, found, sums)
             for slot in range(num_found):
                 of_cluster = tables[index[tap], found[slot]]
                 for j in range(tables.shape[2]):
@@ -273,7 +323,7 @@ def _add_rays(rings: Rings, rays: Rays, receivers: Receivers, axes: F32, start: 
     _from_listed(rings, axes, listed.first, listed.wi, listed.irradiance, out)
 
 
-def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place: F64) -> F64:
+def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place: F64, footprint: float = 0.0) -> F64:
     """Do as `texel_rows` for one point under given lights, in plain NumPy: its oracle.
 
     Args:
@@ -281,20 +331,26 @@ def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place
         irradiance: of each light, across its direction. (m, 3)
         wo: to the eye, in the texture's frame. (3,)
         place: column and row, in texels of the finest level, from the middle of the first.
+        footprint: side of the square of its area, in texels; no wider than two of them, seen from a slant.
     Returns:
         (3,) float64
     """
     found, size = texels.btf, np.array(texels.btf.size[::-1])
     slant = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(found.rings.theta[-1]))
-    height = height_seen_numpy(found.height, (place + 0.5) / size, slant)
     light, of_light, left = taps_numpy(found.rings, directions)
     view, of_view, _ = taps_numpy(found.rings, wo[None])
     seen = np.zeros((found.rings.num_directions, 3))
-    for side, share in zip(view[0], of_view[0], strict=True):
-        at = place + height * (slant - slants(found.rings)[side]) * [1, -1] * size
-        first = np.floor(at).astype(int)
-        for beside in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            near = share * np.abs(1 - np.array(beside) - (at - first)).prod()
-            column, row = (first + beside) % size
-            seen += near * found.texel(row * size[0] + column)[side]
+    length = footprint / np.sqrt(wo[2])
+    num = 1 if length**2 <= 3 else int(np.clip(np.ceil(length / _APART), 2, _MOST_PLACES))
+    apart = np.sqrt((length**2 - 3) / (num**2 - 1)) if num > 1 else 0.0
+    for away in apart * (np.arange(num) - (num - 1) / 2):
+        one = place + away * wo[:2] / np.hypot(wo[0], wo[1]) * [1, -1]
+        height = height_seen_numpy(found.height, (one + 0.5) / size, slant)
+        for side, share in zip(view[0], of_view[0], strict=True):
+            at = one + height * (slant - slants(found.rings)[side]) * [1, -1] * size
+            first = np.floor(at).astype(int)
+            for beside in ((0, 0), (1, 0), (0, 1), (1, 1)):
+                near = share * np.abs(1 - np.array(beside) - (at - first)).prod() / num
+                column, row = (first + beside) % size
+                seen += near * found.texel(row * size[0] + column)[side]
     return np.asarray(np.einsum("mk,m,mkc,mc->c", of_light, left, seen[light], irradiance).clip(0))

@@ -33,6 +33,7 @@ MESH = "mesh"
 LEAST_SIZE = 8
 MOST_GRID = 8
 _SEED = 1
+_LIGHT = "fitted"  # what values tell of it, see `relume.synthetic.render`: others are other BTFs
 _OF_RENDERING = 0.8  # of the time, about
 
 
@@ -41,8 +42,7 @@ class Made(NamedTuple):
 
     Attributes:
         geometry: one of `GEOMETRIES`, or `MESH`. size: texels along each side.
-        grid: places along each side of a texel, each seen by another part of the lens, in light of another part of
-            the lamps.
+        grid: places along each side of a texel that are looked at, each in light from other directions.
         bound: relative RMS that compression may miss.
         file: of a mesh. period: of it, see `tile_of`.
     """
@@ -77,7 +77,7 @@ class Made(NamedTuple):
             for array in tile[:-1]:
                 hashed.update(array.tobytes())
             made["tile"] = hashed.hexdigest()
-        return {"synthetic": made, "seed": _SEED}
+        return {"synthetic": made, "seed": _SEED, "light": _LIGHT}
 
 
 def make_btf(
@@ -101,7 +101,7 @@ def make_btf(
     wanted.check()
     tile = wanted.tile()
     from_all = wanted.recipe(tile)
-    parts = *wanted[:3], from_all["synthetic"].get("tile", "")[:16]
+    parts = *wanted[:3], _LIGHT, from_all["synthetic"].get("tile", "")[:16]
     making = making or folder / "making" / "-".join(str(part) for part in parts if part)
     making.mkdir(parents=True, exist_ok=True)
     recipe = making / "recipe.json"

@@ -1,12 +1,16 @@
 """What a small geometry sends from each place of its plane to each side, lit from each: the values of its BTF.
 
-    B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx
+    B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx ,
 
-where an eye far off towards v sees the geometry through the texel. Lamps are spread over `_SPREAD` about their
-directions, so that shadows between these follow from them. Eyes are points, as far lenses are: between them relief is
-found by its height (`relume.btf.parallax`), which a blur would only hide. Light that comes straight is traced from what
-is seen; E_l is the irradiance by light that other faces have sent on, which do so as matt surfaces of the same
-reflectance ρ: found once for the middles of all faces, by rays to other faces, as often as it takes.
+where an eye far off towards v sees the geometry through the texel. Straight light is traced from many directions ω_j,
+evenly over the hemisphere, others at each place of a texel; values are on the way to those that tell it best,
+
+    B(v, ·) → argmin Σ_j ( Σ_l hat_l(ω_j) B(v, l) − f(ω_j, v) cos θ_j V(ω_j) )² ,
+
+with hat_l of `relume.btf.rings` (ADR 87). Eyes are points, as far lenses are: between them relief is found by its
+height (`relume.btf.parallax`), which a blur would only hide. E_l is the irradiance by light that other faces have sent
+on, which do so as matt surfaces of the same reflectance ρ: found once for the middles of all faces, by rays to other
+faces, as often as it takes.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from scipy.sparse import csr_array
 
 from relume.brdf.albedo import reflectance
 from relume.brdf.evaluate import eval_brdf
-from relume.btf.rings import Rings, directions
+from relume.btf.rings import Rings, directions, polar, taps_numpy
 from relume.synthetic.tile import I64, Tile, levelled, repeated
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import Hits, trace_from
@@ -36,7 +40,7 @@ _RAYS_A_FACE = 96  # to other faces
 _BOUNCES = 5
 _ABOVE = 4.0  # periods above the plane that eyes' rays begin
 _PAIRS_AT_ONCE = 1 << 19
-_SPREAD = np.radians(7.5)  # of lamps about their direction, half of what is between two
+_STEPS = 2  # towards the least squares: all the way, what single places see by chance would be kept, too
 _GOLDEN = np.pi * (3 - 5**0.5)
 
 
@@ -51,12 +55,23 @@ class _Places(NamedTuple):
         return _Places(self.position[rows], self.normal[rows], self.material[rows])
 
 
+class _Lit(NamedTuple):
+    """Light at one place of each texel: where it comes from, and what its light adds to the values of all l.
+
+    Attributes:
+        directions: ω. (L, 3). share: of the texel's values. (L of values, L of ω)
+    """
+
+    directions: F64
+    share: F64
+
+
 class SmallGeometry:
     """A tile and what is beside it, ready to be lit and looked at.
 
     Args:
         tile: one period. rings: of directions to lights and to eyes. size: height and width of the texture, texels.
-        grid: places along each side of a texel that are looked at, each in light of another part of the lamps.
+        grid: places along each side of a texel that are looked at, each in light from other directions.
         seed: of the rays between faces.
     """
 
@@ -76,13 +91,11 @@ class SmallGeometry:
 
     def seen_from(self, view: int) -> F32:
         """Every texel's values from one direction. (lights, texels, 3) float32"""
-        grid, wo = self._grid, self._directions[view]
+        wo = self._directions[view]
         out = np.zeros((self.rings.num_directions, self.size[0] * self.size[1], 3))
-        for part in range(grid * grid):
-            # the same places of lamps for all texels: what they make is no noise
-            lights = _beside(self._directions, part * 3 + 1, grid * grid)
-            out += self._sent(self._seen(part, wo), wo, lights)
-        return (out / grid**2).astype(np.float32)
+        for part, lit in enumerate(self._lit):
+            out += self._sent(self._seen(part, wo), wo, lit)
+        return np.maximum(out, 0).astype(np.float32)
 
     def height(self) -> F32:
         """How far over the texture's plane the geometry reaches at each texel; in holes, as far as it reaches down.
@@ -103,18 +116,34 @@ class SmallGeometry:
         origin = np.stack([x, y, np.zeros_like(x)], axis=1) + _ABOVE * wo / wo[2]
         return trace_from(self._embree, origin.astype(np.float32), np.tile(-wo.astype(np.float32), (len(x), 1)))
 
-    def _sent(self, hits: Hits, wo: F64, lights: F64) -> F64:
-        """What is sent from hits towards wo, by light. (lights, hits, 3)"""
+    @cached_property
+    def _lit(self) -> list[_Lit]:
+        """The light of each place: the same for all texels, so that what it misses is no noise."""
+        parts = self._grid**2
+        if parts == 1:
+            return [_Lit(self._directions, np.eye(len(self._directions)))]
+        every = _evenly(parts * self.rings.num_directions)
+        index, weight, left = taps_numpy(self.rings, every)
+        hat = np.zeros((len(every), self.rings.num_directions))
+        np.add.at(hat, (np.arange(len(every))[:, None], index), weight * left[:, None])
+        gram, mass = hat.T @ hat, (hat.T @ hat.sum(axis=1))[:, None]
+        share = hat.T / mass
+        for _ in range(_STEPS):
+            share += (hat.T - gram @ share) / mass
+        return [_Lit(every[part::parts], share[:, part::parts]) for part in range(parts)]
+
+    def _sent(self, hits: Hits, wo: F64, lit: _Lit) -> F64:
+        """What hits add to values towards wo, by light. (lights, hits, 3)"""
         found, seen = hits.face >= 0, np.zeros((self.rings.num_directions, len(hits.face), 3))
         some = hits.rows(found)
         places = self._places(some, wo)
         step = max(1, _PAIRS_AT_ONCE // self.rings.num_directions)
         rows = np.flatnonzero(found)
         for start in range(0, len(rows), step):
-            chosen = places.rows(slice(start, start + step))
-            seen[:, rows[start : start + step]] = self._direct(chosen, wo, lights).transpose(1, 0, 2)
-        face = some.face % self._num_faces
-        seen[:, rows] += (self._reflectance[face, None] / np.pi * self._irradiance[face]).transpose(1, 0, 2)
+            direct = self._direct(places.rows(slice(start, start + step)), wo, lit.directions)
+            seen[:, rows[start : start + step]] = np.tensordot(lit.share, direct, (1, 1))
+        face, of_place = some.face % self._num_faces, 1 / (np.pi * len(self._lit))
+        seen[:, rows] += (of_place * self._reflectance[face, None] * self._irradiance[face]).transpose(1, 0, 2)
         return seen
 
     def _direct(self, places: _Places, wo: F64, lights: F64) -> F64:
@@ -194,10 +223,7 @@ class SmallGeometry:
         return csr_array((weight, (row, hits.face[hit] % num)), (num, num))
 
 
-def _beside(directions: F64, part: int, num: int) -> F64:
-    """Directions (n, 3) moved to a place in a disc about each: one of `num` places that fill it evenly."""
-    t = any_tangent(directions.astype(np.float32)).astype(np.float64)
-    away = _SPREAD * np.sqrt((part % num + 0.5) / num)
-    turn = part * _GOLDEN + np.arange(len(directions))[:, None]  # another one for each
-    moved = directions + np.tan(away) * (np.cos(turn) * t + np.sin(turn) * np.cross(directions, t))
-    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+def _evenly(num: int) -> F64:
+    """Directions evenly over the hemisphere, on a spiral. (num, 3)"""
+    k = np.arange(num, dtype=np.float64)
+    return polar(np.arccos(1 - (k + 0.5) / num), k * _GOLDEN)

@@ -13,7 +13,7 @@ from relume.synthetic.corduroy import corduroy
 from relume.synthetic.make import Made, make_btf
 from relume.synthetic.render import SmallGeometry
 
-SIZE, GRID = 16, 2
+SIZE, GRID = 16, 3
 
 
 class Corduroy(NamedTuple):
@@ -33,6 +33,7 @@ def small_btf(tmp_path_factory):
         small = SmallGeometry(corduroy(), ubo_rings(), (SIZE, SIZE), GRID, 1)
         values.fill(small.seen_from, lambda share: None, lambda: False)
         wanted = Made("corduroy", SIZE, GRID, 0.02)
-        shutil.copytree(rendered, folder / "making" / f"corduroy-{SIZE}-{GRID}")  # goes on where it was, at the end
+        begun = folder / "making" / f"corduroy-{SIZE}-{GRID}-fitted"  # goes on where it was, at the end
+        shutil.copytree(rendered, begun)
         record = make_btf(folder, wanted, "Corduroy", lambda share: None, lambda: False)
         yield Corduroy(folder, record, values)

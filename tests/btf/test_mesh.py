@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.btf.rings import directions, ubo_rings
+from relume.btf.rings import directions, polar, taps_numpy, ubo_rings
 from relume.errors import ParameterError, SceneError
 from relume.synthetic.corduroy import corduroy
 from relume.synthetic.make import MESH, Made, make_btf
@@ -39,6 +39,17 @@ def test_every_material_of_a_flat_mesh_sends_what_it_would_alone(striped):
         # lamps are wide, and a mirror's share of what is not matt comes on top
         np.testing.assert_allclose(half.mean(axis=(1, 2)), expected[:, 0, 0], rtol=0.15, atol=0.02)
     assert seen[:, :, :4, 0].mean() > 2 * seen[:, :, 4:, 0].mean()
+
+
+def test_between_its_directions_light_is_neither_lost_nor_won(striped):
+    """A matt surface sends the same share of light from everywhere: means of what it sends at directions are less."""
+    albedo, rings = 0.5, ubo_rings()
+    matt = tile_of(striped, None)._replace(materials=(({"model": "lambert", "color": [albedo] * 3},),) * 2)
+    seen = SmallGeometry(matt, rings, (8, 8), 3, 1).seen_from(30).mean(axis=(1, 2), dtype=np.float64)
+    k = np.arange(4000)
+    lights = polar(np.arccos(1 - (k + 0.5) / len(k)), k * np.pi * (3 - 5**0.5))
+    index, weight, left = taps_numpy(rings, lights)
+    assert (weight * seen[index]).sum(axis=1) @ left == pytest.approx(albedo / np.pi * lights[:, 2].sum(), rel=2e-3)
 
 
 def test_a_file_holds_the_same_period(tmp_path):

@@ -49,21 +49,21 @@ def settled(record, **params):
     return TERMS["measured_btf"].settled(document)
 
 
-def arriving(bake, look):
+def arriving(bake, look, footprint=0.0):
     """What arrives at the floor, and where it does, in the finest level."""
     light = light_of(look, bake.material_names, has_bounces=False)
     lights, receivers = bake.arriving(bake.views["front"], 0, light, bake.memory)
     uv = np.array(receivers.uv)
-    uv[:, 2] = 0
+    uv[:, 2] = footprint
     return lights, replace(receivers, uv=uv)
 
 
-@pytest.mark.parametrize("rotation", [0.0, 50.0])
-def test_the_kernel_is_the_oracle(bake, small_btf, rotation):
+@pytest.mark.parametrize(("rotation", "footprint"), [(0.0, 0.0), (50.0, 0.0), (50.0, 2.0)])
+def test_the_kernel_is_the_oracle(bake, small_btf, rotation, footprint):
     """The floor's texture: x to the right, y away from the eye, v = 0 where z is −1."""
     look = covered(bake, small_btf.record, scale=3.0, rotation=rotation)
-    lights, receivers = arriving(bake, look)
     texels = settled(small_btf.record, scale=3.0, rotation=rotation).texels
+    lights, receivers = arriving(bake, look, footprint / (3 * texels.btf.size[0]))
     rows = texel_rows(texels, lights, receivers, 0, len(receivers.uv))
     turn, (height, width) = np.radians(rotation), texels.btf.size
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
@@ -74,7 +74,12 @@ def test_the_kernel_is_the_oracle(bake, small_btf, rotation):
         from_corner = (receivers.points.position[point].astype(np.float64) + np.array([1, 0, 1])) / 2
         place = 3 * np.array([width * across @ from_corner, -height * up @ from_corner]) - 0.5
         expected = texel_numpy(
-            texels, lights.direction[seen] @ axes.T, lights.irradiance[seen], axes @ receivers.wo[point], place
+            texels,
+            lights.direction[seen] @ axes.T,
+            lights.irradiance[seen],
+            axes @ receivers.wo[point],
+            place,
+            footprint,
         )
         np.testing.assert_allclose(rows[point], expected, rtol=2e-3, atol=1e-4)
 
