@@ -55,6 +55,7 @@ TARGETS = {
     "btf.table_rmse": "≤ 2 %",
     "btf.view_fps": "≥ 24",
     "btf.light_ms": "≤ 80 ms",
+    "btf.light_bytes": "≤ 50 kB",
     "surface.rmse_diffuse": "≤ 3 %",
     "surface.rmse_hard_sun": "≤ 8 %",
     "surface.rmse_glossy_0.5": "≤ 6 %",

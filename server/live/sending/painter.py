@@ -15,6 +15,7 @@ from PIL import Image
 from relume.imageio.files import to_bytes
 from relume.imageio.shrink import shrink
 from relume.imageio.tonemap import tone_map
+from relume.look.model import DisplayLook
 from server.library.ports import Advance, MovingPicture, Picture, Tile
 from server.live.state.target import Eye, Target
 from server.wire.protocol import ArrayInfo, FrameHeader, FrameTimes, TablesInfo
@@ -183,16 +184,17 @@ def _payload(
 ) -> tuple[list[Tile], bytes, bytes | None]:
     """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
     if request.form == "jpeg":
-        return [(0, 0, *request.size)], _jpeg(picture, request), None
+        shown = jpeg_of(picture, request.target.look.display, request.jpeg_size, request.quality)
+        return [(0, 0, *request.size)], shown, None
     tiles = sorted(request.lacking.union(changed), key=lambda tile: (tile[1], tile[0]))
     return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
 
 
-def _jpeg(picture: Picture, request: FrameRequest) -> bytes:
-    display = request.target.look.display
-    shown = tone_map(shrink(picture.image(), request.jpeg_size), display.exposure, display.tone_map)
+def jpeg_of(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
+    """A picture as it is displayed, no larger than a size."""
+    shown = tone_map(shrink(picture.image(), size), display.exposure, display.tone_map)
     buffer = io.BytesIO()
-    Image.fromarray(to_bytes(shown)).save(buffer, "JPEG", quality=request.quality)
+    Image.fromarray(to_bytes(shown)).save(buffer, "JPEG", quality=quality)
     return buffer.getvalue()
 
 
