@@ -119,7 +119,7 @@ class LambertBlinnPhong(_TwoLobes):
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
-class MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
+class _MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
     """`share` of a smooth mirror beside albedo/π.
 
     Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of
@@ -162,7 +162,7 @@ class MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
         return "MirrorOverDiffuse[]"
 
 
-mi.register_bsdf("mirror_over_diffuse", lambda props: MirrorOverDiffuse(props))
+mi.register_bsdf("mirror_over_diffuse", lambda props: _MirrorOverDiffuse(props))
 
 
 class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]

@@ -107,7 +107,14 @@ def see_parts(visible, group, share, start, stop, seen):  # type: ignore[no-unty
 
 
 def see_parts_numpy(visible: NDArray[np.uint8], parts: Parts, num: int) -> F64:
-    """Do as `see_parts` for all points, in plain NumPy: its oracle. num: C. (n, C)"""
+    """Do as `see_parts` for all points, in plain NumPy: its oracle.
+
+    Args:
+        visible: bits of all parts. (n, bytes) uint8
+        parts: which merged triangle each is of, and its share. num: of merged triangles, C.
+    Returns:
+        (n, C)
+    """
     bits = np.unpackbits(visible, axis=1, count=len(parts.group), bitorder="little")
     shares = np.zeros((len(parts.group), num))
     shares[np.arange(len(parts.group)), parts.group] = parts.share

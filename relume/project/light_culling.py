@@ -68,7 +68,13 @@ def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
-    """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end."""
+    """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end.
+
+    Args:
+        kinds, support: of dormant curves, and up to where each is not zero, radians. (D,)
+        radius: of each light, radians. light: which are listed. wi: towards them, local, unit. (3, K)
+        begin, end: of the list. ox, oy, oz: local wo. reach, nearest: scratch. (≥ end − begin,)
+    """
     for k in range(kinds.shape[0]):
         limit = support[k] + _SLACK
         if limit > np.float32(math.pi / 2) or not has_bound(kinds[k]):

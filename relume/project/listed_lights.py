@@ -141,7 +141,11 @@ class ListedLamp:
 
 
 def listed_lamps(term: Term, contraction: Contraction, receivers: Receivers) -> list[ListedLamp]:
-    """Make room for all lamps that are listed as triangles: those with an extent, where any curve asks for it."""
+    """Make room for all lamps that are listed as triangles: those with an extent, where any curve asks for it.
+
+    Args:
+        term: that is sent. contraction: its curves. receivers: points, and rays from them to lamps.
+    """
     if contraction.kinds.size == 0:
         return []
     lamps = [rays for rays in receivers.rays if isinstance(rays, LocalRays) and rays.has_extent]

@@ -154,5 +154,7 @@ def test_it_is_told_once_that_the_server_answers() -> None:
         process.should_exit = True
 
     process = Process(config, leave=Leave(), num_sessions=lambda: 0, tell_started=tell, **limits)
-    process.run()
+    thread = threading.Thread(target=process.run)  # browser tests of the same process may have a loop in this one
+    thread.start()
+    thread.join(timeout=30)
     assert told == [True]
