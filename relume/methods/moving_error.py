@@ -30,7 +30,7 @@ from relume.scene.model import Camera, Scene
 
 F64 = NDArray[np.float64]
 
-SIZE, _SQUARE = (64, 48), 8
+_SIZE, _OF_SMALL, _SQUARE = (64, 48), (32, 24), 8
 _MOST_VIEWS = 3
 _TURN = 18  # steps of a turntable: as far as a hand turns an eye at once
 _BUDGET_BYTES = 1 << 30
@@ -39,28 +39,30 @@ BYTES = 300 << 20  # what else is made: tables, skies, stills
 _DIGITS = 4
 
 
-def measured(store: StoreReader, scene: Scene) -> NDArray[np.float32]:
+def measured(store: StoreReader, scene: Scene, size: tuple[int, int]) -> NDArray[np.float32]:
     """The error and its standard error; not a number where all is dark, or it takes more than there is. (2,) float32
 
     Args:
         store: of a bake whose eyes move, everything else in it. scene: with its cameras.
+        size: width and height that its pictures begin with; fewer rays do where they are small.
     """
     # no folder is there for what pictures keep beside a bake
     transfer = MovingViews.of(store, f"bake in making/{scene.id}", Memory(_BUDGET_BYTES))
     try:
-        found = _measured(transfer, Stills(transfer.lit, scene))
+        rays = _SIZE if size[0] * size[1] >= _SIZE[0] * _SIZE[1] else _OF_SMALL
+        found = _measured(transfer, Stills(transfer.lit, scene), rays)
     except RelumeError:
         found = Estimated(np.nan, np.nan)
     return np.round(found, _DIGITS).astype(np.float32)
 
 
-def _measured(transfer: MovingViews, stills: Stills) -> Estimated:
+def _measured(transfer: MovingViews, stills: Stills, rays: tuple[int, int]) -> Estimated:
     look = looks.validate(transfer.default_look, transfer.default_look)
     moving = MovingPicture(transfer, next(iter(transfer.views)))
     moving.set_look(look)
     squares = []
     for camera in _eyes(transfer):
-        view = ExactView(stills.make, transfer.memory.passing, (camera, SIZE), look, None)
+        view = ExactView(stills.make, transfer.memory.passing, (camera, rays), look, None)
         squares.append(_of_eye(moving, view))
     off, of = np.concatenate(squares, axis=1)
     if np.count_nonzero(of) < 2:
@@ -82,9 +84,9 @@ def _of_eye(moving: MovingPicture, view: ExactView) -> F64:
         moving: in the light of the view. view: what is to be seen.
     """
     moving.set_eye(*view.eye)
-    found, seen = moving.along_middles(SIZE, is_fine=False)
+    found, seen = moving.along_middles(view.eye[1], is_fine=False)
     exact = view.picture(lambda share: None, lambda: False, smooths_edges=False).image().astype(np.float64)
-    width, height = SIZE
+    width, height = view.eye[1]
     is_hit = (seen.hits.face >= 0).reshape(height, width)
     both = np.stack([((found - exact) ** 2).sum(axis=2), (exact**2).sum(axis=2)]) * is_hit
     squares = both.reshape(2, height // _SQUARE, _SQUARE, width // _SQUARE, _SQUARE)

@@ -171,7 +171,7 @@ class SurfaceMethod:
         if task.view == "harmonics":
             return Written(make_harmonic_light(store, int(scene.id[:7], 16)), 0, 0.0)
         if task.view == "moving error":
-            return Written({MOVING_ERROR: moving_error.measured(store, scene)}, 0, 0.0)
+            return Written({MOVING_ERROR: moving_error.measured(store, scene, recipe.size)}, 0, 0.0)
         if task.view not in ("cells", "points"):
             raise ValueError(f"{task.view!r} is not in the stage")
         return self._rows(scene, recipe, task, store)
