@@ -119,7 +119,7 @@ def test_roughness_slider_scales_the_map(direct) -> None:
     picture = shown(direct)
     picture.touch(FLOOR + "params/roughness")
     make_next(picture)
-    for roughness in (0.3, 0.6, 0.1, 1.0):
+    for roughness in (0.6, 0.1):
         picture.set_look(changed(direct, roughness=roughness))
         assert picture.next_job() is None or picture.next_job().refines
         assert picture.advance(8).changed
