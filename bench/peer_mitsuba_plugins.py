@@ -8,7 +8,24 @@ mi: Any = __import__("mitsuba")
 dr: Any = __import__("drjit")
 
 
-class _TwoLobes(mi.BSDF):  # type: ignore[misc]
+class _Sided(mi.BSDF):  # type: ignore[misc]
+    """Reflects on its front alone, in components of these flags. A subclass has `sample`, `eval` and `pdf`."""
+
+    def __init__(self, props: Any, *flags: Any) -> None:
+        mi.BSDF.__init__(self, props)
+        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
+        self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Mitsuba's interface."""
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def to_string(self) -> str:
+        """Mitsuba's interface."""
+        return f"{type(self).__name__}[]"
+
+
+class _TwoLobes(_Sided):
     """A diffuse and a glossy lobe. A subclass has, `wo` being towards the light as Mitsuba names it,
 
     `_value(wi, wo)`, BRDF times the cosine; `_drawn(wi, which, place)`, a direction from numbers in [0, 1), and
@@ -16,10 +33,7 @@ class _TwoLobes(mi.BSDF):  # type: ignore[misc]
     """
 
     def __init__(self, props: Any) -> None:
-        mi.BSDF.__init__(self, props)
-        flags = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
-        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
-        self.m_flags = self.m_components[0] | self.m_components[1]
+        super().__init__(props, mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
@@ -38,14 +52,6 @@ class _TwoLobes(mi.BSDF):  # type: ignore[misc]
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
         return dr.select(_above(si.wi, wo, active), self._density(si.wi, wo), 0)
-
-    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-    def to_string(self) -> str:
-        """Mitsuba's interface."""
-        return f"{type(self).__name__}[]"
 
 
 def _above(wi: Any, wo: Any, active: Any) -> Any:
@@ -119,7 +125,7 @@ class LambertBlinnPhong(_TwoLobes):
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
-class _MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
+class _MirrorOverDiffuse(_Sided):
     """`share` of a smooth mirror beside albedo/π.
 
     Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of
@@ -127,11 +133,8 @@ class _MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
     """
 
     def __init__(self, props: Any) -> None:
-        mi.BSDF.__init__(self, props)
+        super().__init__(props, mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection)
         self.albedo, self.share = mi.Color3f(props["albedo"]), float(props["share"])
-        flags = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection)
-        self.m_components = [flag | mi.BSDFFlags.FrontSide for flag in flags]
-        self.m_flags = self.m_components[0] | self.m_components[1]
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
@@ -152,14 +155,6 @@ class _MirrorOverDiffuse(mi.BSDF):  # type: ignore[misc]
         """Mitsuba's interface."""
         density = (1 - self.share) * mi.warp.square_to_cosine_hemisphere_pdf(wo)
         return dr.select(_above(si.wi, wo, active), density, 0)
-
-    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Mitsuba's interface."""
-        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-    def to_string(self) -> str:
-        """Mitsuba's interface."""
-        return "MirrorOverDiffuse[]"
 
 
 mi.register_bsdf("mirror_over_diffuse", lambda props: _MirrorOverDiffuse(props))
