@@ -7,8 +7,6 @@ What a point sees of a merged triangle is the share of its light that comes from
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +41,8 @@ def merge(lights: TriangleLights, tiles: Tiles, num: int) -> TriangleLights:
     total = parts.sums(luminous, len(codes))
     irradiance = np.stack([parts.sums(light, len(codes)) for light in lights.irradiance.T.astype(np.float64)], axis=1)
     share = np.divide(luminous, total[group], out=np.zeros_like(luminous), where=luminous > 0)
-    return replace(
-        TriangleLights(nodes_of(its_corners), mean.astype(np.float32), irradiance.astype(np.float32)),
-        parts=Parts(group.astype(np.int32), share.astype(np.float32)),
-    )
+    its_parts = Parts(group.astype(np.int32), share.astype(np.float32))
+    return TriangleLights(nodes_of(its_corners), mean.astype(np.float32), irradiance.astype(np.float32), its_parts)
 
 
 def _coarser(tiles: Tiles, luminous: F64, num: int) -> Codes:

@@ -15,7 +15,7 @@ from relume.light.triangles import Parts, TriangleLights
 from relume.project.contraction import Contraction
 from relume.project.lamp_kernel import list_lamp
 from relume.project.light_culling import list_lights
-from relume.project.receivers import LocalRays, Receivers
+from relume.project.receivers import LocalRays, Receivers, is_lamp
 
 F32 = NDArray[np.float32]
 
@@ -49,6 +49,13 @@ def _support_of(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
     """Angles of curves, and radians beyond which each is nothing."""
     radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
     return with_half_angle(contraction.kinds, radians)
+
+
+def _weighed(term: Term, wi: F32, wo: F32) -> F32:
+    """q cos θi of entries. (1 or 3, K). wi, wo: local. (3, K)"""
+    shading = term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
+    shading *= wi[2]
+    return shading
 
 
 class ListedLights:
@@ -86,9 +93,8 @@ class ListedLights:
             r.normal[some], r.tangent[some], r.wo[some], visible, lights.direction, lights.radius, self._kinds,
             self._support, 0, stop - start, self.first, self.light, self._wi, self._wo,
         )  # fmt: skip
-        wi, wo = self._wi[:, :num], self._wo[:, :num]
-        shading = self._term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
-        shading *= wi[2]
+        wo = self._wo[:, :num]
+        shading = _weighed(self._term, self._wi[:, :num], wo)
         if lights.parts is not None:
             weigh_by_parts(self.first[: stop - start + 1], self.light, self._seen, shading)
         return shading, wo
@@ -134,10 +140,13 @@ class ListedLamp:
             r.points, r.wo, (rays.light, rays.strata, rays.parts, self._gain), rays.visible, self._kinds,
             self._support, start, stop, self.first, self.light, self._wi, self._wo, self._nodes, self._brings,
         )  # fmt: skip
-        wi, wo = self._wi[:, :num], self._wo[:, :num]
-        shading = self._term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
-        shading *= wi[2]
-        return shading, wo, self._nodes[:num_triangles], self._brings[:num_triangles]
+        wo = self._wo[:, :num]
+        return (
+            _weighed(self._term, self._wi[:, :num], wo),
+            wo,
+            self._nodes[:num_triangles],
+            self._brings[:num_triangles],
+        )
 
 
 def listed_lamps(term: Term, contraction: Contraction, receivers: Receivers) -> list[ListedLamp]:
@@ -146,7 +155,5 @@ def listed_lamps(term: Term, contraction: Contraction, receivers: Receivers) -> 
     Args:
         term: that is sent. contraction: its curves. receivers: points, and rays from them to lamps.
     """
-    if contraction.kinds.size == 0:
-        return []
-    lamps = [rays for rays in receivers.rays if isinstance(rays, LocalRays) and rays.has_extent]
+    lamps = [rays for rays in receivers.rays if is_lamp(rays, contraction.kinds.size)]
     return [ListedLamp(term, contraction, receivers, rays) for rays in lamps]

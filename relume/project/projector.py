@@ -21,6 +21,7 @@ from relume.project.receivers import Receivers
 from relume.vector_code import NUM as EIGHT
 
 F32 = NDArray[np.float32]
+_Listed = tuple[NDArray[np.int64], NDArray[np.int32], F32, F32, F32, F32]
 
 
 class Projector:
@@ -59,22 +60,24 @@ class Projector:
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
     def _add_lamp(self, lamp: ListedLamp, start: int, stop: int, out: F32) -> None:
-        r, c = self._receivers, self._contraction
         for block in range(start, stop, lamp.points_a_block):
             end = min(block + lamp.points_a_block, stop)
             shading, wo, nodes, brings = lamp.list(block, end)
             by_axis, irradiance = np.ascontiguousarray(nodes.transpose(2, 1, 0)), np.ascontiguousarray(brings[:, :3])
-            project_points(
-                r.normal, r.tangent, lamp.first, lamp.light, shading, wo, by_axis, irradiance,
-                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
-                self._fine, block, end, self._scratch, out[block - start : end - start],
-            )  # fmt: skip
+            listed = lamp.first, lamp.light, shading, wo, by_axis, irradiance
+            self._project(listed, block, end, out[block - start : end - start])
 
     def _block(self, start: int, stop: int, out: F32) -> None:
-        r, c, listed = self._receivers, self._contraction, self._listed
-        shading, wo = listed.list(start, stop)
+        its = self._listed
+        shading, wo = its.list(start, stop)
+        listed = its.first, its.light, shading, wo, self._lights.nodes, its.irradiance
+        self._project(listed, start, stop, out)
+
+    def _project(self, listed: _Listed, start: int, stop: int, out: F32) -> None:
+        """Project a block. listed: of its points, `first` to `irradiance` of `project_points`."""
+        r, c = self._receivers, self._contraction
         project_points(
-            r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.nodes, listed.irradiance,
+            r.normal, r.tangent, *listed,
             c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
             self._fine, start, stop, self._scratch, out,
         )  # fmt: skip

@@ -12,7 +12,7 @@ from relume.brdf.term import Term
 from relume.project.contraction import Contraction
 from relume.project.lambertian import uprights
 from relume.project.ray_kernel import project_rays, sum_rays, weigh_rays
-from relume.project.receivers import GatherRays, Listed, LocalRays, Rays, Receivers
+from relume.project.receivers import GatherRays, Listed, Rays, Receivers, is_lamp
 from relume.sharing import Sharing
 
 F32 = NDArray[np.float32]
@@ -35,7 +35,7 @@ class RayProjector:
         """Add points [start, stop) to `out`, laid out as `project_rays` has it."""
         arrived = np.zeros_like(out)
         for rays in self._points.rays:
-            if isinstance(rays, LocalRays) and rays.has_extent and self._contraction.kinds.size:
+            if is_lamp(rays, self._contraction.kinds.size):
                 continue  # it is listed as triangles
             if isinstance(rays, GatherRays) and rays.sharing is not None:
                 self._add_shared(rays, rays.sharing, start, stop, arrived)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,11 +104,6 @@ class LocalRays:
     gain: F32
     visible: NDArray[np.uint8]
 
-    @property
-    def has_extent(self) -> bool:
-        """Whether the light is a surface."""
-        return self.light.kind == SURFACE and bool(self.light.area > 0)
-
     @cached_property
     def parts(self) -> LampParts:
         """LampParts of that surface."""
@@ -127,6 +122,14 @@ class LocalRays:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
         arriving = self.light, self.strata, self.gain, self.visible
         return int(list_local(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+
+
+def is_lamp(rays: Rays, num_curves: int) -> TypeGuard[LocalRays]:
+    """Whether rays come from a surface of which a term with so many curves lists parts as triangles.
+
+    Where no curve asks where light comes from, its samples are rays as others are.
+    """
+    return num_curves > 0 and isinstance(rays, LocalRays) and rays.light.kind == SURFACE and bool(rays.light.area > 0)
 
 
 @dataclass(frozen=True)
