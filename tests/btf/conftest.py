@@ -4,19 +4,20 @@ import shutil
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from relume.btf.rings import ubo_rings
 from relume.btf.shelf import STORE, BtfRecord
 from relume.btf.values import Values
-from relume.synthetic.corduroy import corduroy
-from relume.synthetic.make import Made, make_btf
+from relume.synthetic.make import MESH, Made, make_btf
 from relume.synthetic.render import SmallGeometry
 
-SIZE, GRID = 16, 3
+SIZE, GRID, BOUND = 16, 1, 0.02
+STEPS = 24  # of the cords, along each side
 
 
-class Corduroy(NamedTuple):
+class Cords(NamedTuple):
     """folder: of the store. record: that it keeps. values: of it before compression."""
 
     folder: Path
@@ -24,16 +25,30 @@ class Corduroy(NamedTuple):
     values: Values
 
 
+def cords(folder: Path) -> Path:
+    """Two cords of unlike colours a metre, one of them shining, their piles uneven; of few faces, as light between them
+    takes longest."""
+    (folder / "m.mtl").write_text("newmtl a\nKd 0.6 0.4 0.2\nillum 1\nnewmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\n")
+    v, u = np.meshgrid(*[np.linspace(0, 1, STEPS + 1)] * 2, indexing="ij")
+    height = 0.08 * np.sin(2 * np.pi * u) ** 2 + 0.02 * np.cos(2 * np.pi * (u + 2 * v))
+    lines = ["mtllib m.mtl", *(f"v {x} {y} {-z}" for x, y, z in zip(u.flat, height.flat, v.flat, strict=True))]
+    for column in range(STEPS):
+        lines.append("usemtl " + "ab"[2 * column // STEPS])
+        for first in range(column + 1, (STEPS + 1) * STEPS, STEPS + 1):
+            lines.append(f"f {first} {first + 1} {first + STEPS + 2} {first + STEPS + 1}")
+    path = folder / "cords.obj"
+    path.write_text("\n".join(lines))
+    return path
+
+
 @pytest.fixture(scope="session")
 def small_btf(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("btf")
+    folder, rendered = tmp_path_factory.mktemp("btf"), tmp_path_factory.mktemp("values")
+    wanted = Made(MESH, SIZE, GRID, BOUND, cords(tmp_path_factory.mktemp("geometry")))
+    values = Values(rendered, ubo_rings(), (SIZE, SIZE))
+    small = SmallGeometry(wanted.tile(), ubo_rings(), (SIZE, SIZE), GRID, 1)
+    values.fill(small.seen_from, lambda share: None, lambda: False)
+    begun = folder / "begun"  # goes on where it was, at the end
+    shutil.copytree(rendered, begun)
     with STORE.at(folder):
-        rendered = tmp_path_factory.mktemp("values")
-        values = Values(rendered, ubo_rings(), (SIZE, SIZE))
-        small = SmallGeometry(corduroy(), ubo_rings(), (SIZE, SIZE), GRID, 1)
-        values.fill(small.seen_from, lambda share: None, lambda: False)
-        wanted = Made("corduroy", SIZE, GRID, 0.02)
-        begun = folder / "making" / f"corduroy-{SIZE}-{GRID}-fitted"  # goes on where it was, at the end
-        shutil.copytree(rendered, begun)
-        record = make_btf(folder, wanted, "Corduroy", lambda share: None, lambda: False)
-        yield Corduroy(folder, record, values)
+        yield Cords(folder, make_btf(folder, wanted, "Cords", lambda share: None, lambda: False, begun), values)

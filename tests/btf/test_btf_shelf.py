@@ -26,7 +26,7 @@ from server.settings import Settings
 
 def test_what_is_kept_is_found_by_its_name(small_btf):
     record = small_btf.record
-    assert record.synthetic == "corduroy"
+    assert record.synthetic == "mesh"
     assert record.size == (16, 16)
     assert record.error[-1] < 0.03
     assert records(small_btf.folder) == [record]
