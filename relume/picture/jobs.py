@@ -274,12 +274,14 @@ class Settle:
 
     Attributes:
         ready: the state that the steps led to. sum_into: writes the same image, summed once, over zeros.
+        rounding: that such a sum leaves, see `Shown`.
     """
 
     place: Place
     key: tuple[Hashable, ...]
     ready: Shown = field(repr=False)
     sum_into: Callable[[F32], object] = field(repr=False)
+    rounding: float = 0.0
     refines: bool = True
     state: Literal["freezing", "shading"] = "shading"
 
@@ -299,7 +301,7 @@ class Settle:
         """See `Job`; of no use where another step has been added."""
         live = self.place.live
         if live.ready is self.ready:
-            live.put(replace(self.ready, image=made, rounding=0.0))
+            live.put(replace(self.ready, image=made, rounding=self.rounding, fidelity=Fidelity.EXACT))
 
 
 def weighted_sum(start: F32, parts: Sequence[tuple[F32, Rgb]]) -> F32:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -18,6 +19,10 @@ F64 = NDArray[np.float64]
 
 UNIT_ROUNDOFF = 2.0**-24  # of float32
 
+# Share of an image's length that float32 sums may have left in it where it is called exact.
+MOST_IN_EXACT = 2.0**-16
+_COLUMNS_A_SUM = 4  # that `relume.operators.stream` adds to an image at once
+
 
 @dataclass(frozen=True, eq=False)
 class Shown:
@@ -31,7 +36,7 @@ class Shown:
         bands: of each curve, (3, J) float64; not a number where only the most important coefficients have been moved.
         light: what arrives; None where nothing is shown.
         basis: what the operator in use leaves free. coefficients: c of it in `image`. (3, columns) float64
-        rounding: length of the errors to be expected in `image` of float32 sums since all of it was summed at once.
+        rounding: length of the errors to be expected in `image` of float32 sums, since it was shaded.
         anchor: the last image of which every coefficient was summed, where that was in another light.
     """
 
@@ -68,7 +73,13 @@ class Shown:
         coefficients = basis.coefficients(target)
         frozen.write_image(coefficients, self.image)
         fidelity = Fidelity.EXACT if basis.is_complete and frozen.is_exact else Fidelity.NEAR
-        return Shown(self.image, fidelity, dict(target), light, basis, coefficients)
+        rounding = rounding_of(0.0, coefficients, frozen)
+        return Shown(self.image, fidelity, dict(target), light, basis, coefficients, rounding).as_worn()
+
+    def as_worn(self) -> Shown:
+        """The same image; sums that left more in it than may be in an exact one make it a near one."""
+        is_worn = self.rounding > MOST_IN_EXACT * length_of(self.image)
+        return replace(self, fidelity=min(self.fidelity, Fidelity.NEAR)) if is_worn else self
 
     def without_basis(self) -> Shown:
         """The same image, which follows no operator any more."""
@@ -79,3 +90,21 @@ def length_of(image: F32) -> float:
     """Of an image as a vector over all its samples and channels."""
     flat = image.reshape(-1)
     return float(np.sqrt(np.dot(flat, flat)))
+
+
+def rounding_of(length: float, change: F64, frozen: Operator) -> float:
+    """Length of the rounding errors to be expected of R + Σ_j Δc_j T_j in float32, with unit roundoff u.
+
+    u √(Σ_k (‖R‖ + Σ_{j≤k} |Δc_j| ‖T_j‖)² / 3), k over the additions to the image: each rounds a sum that is at most
+    so long, by u/√3 of it on the mean; the sum of all of them, without the root, bounds it always, and is never met
+    (Higham and Mary 2019). Columns may cancel, so that little is left of long sums: then what is left is mostly this.
+
+    Args:
+        length: of the image R. change: Δc. (3, J), or (L, 3, J). frozen: has the columns.
+    """
+    added = np.cumsum(np.abs(change) * frozen.importance, axis=-1)
+    # columns are added in fours, those that are left over one by one
+    which = np.cumsum(change != 0, axis=-1)
+    is_last = (which % _COLUMNS_A_SUM == 0) | (which > which[..., -1:] // _COLUMNS_A_SUM * _COLUMNS_A_SUM)
+    sums = np.where((change != 0) & is_last, length / math.sqrt(3) + added, 0.0)
+    return UNIT_ROUNDOFF * float(np.sqrt((sums**2).sum() / 3))

@@ -241,20 +241,17 @@ class Transition:
         """What makes an image exact that is near it already."""
         for place in self._places():
             live = place.live
-            if live.is_firm and live.ready.fidelity < Fidelity.EXACT and not live.differing():
-                return Shade.of(place, self._images.light, refines=True)
-            if live.ready.rounding > 0 and live.is_exact() and (settling := self._settling(place)) is not None:
-                return settling
+            if live.is_firm and not live.differing():
+                found = self._settling(place) if live.ready.rounding > 0 else None
+                if found is None and live.ready.fidelity < Fidelity.EXACT:
+                    found = Shade.of(place, self._images.light, refines=True)
+                if found is not None:
+                    return found
         return None
 
     def _settling(self, place: Place) -> Job | None:
-        """What sums an image once that was summed from steps: from where they came, or by shading, where nothing is
-        there to sum it from and they have left too much."""
-        ready = place.live.ready
-        settled = self._mix.settle_job(place) if ready.basis is None else operator.settle_job(place)
-        if settled is None and operator.is_worn(ready):
-            return Shade.of(place, self._images.light, refines=True)
-        return settled
+        """What sums an image once that was summed from steps, from where they came."""
+        return self._mix.settle_job(place) if place.live.ready.basis is None else operator.settle_job(place)
 
     def _ahead(self, hand: Hand, look: Look) -> Job | None:
         """What can be made ahead for what a hand is on, when nothing else is lacking."""

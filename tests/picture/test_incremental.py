@@ -10,13 +10,14 @@ import twins
 from sessions import BUDGET, look_of, random_edit, relative_rmse, settle
 
 from relume.basis import identity
-from relume.basis.daubechies import analysis
+from relume.basis.daubechies import analysis, synthesis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.look import BAKED_ENVIRONMENT, Paths, validate
 from relume.memory import Memory
 from relume.operators.edit_basis import CurveBasis
 from relume.operators.frozen import Frozen, freeze
+from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Settle
 from relume.picture.light import Light
 from relume.picture.picture import Picture
@@ -162,6 +163,22 @@ def test_didactic_example_of_table_2(monkeypatch):
         incremental.append(abs(r_perfect - r_effective))
     assert incremental == [12, 2, 0]
     assert non_linear == [12, 14, 20]  # the largest coefficient alone, frame by frame
+
+
+@pytest.mark.parametrize(("common", "is_exact"), [(0, True), (10_000, False)])
+def test_images_know_what_float32_sums_have_left_in_them(common, is_exact):
+    """All columns have the same in common, which cancels: what is left of a sum is mostly rounding where it is much."""
+    rng = np.random.default_rng(8)
+    columns = (rng.normal(size=(1, 3, 64, 1024)) + common * rng.normal(size=1024)).astype(np.float32)
+    coefficients = rng.integers(-100, 100, 64).astype(float)  # float32 has them
+    coefficients[-1] -= coefficients.sum()
+    frozen = Frozen(columns, np.sqrt((columns.astype(float) ** 2).sum(axis=(0, 3))))
+    empty = start(frozen)
+    shown = advance(empty, {"theta_i": synthesis(np.tile(coefficients, (3, 1)))}, frozen, None)
+    true = np.einsum("j,tcjs->tcs", coefficients, columns, dtype=float)
+    left = np.linalg.norm(shown.image - true)
+    assert 0.5 * left < shown.rounding < 20 * left
+    assert (shown.fidelity == Fidelity.EXACT) == is_exact
 
 
 def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is_not(transfer):

@@ -73,7 +73,7 @@ class Mix:
         mixed = weighted_sum(anchor.image.copy(), parts)
         left = UNIT_ROUNDOFF * len(parts) ** 0.5 * (length_of(anchor.image) + length_of(mixed))
         rounding = float(np.hypot(anchor.rounding, left))
-        live.put(Shown(mixed, anchor.fidelity, dict(live.target), light, rounding=rounding))
+        live.put(Shown(mixed, anchor.fidelity, dict(live.target), light, rounding=rounding).as_worn())
 
     def settle_job(self, place: Place) -> Settle | None:
         """What sums an image of all its sources once that was mixed from step to step; None where too few of the

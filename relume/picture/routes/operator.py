@@ -8,7 +8,6 @@ packed columns (`relume.operators.packed`) make is shaded when the hand rests.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -18,15 +17,14 @@ from numpy.typing import NDArray
 from relume.operators.operator import Operator
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Place, Settle
-from relume.picture.shown import UNIT_ROUNDOFF, Shown, length_of
+from relume.picture.shown import MOST_IN_EXACT, Shown, length_of, rounding_of
 
 F64 = NDArray[np.float64]
 
 # Share of an image's length that float32 sums may have left in it before it is summed anew instead of gone on with; a
 # frame's pixels have nine bits.
 MAX_ROUNDING = 2.0**-11
-MOST_AT_REST = 2.0**-16
-_COLUMNS_A_SUM = 4  # that `stream` adds to the image at once
+_WORTH_SUMMING = 4.0  # times what that sum itself would leave
 
 
 def step(place: Place, max_coefficients: int | None) -> None:
@@ -59,26 +57,22 @@ def advance(ready: Shown, target: Mapping[str, F64], frozen: Operator, max_coeff
     return ready.summed(frozen, basis, moved, light) if frozen.is_whole else _add_change(ready, moved, frozen, None)
 
 
-def is_worn(ready: Shown) -> bool:
-    """Whether steps have left more in an image than may stay there at rest."""
-    return ready.rounding > 0 and ready.rounding > MOST_AT_REST * length_of(ready.image)
-
-
 def settle_job(place: Place) -> Settle | None:
     """What makes of an image that was summed from steps one that was summed once from all coefficients.
 
-    None where the operator is gone or not exact, and where there is no need: a few small steps leave less
-    than a sum of all coefficients, whose columns cancel.
+    None where the operator is gone or not exact, where there is no need: a few small steps leave less than a sum of all
+    coefficients, whose columns cancel; and where they cancel so that no such sum is exact.
     """
     images, material, live = place
     ready, frozen = live.ready, images.operator(material, live)
     basis, coefficients = ready.basis, ready.coefficients
-    if frozen is None or basis is None or coefficients is None or not frozen.is_exact:
+    if frozen is None or basis is None or coefficients is None or not (frozen.is_exact and basis.is_complete):
         return None
-    if ready.rounding <= _rounding(0.0, coefficients, frozen):
+    left = rounding_of(0.0, coefficients, frozen)
+    if left >= ready.rounding or left > MOST_IN_EXACT * length_of(ready.image):
         return None
     key = images.key_of_operator(material, live, basis, live.target)
-    return Settle(place, (*key, "settled"), ready, lambda image: frozen.write_image(coefficients, image))
+    return Settle(place, (*key, "settled"), ready, lambda image: frozen.write_image(coefficients, image), left)
 
 
 def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Operator, max_coefficients: int | None) -> Shown:
@@ -96,25 +90,12 @@ def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Operator, max_co
         moved = {**moved, **unsaid}
     length = length_of(ready.image)
     frozen.add(change, ready.image)
-    rounding = float(np.hypot(ready.rounding, _rounding(length, change, frozen)))
+    rounding = float(np.hypot(ready.rounding, rounding_of(length, change, frozen)))
     after = replace(ready, bands=moved, coefficients=perfect, rounding=rounding)
     if not frozen.is_exact:  # at rest it is shaded
         return replace(after, fidelity=min(ready.fidelity, Fidelity.NEAR if frozen.is_whole else Fidelity.COARSE))
-    return after if rounding <= MAX_ROUNDING * length else _anew(after, frozen)
-
-
-def _anew(ready: Shown, frozen: Operator) -> Shown:
-    """The same image summed once from its coefficients, in place."""
-    assert ready.coefficients is not None
-    frozen.write_image(ready.coefficients, ready.image)
-    return replace(ready, rounding=0.0)
-
-
-def _rounding(length: float, change: F64, frozen: Operator) -> float:
-    """Length of the rounding errors of one step, to be expected of n additions with unit roundoff u.
-
-    √n u (‖R‖ + Σ_j |Δc_j| ‖T_j‖); n in place of √n bounds it always, and is never met (Higham and Mary 2019).
-    """
-    num = int(np.count_nonzero(change, axis=-1).max())
-    added = float(np.linalg.norm((np.abs(change) * frozen.importance).reshape(-1, 3 * change.shape[-1]).sum(axis=1)))
-    return math.sqrt(num / _COLUMNS_A_SUM + _COLUMNS_A_SUM) * UNIT_ROUNDOFF * (length + added) if num else 0.0
+    left = rounding_of(0.0, perfect, frozen)
+    if rounding > max(MAX_ROUNDING * length, _WORTH_SUMMING * left):
+        frozen.write_image(perfect, after.image)
+        after = replace(after, rounding=left, fidelity=Fidelity.EXACT)
+    return after.as_worn()
