@@ -10,17 +10,32 @@ U32 = NDArray[np.uint32]
 
 _FLAT = 1e-9  # of the largest of a transform's three scales, below which another is none
 _NOTHING = 1e-15  # of the largest, metres a metre
+_SURELY = 1e-6  # of the cube of a transform's largest number: with such a determinant it keeps three dimensions
 
 
 def dimensions(linear: F64) -> int:
     """How many dimensions a transform leaves of three. linear: (3, 3)"""
+    largest = float(np.abs(linear).max())
+    if abs(determinant(linear)) > _SURELY * largest**3 and largest > 1 / _SURELY * _NOTHING:
+        return 3  # the smallest of three scales is at least the determinant over the square of the largest
     scales = np.linalg.svd(linear, compute_uv=False)
     return int(np.count_nonzero(scales > max(_FLAT * float(scales[0]), _NOTHING)))
 
 
+def determinant(linear: F64) -> float:
+    """By the rule of Sarrus. linear: (3, 3)"""
+    (a, b, c), (d, e, f), (g, h, i) = linear.tolist()
+    return float(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
+
+
 def cofactors(linear: F64) -> F64:
     """What normals are multiplied by: the inverse transposed times the determinant, which flat ones have too. (3, 3)"""
-    return np.asarray(np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]))
+    (a, b, c), (d, e, f), (g, h, i) = linear.tolist()  # a scene has a hundred thousand of these
+    return np.array([
+        [e * i - f * h, f * g - d * i, d * h - e * g],
+        [h * c - i * b, i * a - g * c, g * b - h * a],
+        [b * f - c * e, c * d - a * f, a * e - b * d],
+    ])  # fmt: skip
 
 
 def with_area(positions: F64, faces: U32) -> U32:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from relume.scene.gltf.cameras import framing_camera, rigid, slug
 from relume.scene.gltf.container import READ_EXTENSIONS, Container, read_container
 from relume.scene.gltf.document import Document, Node, Primitive
 from relume.scene.gltf.document import Material as GltfMaterial
-from relume.scene.gltf.flattened import cofactors, dimensions, plane_normal, with_area
+from relume.scene.gltf.flattened import cofactors, determinant, dimensions, plane_normal, with_area
 from relume.scene.gltf.geometry import MAX_COORDINATE, Geometry, num_corners, read_primitive
 from relume.scene.gltf.images import ImageReader
 from relume.scene.gltf.instances import instances_of
@@ -32,7 +33,7 @@ from relume.scene.gltf.uvs import made_tangents, turned_tangents
 from relume.scene.gltf.variants import Choices, choices, variant_looks, variant_names
 from relume.scene.joined import joined
 from relume.scene.lights import LightCollector
-from relume.scene.model import Camera, Mesh, Scene
+from relume.scene.model import F32, Camera, Mesh, Scene
 from relume.scene.vertex_colors import MAX_COLORED, are_alike, colors_as_image
 
 F64 = NDArray[np.float64]
@@ -66,6 +67,15 @@ def import_gltf(
     return finished_scene(*parts, reading.warnings, reading.variants, reading.lights)
 
 
+class _Dressed(NamedTuple):
+    """A primitive, its places in textures, and the material that it wears."""
+
+    geometry: Geometry
+    uvs: F32
+    understood: Understood
+    material: int
+
+
 class _Reading:
     """One file on its way to a scene: walks the nodes, reading meshes and materials when they are first met."""
 
@@ -78,7 +88,9 @@ class _Reading:
         self._light_reader = LightReader(container.document, self._collector, self.warnings)
         self._geometry: dict[Key, Geometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
-        self._wearing = _wearing(container.document)
+        self._choices = _choices(container.document)
+        self._wearing = _wearing(container.document, self._choices)
+        self._worn: dict[tuple[Key, int], _Dressed] = {}
         self._mesh_names: dict[str, int] = {}
         self._flattened: list[str] = []
         self._camera_names: dict[str, int] = {}
@@ -138,7 +150,7 @@ class _Reading:
     def _place_primitive(self, key: Key, primitive: Primitive, name: str, to_world: F64) -> None:
         if self._read_geometry(key, primitive, name) is None:
             return
-        material = self._material(primitive)
+        material = self._material(key, primitive)
         geometry = self._geometry[key]
         assert geometry is not None
         self._triangles_left -= len(geometry.faces)
@@ -146,7 +158,7 @@ class _Reading:
         if min(self._triangles_left, self._vertices_left) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
         num_dimensions = dimensions(to_world[:3, :3])
-        placed = _placed(geometry, self.materials[material], to_world, num_dimensions, name, material)
+        placed = _placed(self._dressed(key, geometry, material), to_world, num_dimensions, name)
         if placed is not None and num_dimensions == 2:
             self._flattened.append(name)
         if placed is None:
@@ -154,15 +166,23 @@ class _Reading:
         else:
             self.meshes.append(placed)
 
-    def _material(self, primitive: Primitive) -> int:
+    def _dressed(self, key: Key, geometry: Geometry, material: int) -> _Dressed:
+        """A primitive with its material, made once for all the nodes that show it."""
+        if (key, material) not in self._worn:
+            understood = self.materials[material]
+            uvs = understood.uv_use.apply(geometry.uvs, len(geometry.positions))
+            self._worn[key, material] = _Dressed(geometry, uvs, understood, material)
+        return self._worn[key, material]
+
+    def _material(self, key: Key, primitive: Primitive) -> int:
         """Number of the primitive's material; those that variants exchange differently are different ones."""
-        exchanges = choices(primitive)
-        key = (primitive.material, exchanges)
-        if key not in self._material_index:
-            self._material_index[key] = len(self.materials)
+        exchanges = self._choices[key]
+        worn = (primitive.material, exchanges)
+        if worn not in self._material_index:
+            self._material_index[worn] = len(self.materials)
             colors = self._vertex_colors(primitive.material, exchanges)
             self.materials.append(self._read_material(primitive.material, colors))
-        return self._material_index[key]
+        return self._material_index[worn]
 
     def _vertex_colors(self, index: int | None, exchanges: Choices) -> VertexColors:
         """The colours of all vertices that wear a material; where they become an image, geometries get places in it."""
@@ -241,26 +261,36 @@ class _Reading:
                 )
 
 
-def _wearing(document: Document) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
+def _choices(document: Document) -> dict[Key, Choices]:
+    """How the primitives of all meshes exchange their materials."""
+    return {
+        (m, i): choices(primitive)
+        for m, mesh in enumerate(document.meshes)
+        for i, primitive in enumerate(mesh.primitives)
+    }
+
+
+def _wearing(
+    document: Document, exchanges: Mapping[Key, Choices]
+) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
     """The primitives that wear each material, and exchange it alike."""
     found: dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]] = {}
-    for m, mesh in enumerate(document.meshes):
-        for i, primitive in enumerate(mesh.primitives):
-            found.setdefault((primitive.material, choices(primitive)), []).append(((m, i), primitive))
+    for (m, i), chosen in exchanges.items():
+        primitive = document.meshes[m].primitives[i]
+        found.setdefault((primitive.material, chosen), []).append(((m, i), primitive))
     return found
 
 
-def _placed(
-    geometry: Geometry, understood: Understood, to_world: F64, num_dimensions: int, name: str, material: int
-) -> Mesh | None:
+def _placed(dressed: _Dressed, to_world: F64, num_dimensions: int, name: str) -> Mesh | None:
     """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
+    geometry, uvs, understood, material = dressed
     linear = to_world[:3, :3]
     positions = geometry.positions @ linear.T + to_world[:3, 3]
     if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
         return None
-    determinant = float(np.linalg.det(linear)) if num_dimensions == 3 else 1.0
-    faces = geometry.faces if determinant > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
-    normals = _unit(geometry.normals @ (np.sign(determinant) * cofactors(linear)).T)
+    hand = np.sign(determinant(linear)) if num_dimensions == 3 else 1.0
+    faces = geometry.faces if hand > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
+    normals = _unit(geometry.normals @ (hand * cofactors(linear)).T)
     if num_dimensions == 2:
         faces = with_area(positions, faces)
         normals = np.where(normals.any(axis=1, keepdims=True), normals, plane_normal(linear))
@@ -268,13 +298,13 @@ def _placed(
             return None
     tangents = np.zeros((len(positions), 4))
     tangents[:, :3] = _unit(geometry.tangents[:, :3] @ linear.T)
-    tangents[:, 3] = geometry.tangents[:, 3] * np.sign(determinant)
+    tangents[:, 3] = geometry.tangents[:, 3] * hand
     placed = Mesh(
         name,
         positions.astype(np.float32),
         normals.astype(np.float32),
         tangents.astype(np.float32),
-        understood.uv_use.apply(geometry.uvs, len(positions)),
+        uvs,
         faces,
         material,
     )

@@ -31,7 +31,7 @@ def placed_nodes(document: Document, warnings: list[Remark]) -> Iterator[tuple[N
     Raises:
         SceneError: a node does not exist, lies too deep, or is out of range.
     """
-    seen, told = set[int](), set[int]()
+    seen, told, local = set[int](), set[int](), local_transforms(document.nodes)
     stack = [(index, np.eye(4), 1) for index in reversed(_roots(document))]
     while stack:
         index, parent, depth = stack.pop()
@@ -47,21 +47,26 @@ def placed_nodes(document: Document, warnings: list[Remark]) -> Iterator[tuple[N
             raise SceneError(f"nodes are nested more than {MAX_DEPTH} deep; flatten the scene")
         seen.add(index)
         node = document.nodes[index]
-        to_world = parent @ local_transform(node)
+        to_world = parent @ local[index]
         if not np.isfinite(to_world).all() or np.abs(to_world).max() > 1e12:
             raise SceneError(f"the transform of node {index} is out of range; export the scene again")
         yield node, to_world
         stack.extend((child, to_world, depth + 1) for child in reversed(node.children[: MAX_NODES + 1]))
 
 
-def local_transform(node: Node) -> F64:
-    """The node's matrix, or translation · rotation · scale. (4, 4)"""
-    if node.matrix is not None:
-        return np.array(node.matrix, np.float64).reshape(4, 4).T
-    transform = np.eye(4)
-    transform[:3, :3] = rotations(np.array([node.rotation], np.float64))[0] * np.array(node.scale, np.float64)
-    transform[:3, 3] = node.translation
-    return transform
+def local_transforms(nodes: Sequence[Node]) -> F64:
+    """The matrix of each node, or its translation · rotation · scale. (n, 4, 4)"""
+    transforms = np.tile(np.eye(4), (len(nodes), 1, 1))
+    turns, scales, moves = (
+        np.array([getattr(node, name) for node in nodes], np.float64).reshape(len(nodes), -1)
+        for name in ("rotation", "scale", "translation")
+    )
+    transforms[:, :3, :3] = rotations(turns) * scales[:, None, :]
+    transforms[:, :3, 3] = moves
+    for index, node in enumerate(nodes):
+        if node.matrix is not None:
+            transforms[index] = np.array(node.matrix, np.float64).reshape(4, 4).T
+    return transforms
 
 
 def rotations(quaternions: F64) -> F64:
