@@ -219,6 +219,13 @@ def test_an_index_that_no_glass_has_is_said_and_replaced(ior: float) -> None:
     assert scene.materials[0].glass.ior == 1.5
 
 
+@pytest.mark.parametrize(("ior", "colour", "is_said"), [(0.5, 1, True), (100, 1, True), (0, 1, True), (0, 0.2, False)])
+def test_an_index_that_nothing_opaque_has_is_said(ior: float, colour: float, is_said: bool) -> None:
+    """But for those of files whose highlights had a colour of their own, which is what 0 is for."""
+    scene = imported({"ior": {"ior": ior}, "specular": {"specularColorFactor": [colour] * 3}})
+    assert any("index of refraction" in str(warning) for warning in scene.warnings) == is_said
+
+
 def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
     glb = Glb()
     texture = {"index": glb.texture([[[255, 0, 0], [0, 0, 0]]])}

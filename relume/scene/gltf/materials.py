@@ -92,6 +92,8 @@ class MaterialReader:
         strength, turn = self._anisotropy(layers, what)
         transmission = self._transmission(layers, what)
         glass = self._glass(surface, layers, transmission, what) if transmission > 0 else None
+        if glass is None:
+            self._doubt(layers, what)
         surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
         if strength > 0 and "roughness" in surface.textures:
             self._warnings.append(simplified(f"the roughness texture of {what}, which is anisotropic, is its mean"))
@@ -134,6 +136,14 @@ class MaterialReader:
         red, green, blue = np.clip(tint, 0, 1).tolist()
         r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
         return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
+
+    def _doubt(self, layers: Layers, what: str) -> None:
+        """Tell of an index of refraction that no opaque matter has; what stands for a mirror is tinted or weak."""
+        ior, specular = layers.ior.ior, layers.specular
+        share = min(1.0, _f0(ior) * max(specular.specularColorFactor)) * specular.specularFactor
+        if 0 < ior < 1 or share > _f0(MAX_IOR):
+            told = f"{what} has an index of refraction of {ior:g}; where it is no metal, {share:.0%} of the light that"
+            self._warnings.append(wrong(f"{told} falls straight on it is reflected (1.5 is usual)"))
 
     def _opacity(self, material: GltfMaterial, colors: NDArray[np.uint8] | None, what: str) -> Opacity | None:
         """Where the material has holes; alpha that is not asked for is not looked at."""
