@@ -249,6 +249,34 @@ def test_texture_transforms_move_coordinates() -> None:
     np.testing.assert_allclose(mesh.uvs[2], [0.5, -1.75], atol=1e-6)
 
 
+def at(scale, offset=(0, 0), **more):
+    return {"extensions": {"KHR_texture_transform": {"scale": scale, "offset": list(offset)}}} | more
+
+
+def test_an_image_that_is_repeated_more_often_than_another_is_tiled() -> None:
+    """Bumps four times along u and twice along v as often as the base colour."""
+    rng, glb = np.random.default_rng(3), Glb()
+    bumps, base = rng.integers(0, 255, (6, 4, 3)), rng.integers(0, 255, (2, 2, 3))
+    of_base = {"index": glb.texture(base)} | at([0.5, 2], (0.25, 0.5))
+    of_bumps = {"index": glb.texture(bumps)} | at([2, 4], (0.5, 1.5))
+    material = {"normalTexture": of_bumps, "pbrMetallicRoughness": {"baseColorTexture": of_base, "metallicFactor": 0}}
+    scene = imported(glb.quad(material))
+    assert not scene.warnings
+    found = scene.materials[0].normal_map
+    assert found is not None
+    # u of the bumps is 4 u of the base − 0.5, two texels of four; v is 2 v + 0.5, three of six
+    np.testing.assert_array_equal(found.pixels, np.tile(np.roll(bumps, (-3, 2), axis=(0, 1)), (2, 4, 1)))
+    np.testing.assert_allclose(scene.meshes[0].uvs, QUAD_UVS * [0.5, 2] + [0.25, 0.5])
+
+
+@pytest.mark.parametrize("other", [at([1.5, 1]), {"texCoord": 1}, at([9000, 1])])
+def test_images_that_cannot_be_placed_alike_are_told_of(other) -> None:
+    glb = Glb()
+    base, bumps = ({"index": glb.texture([[[1, 2, 3], [3, 4, 5]]])} for _ in range(2))
+    scene = imported(glb.quad({"normalTexture": bumps | other, "pbrMetallicRoughness": {"baseColorTexture": base}}))
+    assert any("placed differently" in warning for warning in scene.warnings)
+
+
 def test_the_second_set_of_coordinates_is_used_where_asked_for() -> None:
     glb = Glb()
     info = {"index": glb.texture([[[1, 2, 3]]]), "texCoord": 1}

@@ -25,7 +25,7 @@ from relume.scene.gltf.layers import Layers, read_layers
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
-from relume.scene.gltf.uvs import UvUse, uv_use
+from relume.scene.gltf.uvs import Placements, UvUse
 from relume.scene.model import Coding, Glass, Material, Opacity, Texture
 from relume.scene.opacity import make_opacity
 from relume.scene.vertex_colors import WRAP
@@ -86,7 +86,8 @@ class MaterialReader:
         what = f"material {name!r}"
         layers = read_layers(material.extensions, what, self._warnings)
         self._warn_of_the_rest(material, what)
-        use = uv_use([info for info in _infos(material, layers) if info is not None], what, self._warnings)
+        infos = [info for info in _infos(material, layers) if info is not None]
+        self._placements = Placements(infos, what, self._warnings)
         material = _times(material, colors.factor)
         surface = self._surface(material, layers, self._raster(material, layers, colors.image, what))
         strength, turn = self._anisotropy(layers, what)
@@ -113,7 +114,8 @@ class MaterialReader:
             opacity=self._opacity(material, colors.image, what),
             glass=glass,
         )
-        return Understood(made, use, turn if strength > 0 else None, self._emission(material, layers, what))
+        turned = turn if strength > 0 else None
+        return Understood(made, self._placements.use, turned, self._emission(material, layers, what))
 
     def _transmission(self, layers: Layers, what: str) -> float:
         passing = layers.transmission
@@ -155,7 +157,7 @@ class MaterialReader:
             return None
         pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
         if pbr.baseColorTexture is not None:
-            pixels, wrap = self._images.texture(pbr.baseColorTexture.index, f"the base colour texture of {what}")
+            pixels, wrap = self._placed(pbr.baseColorTexture, f"the base colour texture of {what}")
             alpha = pixels[..., 3]
         elif colors is not None:
             alpha, wrap = colors[..., 3], WRAP
@@ -171,7 +173,7 @@ class MaterialReader:
         """The image of what surfaces shine, as it is in the file."""
         if material.emissiveTexture is None or max(material.emissiveFactor) <= 0:
             return {}
-        pixels, wrap = self._images.texture(material.emissiveTexture.index, f"the emission texture of {what}")
+        pixels, wrap = self._placed(material.emissiveTexture, f"the emission texture of {what}")
         return {"emission": self._kept(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, Coding("srgb")))}
 
     def _surface(self, material: GltfMaterial, layers: Layers, raster: Raster) -> Surface:
@@ -210,11 +212,12 @@ class MaterialReader:
             "tint": (layers.specular.specularColorTexture, "specular colour"),
         }
         images = {
-            key: self._images.texture(info.index, f"the {words} texture of {what}")
+            key: self._placed(info, f"the {words} texture of {what}")
             for key, (info, words) in infos.items()
             if info is not None
         }
-        return Raster(images)
+        tiled = [images[key][0].shape for key, (info, _) in infos.items() if info and self._placements.repeats(info)]
+        return Raster(images, (max((h for h, _, _ in tiled), default=0), max((w for _, w, _ in tiled), default=0)))
 
     def _over(self, layers: Layers, anisotropy: float, what: str) -> Over:
         coat, sheen = layers.clearcoat, layers.sheen
@@ -262,10 +265,15 @@ class MaterialReader:
         """Unit normals, in the frame of tangents turned by `turn`."""
         if info is None:
             return None
-        pixels, wrap = self._images.texture(info.index, f"the normal texture of {what}")
+        pixels, wrap = self._placed(info, f"the normal texture of {what}")
         scale = float(np.clip(info.scale, -100, 100))
         coding = Coding("normal", (scale, scale, 1.0), turn)
         return self._kept(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, coding))
+
+    def _placed(self, info: TextureInfo, words: str) -> tuple[NDArray[np.uint8], tuple[str, str]]:
+        """An image, placed as the meshes' coordinates want it, and how it wraps."""
+        pixels, wrap = self._images.texture(info.index, words)
+        return self._placements.placed(info, pixels, wrap), wrap
 
     def _mean(self, info: TextureInfo | None, channel: int, words: str) -> float:
         """Mean of one channel, in [0, 1]; 1 without a texture, and a warning where it varies."""

@@ -14,12 +14,16 @@ NOISE = 2  # that lossy coding makes of one value
 
 
 class Raster:
-    """Images by name, all in the size and with the wrap of the first; those that are missing are white and opaque."""
+    """Images by name, all in the size and with the wrap of the first; those that are missing are white and opaque.
 
-    def __init__(self, images: Mapping[str, tuple[U8, Wrap]]) -> None:
+    Args:
+        images: pixels and wrap of each. at_least: height and width of those that need more than the first has.
+    """
+
+    def __init__(self, images: Mapping[str, tuple[U8, Wrap]], at_least: tuple[int, int] = (0, 0)) -> None:
         self._images = {key: pixels for key, (pixels, _) in images.items()}
         first, self.wrap = next(iter(images.values()), (np.zeros((0, 0, 4), np.uint8), ("repeat", "repeat")))
-        self._height, self._width = int(first.shape[0]), int(first.shape[1])
+        self._height, self._width = (max(int(own), least) for own, least in zip(first.shape, at_least, strict=False))
         self.empty = not images
         self._channels: dict[tuple[str, int], U8] = {}
 

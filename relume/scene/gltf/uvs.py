@@ -6,11 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from relume.remarks import Remark, wrong
 from relume.scene.gltf.document import Index, Number, TextureInfo
 from relume.scene.model import F32, U32
+
+U8 = NDArray[np.uint8]
+Wrap = tuple[str, str]
+Tiling = tuple[tuple[int, int], tuple[float, float]]
+_AS_IT_IS: Tiling = ((1, 1), (0.0, 0.0))
+_MAX_TILED = 8192  # texels a side
+_WHOLE = 1e-4
 
 
 class Placement(BaseModel, frozen=True):
@@ -40,18 +48,72 @@ class UvUse:
         return np.asarray(np.clip(moved, -1e6, 1e6), np.float32)
 
 
-def uv_use(textures: Sequence[TextureInfo], what: str, warnings: list[Remark]) -> UvUse:
-    """The texture coordinates, and their placement, that all images of a material are shown with: the first image's.
+class Placements:
+    """How all images of a material are brought to one placement: those that repeat more often are tiled.
 
-    Args:
-        textures: of the material; the first one decides.
-        what: names the material in the warning.
-        warnings: gets a sentence where another texture asks for something else.
+    Attributes:
+        use: what the meshes carry.
     """
-    uses = [_use(texture, what, warnings) for texture in textures]
-    if len(set(uses)) > 1:
-        warnings.append(wrong(f"the textures of {what} are placed differently; all are placed as the first"))
-    return uses[0] if uses else UvUse()
+
+    def __init__(self, textures: Sequence[TextureInfo], what: str, warnings: list[Remark]) -> None:
+        """Choose the placement.
+
+        Args:
+            textures: of the material; the first one decides where none is a whole part of all others.
+            what: names the material in warnings. warnings: gets a sentence where an image cannot be placed.
+        """
+        self._what, self._warnings = what, warnings
+        uses = [_use(texture, what, warnings) for texture in textures]
+        self._uses = dict(zip(map(id, textures), uses, strict=True))
+        fitting = (use for use in uses if all(tiling(other, use) is not None for other in uses))
+        self.use = next(fitting, uses[0] if uses else UvUse())
+        self._are_told = False
+
+    def repeats(self, info: TextureInfo) -> bool:
+        """Whether `placed` tiles an image. info: one of the material's textures"""
+        tiled = tiling(self._uses[id(info)], self.use)
+        return tiled is not None and tiled[0] != (1, 1)
+
+    def placed(self, info: TextureInfo, pixels: U8, wrap: Wrap) -> U8:
+        """An image as it is to be sampled at the meshes' coordinates.
+
+        Args:
+            info: one of the material's textures. pixels: top row first. (height, width, channels). wrap: its own
+        """
+        tiled = tiling(self._uses[id(info)], self.use)
+        if tiled == _AS_IT_IS or pixels.shape[:2] == (1, 1):
+            return pixels
+        height, width = pixels.shape[:2]
+        if tiled is not None and wrap == ("repeat", "repeat"):
+            (across, down), (right, below) = tiled
+            if max(width * across, height * down) <= _MAX_TILED:
+                shift = round(-below * height) % height, round(-right * width) % width
+                return np.tile(np.roll(pixels, shift, axis=(0, 1)), (down, across, 1))
+        if not self._are_told:
+            told = f"the textures of {self._what} are placed differently, one no whole number of times as often as"
+            self._warnings.append(wrong(f"{told} another, or not repeated; all are placed alike"))
+        self._are_told = True
+        return pixels
+
+
+def tiling(use: UvUse, base: UvUse) -> Tiling | None:
+    """How often an image stands in another's along u and v, and where (0, 0) of that lies in it.
+
+    Returns:
+        None where that is no whole number of times, or one is turned.
+    """
+    own, other = use.placement, base.placement
+    if use == base:
+        return _AS_IT_IS
+    if use.uv_set != base.uv_set or own.rotation != other.rotation or 0 in other.scale:
+        return None
+    times = np.array(own.scale) / other.scale
+    whole = np.rint(times)
+    if (whole < 1).any() or np.abs(times - whole).max() > _WHOLE or (own.rotation and times[0] != times[1]):
+        return None
+    across, down = (int(min(number, _MAX_TILED)) for number in whole)
+    right, below = (np.array(own.offset) - whole * other.offset).tolist()
+    return (across, down), (right, below)
 
 
 def _use(texture: TextureInfo, what: str, warnings: list[Remark]) -> UvUse:
