@@ -12,6 +12,13 @@ def test_import_refuses_a_truncated_glb(length: int) -> None:
     refused(Glb().quad().bytes()[:length])
 
 
+@pytest.mark.parametrize(
+    "data", [b"\x00" * 1000, b"glTF", b"glTF\x02\x00\x00\x00\xff\xff\xff\x7f", b"glTF\x02\x00\x00\x00\x0c\x00\x00\x00"]
+)
+def test_import_refuses_what_is_no_glb(data: bytes) -> None:
+    refused(data)
+
+
 def test_import_refuses_a_glb_cut_by_one_byte() -> None:
     assert "truncated" in refused(Glb().quad().bytes()[:-1])
 

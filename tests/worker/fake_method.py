@@ -41,6 +41,7 @@ class FakeMethod:
         problem: raised by the third task: "disk full", "defect", "memory".
     """
 
+    name: str = "fake"
     num_rays: int = 1000
     delay_s: float = 0.0
     log: str = ""
@@ -49,7 +50,6 @@ class FakeMethod:
     peak_bytes: int = 1000
     store_bytes: int = 1000
     lone_bytes: int = 0
-    name: str = "fake"
     stages: tuple[str, ...] = ("samples", "visibility")
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:

@@ -65,20 +65,25 @@ def wait_for(log: Path, num_tasks: int) -> None:
     pytest.fail("the bake did not get under way")
 
 
-def test_worker_killed_during_a_task_is_replaced(tmp_path: Path, expected: str) -> None:
-    log, url = tmp_path / "log", f"sqlite:///{tmp_path / 'relume.db'}"
-    output = finish(start(tmp_path / "data", url, num_rays=LARGE, delay_s=0.02, log=str(log), kill="once"))
-    assert output[-1].startswith("ready")
-    assert (tmp_path / "log.died").exists()
+def test_worker_killed_during_a_task_is_replaced_and_a_task_that_kills_all_fails_clearly(
+    tmp_path: Path, expected: str
+) -> None:
+    log = tmp_path / "log"
+    once = FakeMethod(num_rays=LARGE, delay_s=0.02, log=str(log), kill="once")
+    methods = {"fake": once, "deadly": FakeMethod("deadly", num_rays=LARGE, log=str(log), kill="always")}
+    with BakeService(tmp_path / "data", num_workers=2, methods=methods) as service:
+        scene = register_scene(service.data_dir, service.ledger, tiny_scene())
+        last = {}
+        for method in methods:
+            identity = service.submit(scene, replace(RECIPE, method=method))
+            with service.subscribe(identity) as changes:
+                last[method] = list(changes)[-1]
+            assert (tmp_path / "log.died").exists()
+    assert last["fake"].state == "ready"
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
-
-
-def test_task_that_kills_every_worker_fails_the_bake_clearly(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path / 'relume.db'}"
-    output = finish(start(tmp_path, url, num_rays=LARGE, log=str(tmp_path / "log"), kill="always"))
-    assert "worker processes died of the same task" in output[-1]
-    assert output[-1].startswith("failed")
-    assert not bake_path(tmp_path, IDENTITY).exists()
+    assert last["deadly"].state == "failed"
+    assert "worker processes died of the same task" in last["deadly"].problem
+    assert not bake_path(tmp_path / "data", identity).exists()
 
 
 @pytest.mark.parametrize(
