@@ -1,8 +1,11 @@
 """Live sessions over a picture whose pixels are known."""
 
+import asyncio
 import io
 import json
 import struct
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from server_fakes import SIZE, Control
 from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
+from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
 from server.wire.protocol import FrameHeader
 
@@ -100,6 +104,29 @@ def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
         client.portal.call(turns.release)
         assert session.frame().header["revision"] == 8
         assert control.num_looks == num_looks + 1
+
+
+def test_the_next_frame_is_painted_while_one_goes_out(
+    client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        num_looks, send_frame, goes_out = control.num_looks, ClientSocket.send_frame, threading.Event()
+
+        async def send_late(self: ClientSocket, frame: bytes) -> None:
+            while not goes_out.is_set():
+                await asyncio.sleep(0.001)
+            await send_frame(self, frame)
+
+        monkeypatch.setattr(ClientSocket, "send_frame", send_late)
+        for revision in (1, 2):
+            session.edit(revision, SIGMA, 0.3 + revision / 100)
+            deadline = time.monotonic() + 10
+            while control.num_looks < num_looks + revision and time.monotonic() < deadline:
+                time.sleep(0.001)
+            assert control.num_looks == num_looks + revision
+        goes_out.set()
+        assert [session.frame().header["revision"] for _ in range(2)] == [1, 2]
 
 
 @impatient

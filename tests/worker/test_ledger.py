@@ -1,12 +1,14 @@
 """The ledger names each bake once, lets one owner run it, and keeps what was finished."""
 
+import os
 import threading
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
+from sqlalchemy import text
 
 from relume.bake import Recipe, Task
 from relume.errors import NotFoundError
@@ -141,9 +143,23 @@ def test_scenes_are_listed_and_deleted_with_their_bakes(tmp_path: Path, ledger: 
         get_scene(ledger, SCENE.id)
 
 
-@pytest.mark.parametrize("identity", ["../../etc", "", "0" * 15, "G" * 16, "0" * 16 + "\n", "x" * 10_000])
-def test_malformed_ids_are_not_found(tmp_path: Path, ledger: Ledger, identity: str) -> None:
-    with pytest.raises(NotFoundError):
-        delete_scene(tmp_path, ledger, identity)
-    with pytest.raises(NotFoundError):
-        ledger.bake(identity)
+def test_malformed_ids_are_not_found(tmp_path: Path, ledger: Ledger) -> None:
+    for identity in ("../../etc", "", "0" * 15, "G" * 16, "0" * 16 + "\n", "x" * 10_000):
+        with pytest.raises(NotFoundError):
+            delete_scene(tmp_path, ledger, identity)
+        with pytest.raises(NotFoundError):
+            ledger.bake(identity)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system does not list open files")
+def test_open_files_are_bounded_by_the_most_connections_at_once(tmp_path: Path) -> None:
+    engine, counts = open_database(f"sqlite:///{tmp_path / 'relume.db'}"), []
+    for num_at_once in (5, 15, 15, 3, 15):
+        with ExitStack() as stack:
+            for _ in range(num_at_once):
+                stack.enter_context(engine.connect()).execute(text("SELECT 1"))
+        links = [os.readlink(file.path) for file in os.scandir("/proc/self/fd") if os.path.islink(file.path)]
+        counts.append(sum(link.startswith(str(tmp_path)) for link in links))
+    engine.dispose()
+    assert counts[1:] == [counts[1]] * 4
+    assert counts[1] <= counts[0] + 10

@@ -45,6 +45,7 @@ def connect(url: str) -> Engine:
     else:
         if parsed.database:
             Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+        # of connections beside the five that are kept SQLite keeps the file open: its locks are of the process
         engine = create_engine(parsed)
         event.listen(engine, "connect", _set_up_sqlite)
     event.listen(engine, "handle_error", name_fault)

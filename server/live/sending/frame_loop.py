@@ -43,6 +43,7 @@ class FrameLoop:
         self._library, self._work = library, OneAtATime(threads)
         self._freezer = Freezer(state.socket, threads, state.metrics, state.traces, state.pending.news)
         self._answers = Answers(state.socket, self._work)
+        self._delivery: asyncio.Task[None] | None = None
         self._accepted: Target | None = None
         self._viewports: dict[str, Viewport] = {}
         self._rest_until_s = self._settle_at_s = 0.0
@@ -55,11 +56,16 @@ class FrameLoop:
                 if not await self._turn():
                     await self._rest()
         finally:
+            if self._delivery is not None:
+                self._delivery.cancel()
+                await asyncio.wait({self._delivery})
             await self._freezer.end()
             await self._work.join()
 
     async def _turn(self) -> bool:
         """Do the most urgent thing; whether there was one."""
+        if self._delivery is not None and self._delivery.done():
+            self._delivery.result()
         self._follow_shown()
         if self._shown.focus not in self._viewports:
             await self._open_view(self._shown.focus)
@@ -223,7 +229,7 @@ class FrameLoop:
                 is_focused = viewport.name == self._shown.focus
                 frame = await self._answers.answer_brush(viewport, self._window.next_frame, is_focused)
                 if frame is not None:
-                    await self._send_frame(viewport, frame, "brush", "r8")
+                    await self._hand_over(viewport, frame, "brush", "r8")
                 return True
         return has_answered
 
@@ -248,27 +254,43 @@ class FrameLoop:
             self._settle_at_s = time.perf_counter() + SETTLE_S
         viewport.painted(request, painted, self._pending)
         if painted.message is not None:
-            await self._deliver(viewport, request, painted, painted.message)
+            await self._hand_over(viewport, painted.message, "picture", request.form, told=(request, painted))
         await self._answers.send_curve(target)
 
-    async def _deliver(self, viewport: Viewport, request: FrameRequest, painted: Painted, message: bytes) -> None:
-        sending_s = time.perf_counter()
-        await self._send_frame(viewport, message, "picture", request.form)
+    async def _hand_over(
+        self, viewport: Viewport, frame: bytes, kind: str, form: str, told: tuple[FrameRequest, Painted] | None = None
+    ) -> None:
+        """Send a frame when the one before has gone out, while the next is painted; told: what is to be said of it."""
+        if self._delivery is not None:
+            await self._delivery
         now_s = time.perf_counter()
-        viewport.sent(now_s)
+        self._window.sent(viewport.name, len(frame), now_s)
+        if told is not None:
+            viewport.sent(now_s)
+        self._delivery = asyncio.create_task(self._deliver(frame, kind, form, told))
+        self._delivery.add_done_callback(self._note_failed)
+
+    async def _deliver(self, frame: bytes, kind: str, form: str, told: tuple[FrameRequest, Painted] | None) -> None:
+        sending_s = time.perf_counter()
+        await self._socket.send_frame(frame)
+        now_s = time.perf_counter()
+        self._metrics.frames.labels(kind, form).inc()
+        self._metrics.frame_bytes.inc(len(frame))
+        if told is None:
+            return
+        request, painted = told
         self._metrics.update.observe(painted.update_ms / 1e3)
         self._metrics.encode.observe(painted.encode_ms / 1e3)
         if request.received_s is not None:
             self._metrics.edit_to_socket.observe(now_s - request.received_s)
             if self._traces is not None:
-                name, times, about = told_of(request, painted, len(message), sending_s, now_s)
+                name, times, about = told_of(request, painted, len(frame), sending_s, now_s)
                 self._traces.frame(name, times, about)
 
-    async def _send_frame(self, viewport: Viewport, frame: bytes, kind: str, form: str) -> None:
-        self._window.sent(viewport.name, len(frame), time.perf_counter())
-        await self._socket.send_frame(frame)
-        self._metrics.frames.labels(kind, form).inc()
-        self._metrics.frame_bytes.inc(len(frame))
+    def _note_failed(self, delivery: asyncio.Task[None]) -> None:
+        """The client is gone: whoever waits for news learns it."""
+        if not delivery.cancelled() and delivery.exception() is not None:
+            self._pending.news.set()
 
     async def _take_back(self, target: Target, error: RelumeError) -> None:
         """Go back to the look before; where there is none, or that one itself fails, the session cannot go on.
