@@ -1,7 +1,7 @@
 """Pictures summed from the leaves of operators: for tests that follow a picture through its routes to the last digits.
 
-The product shades by boxes (`relume.project.shader`), which agree with operators to a thousandth: `tests/project` holds
-them to that, and so does the contract. That would hide a coefficient forgotten on the way.
+The product shades by boxes (`relume.project.shading.shader`), which agree with operators to a thousandth:
+`tests/project` holds them to that, and so does the contract. That would hide a coefficient forgotten on the way.
 """
 
 from __future__ import annotations

@@ -7,19 +7,21 @@ What a point sees of a merged triangle is the share of its light that comes from
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.tiles import SOLID_ANGLE_EXPONENT, UNIFORM_SHARE, Tiles, solid_angles
-from relume.light.triangles import Parts, Texels, TriangleLights, matched, nodes_of
+from relume.light.hierarchy import highest, inner_nodes
+from relume.light.tiles import SOLID_ANGLE_EXPONENT, UNIFORM_SHARE, Tiles
+from relume.light.triangles import Parts, TriangleLights, merged_into
 
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]
 
 _MERGED, _FEWEST = 8, 400  # lights that are merged into one; merged ones
-_FIRST_INNER = 32  # codes of tiles below are octants
 
 
 def num_merged(num_lights: int) -> int:
@@ -35,14 +37,10 @@ def merge(lights: TriangleLights, tiles: Tiles, num: int) -> TriangleLights:
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     codes, group = np.unique(_coarser(tiles, luminous, num), return_inverse=True)
-    corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
-    parts = Texels(group.astype(np.int32), luminous, lights.direction.astype(np.float64), solid_angles(corners))
-    its_corners, mean = matched(Tiles(codes).corners, parts)
-    total = parts.sums(luminous, len(codes))
-    irradiance = np.stack([parts.sums(light, len(codes)) for light in lights.irradiance.T.astype(np.float64)], axis=1)
+    merged = merged_into(lights, group, codes)
+    total = np.bincount(group, luminous, len(codes))
     share = np.divide(luminous, total[group], out=np.zeros_like(luminous), where=luminous > 0)
-    its_parts = Parts(group.astype(np.int32), share.astype(np.float32))
-    return TriangleLights(nodes_of(its_corners), mean.astype(np.float32), irradiance.astype(np.float32), its_parts)
+    return replace(merged, parts=Parts(group.astype(np.int32), share.astype(np.float32)))
 
 
 def _coarser(tiles: Tiles, luminous: F64, num: int) -> Codes:
@@ -50,32 +48,11 @@ def _coarser(tiles: Tiles, luminous: F64, num: int) -> Codes:
 
     A node's metric is never below that of its children, so the nodes that are split are those of the largest metrics.
     """
-    inner, metric = _inner_nodes(tiles, luminous)
-    num_split = min(len(inner), max(0, num - 8) // 3)
-    split = inner[np.argsort(-metric, kind="stable")[:num_split]]
-    found = tiles.codes.copy()
-    while True:
-        rises = (found >= _FIRST_INNER) & ~np.isin(found >> np.uint64(2), split)
-        if not rises.any():
-            return found
-        found[rises] >>= np.uint64(2)
-
-
-def _inner_nodes(tiles: Tiles, luminous: F64) -> tuple[Codes, F64]:
-    """Find the inner nodes of the hierarchy, and the metric by which `choose_tiles` splits them."""
     uniform = UNIFORM_SHARE * float(luminous.sum()) / (4 * np.pi)
-    above, light, extent = tiles.codes, luminous, tiles.solid_angles
-    codes, sums = [], []
-    while (is_deeper := above >= _FIRST_INNER).any():
-        above, light, extent = above[is_deeper] >> np.uint64(2), light[is_deeper], extent[is_deeper]
-        codes.append(above)
-        sums.append(np.stack([light, extent]))
-    if not codes:
-        return np.empty(0, np.uint64), np.empty(0)
-    nodes, place = np.unique(np.concatenate(codes), return_inverse=True)
-    of_all = np.concatenate(sums, axis=1)
-    light, extent = (np.bincount(place, values, len(nodes)).astype(np.float64) for values in of_all)
-    return nodes, light * extent**SOLID_ANGLE_EXPONENT + uniform * extent
+    inner, (light, extent) = inner_nodes(tiles.codes, np.stack([luminous, tiles.solid_angles]))
+    metric = light * extent**SOLID_ANGLE_EXPONENT + uniform * extent  # by which `choose_tiles` splits them
+    num_split = min(len(inner), max(0, num - 8) // 3)
+    return highest(tiles.codes, inner[np.argsort(-metric, kind="stable")[:num_split]])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

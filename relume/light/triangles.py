@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from relume.color import luminance
 from relume.environments.equirect import texel_directions, texel_solid_angles, turned
-from relume.light.tiles import Tiles, choose_tiles, unit
+from relume.light.hierarchy import highest, inner_nodes
+from relume.light.tiles import Tiles, choose_tiles, solid_angles, unit
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -19,6 +20,8 @@ F64 = NDArray[np.float64]
 _TANGENT_COSINE = (
     0.8  # triangles within 37° of their light are matched in its tangent plane; larger ones stay as they are
 )
+_MOST_A_GROUP = 12
+_FEWEST_GROUPED = 200  # of fewer lights, groups would save nothing
 
 
 class Parts(NamedTuple):
@@ -47,12 +50,14 @@ class TriangleLights:
         direction: mean direction of the light; shadow rays go there. (M, 3) float32
         irradiance: ∫ L dω over the tile, what the light brings to a surface across its way; per channel. (M, 3) float32
         parts: where each is merged of several, which are what points see.
+        codes: where each tile is in the hierarchy, see `Tiles`. (M,) uint64; none where that is of no use.
     """
 
     nodes: F32
     direction: F32
     irradiance: F32
     parts: Parts | None = None
+    codes: NDArray[np.uint64] | None = None
 
     @property
     def num_lights(self) -> int:
@@ -65,7 +70,8 @@ class TriangleLights:
 
     def some(self, chosen: NDArray[np.intp], irradiance: F32) -> TriangleLights:
         """Choose some of them, with other light. chosen: (N,). irradiance: (N, 3) float32"""
-        return TriangleLights(self.nodes[:, :, chosen], self.direction[chosen], irradiance)
+        codes = None if self.codes is None else self.codes[chosen]
+        return TriangleLights(self.nodes[:, :, chosen], self.direction[chosen], irradiance, codes=codes)
 
     @cached_property
     def by_light(self) -> F32:
@@ -77,6 +83,34 @@ class TriangleLights:
         """The angle from each light's direction to its farthest corner, within which all of it lies; radians. (M,)"""
         chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
+
+    @cached_property
+    def variance(self) -> F64:
+        """Of directions in each light, but for a factor that is the same for all. (M,)"""
+        middles = self.nodes[:, 3:].astype(np.float64)
+        return np.asarray(np.square(middles - middles.mean(axis=1, keepdims=True)).sum(axis=(0, 1)))
+
+    @cached_property
+    def groups(self) -> Groups | None:
+        """Lights that lie together; of few lights there are none."""
+        if self.codes is None or self.num_lights < _FEWEST_GROUPED:
+            return None
+        return _grouped(self, self.codes, _MOST_A_GROUP)
+
+
+class Groups(NamedTuple):
+    """Lights that lie together, as one light for a point that sees all of them.
+
+    Attributes:
+        lights: one for each of G groups.
+        first: where the parts of each begin. (G + 1,) int64. part: the lights in them. (P,) int64
+        between: the share of its variance that is between its parts; the others are the parts' own. (G,) float32
+    """
+
+    lights: TriangleLights
+    first: NDArray[np.int64]
+    part: NDArray[np.int64]
+    between: F32
 
 
 NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
@@ -173,6 +207,43 @@ def _moments(texels: Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) ->
     return centre, np.stack([xx + extent, xy, xy, yy + extent], axis=1).reshape(-1, 2, 2)
 
 
+def merged_into(lights: TriangleLights, group: NDArray[np.integer[Any]], codes: NDArray[np.uint64]) -> TriangleLights:
+    """Merge lights, so that each group has one with the same light, mean direction and spread.
+
+    Light is what a surface across its way receives: a little less of the parts than each of them brings across its own,
+    so that Σ L Ω cos θi is that of the parts wherever all are above the horizon.
+
+    Args:
+        lights: M of them. group: that each is in. (M,) codes: of nodes above them, one for each group. (G,)
+    """
+    luminous = luminance(lights.irradiance).astype(np.float64)
+    corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
+    directions = lights.direction.astype(np.float64)
+    parts = Texels(group.astype(np.int32), luminous, directions, solid_angles(corners))
+    its_corners, mean = matched(Tiles(codes).corners, parts)
+    across = np.einsum("mi,mi->m", directions, mean[group])
+    irradiance = np.stack([parts.sums(light * across, len(codes)) for light in lights.irradiance.T], axis=1)
+    return TriangleLights(nodes_of(its_corners), mean.astype(np.float32), irradiance.astype(np.float32))
+
+
+def _grouped(lights: TriangleLights, codes: NDArray[np.uint64], most: int) -> Groups:
+    """Group lights below one node each, at most `most` together and two at least. codes: of their tiles. (M,)"""
+    inner, (below,) = inner_nodes(codes, np.ones((1, len(codes))))
+    nodes, group, num = np.unique(highest(codes, inner[below > most]), return_inverse=True, return_counts=True)
+    number = np.cumsum(num > 1) - 1
+    part = np.argsort(group, kind="stable")
+    part = part[num[group[part]] > 1]
+    of_part = number[group[part]]
+    chosen = lights.some(part, lights.irradiance[part])
+    merged = merged_into(chosen, of_part, nodes[num > 1])
+    first, luminous = np.searchsorted(of_part, np.arange(number[-1] + 2)), luminance(chosen.irradiance).astype(float)
+    within = _sums(of_part, luminous * chosen.variance, merged.num_lights)
+    total = _sums(of_part, luminous, merged.num_lights) * merged.variance
+    own = np.divide(within, total, out=np.ones_like(within), where=total > 0)
+    between = np.clip(1 - own, 0, 1).astype(np.float32)
+    return Groups(merged, first.astype(np.int64), part.astype(np.int64), between)
+
+
 def nodes_of(corners: F64) -> F32:
     """Lay out corners (M, 3, 3) and the midpoints of their edges as kernels read them. (3 axes, 6, M) float32"""
     nodes = np.concatenate([corners, unit(corners + np.roll(corners, -1, axis=1))], axis=1)
@@ -196,7 +267,7 @@ def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
     texels = Texels(tiles.locate(directions), luminous, directions, solid_angles)
     irradiance = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
     corners, mean = matched(tiles.corners, texels)
-    return TriangleLights(nodes_of(corners), mean.astype(np.float32), irradiance.astype(np.float32))
+    return TriangleLights(nodes_of(corners), mean.astype(np.float32), irradiance.astype(np.float32), codes=tiles.codes)
 
 
 def subdivide(radiance: F32, num_lights: int) -> TriangleLights:

@@ -28,8 +28,8 @@ MOVING_ERROR = "error/moving"
 
 def read_lights(store: StoreReader) -> TriangleLights:
     """The light triangles of a store."""
-    nodes, direction, power = (store.read(f"lights/{name}") for name in ("nodes", "direction", "power"))
-    return TriangleLights(nodes, direction, power)
+    nodes, direction, power, codes = (store.read(f"lights/{name}") for name in ("nodes", "direction", "power", "tiles"))
+    return TriangleLights(nodes, direction, power, codes=codes)
 
 
 def read_tiles(store: StoreReader) -> Tiles:

@@ -2,7 +2,8 @@
 
     Σ_j c_j T_j = Σ_m V L_m Ω_m cos θi · q · Π_f mean_m(f)
 
-The sums that freezing makes, by another quadrature (`relume.project.shader`); pictures differ by a thousandth or two.
+The sums that freezing makes, by another quadrature (`relume.project.shading.shader`); pictures differ by a thousandth
+or two.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from relume.parallel import for_steps
 from relume.project.contraction import Contraction
 from relume.project.levels import contract_levels, project_levels
 from relume.project.receivers import Receivers
-from relume.project.shader import Shader
+from relume.project.shading.shader import Shader
 from relume.project.texels import texel_rows
 
 F32 = NDArray[np.float32]

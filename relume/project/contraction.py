@@ -21,7 +21,7 @@ _FLAT = 1e-12  # band averages of a constant differ by rounding
 
 
 class WholeCurves(NamedTuple):
-    """The curves of a term with none free, as `relume.project.shade_kernel` integrates them.
+    """The curves of a term with none free, as `relume.project.shading.boxes` integrates them.
 
     Attributes:
         kinds, num_rows, num_bands: as in `Contraction`.

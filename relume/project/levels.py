@@ -13,7 +13,7 @@ from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction, contract
 from relume.project.projector import Projector
 from relume.project.receivers import Receivers
-from relume.project.shader import Shader
+from relume.project.shading.shader import Shader
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

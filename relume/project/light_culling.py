@@ -123,9 +123,13 @@ def list_lights(  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         begin = end
         first[p - start] = begin
-        for m in range(num_lights):
-            light[end] = m  # kept where the light is seen; a branch would be guessed wrong at shadow edges
-            end += (visible[p, m >> 3] >> (m & 7)) & 1
+        for eight in range(0, num_lights, 8):
+            bits = visible[p, eight >> 3]
+            if bits == 0:  # of many in a row
+                continue
+            for k in range(min(8, num_lights - eight)):
+                light[end] = eight + k  # kept where it is seen; a branch would be guessed wrong at shadow edges
+                end += (bits >> k) & 1
         nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
         bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx

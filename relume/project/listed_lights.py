@@ -18,6 +18,7 @@ from relume.project.light_culling import list_lights
 from relume.project.receivers import LocalRays, Receivers, is_lamp
 
 F32 = NDArray[np.float32]
+Bits = NDArray[np.uint8]
 
 _TRIANGLES_A_BLOCK = 4096  # of lamps, at least those of one point
 POINTS_A_BLOCK = 48  # directions of a block stay in a core's second-level cache
@@ -81,14 +82,17 @@ class ListedLights:
         self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
 
-    def list(self, start: int, stop: int) -> tuple[F32, F32]:
+    def list(self, start: int, stop: int, visible: Bits) -> tuple[F32, F32]:
         """List the lights of points [start, stop), a block of them at most.
 
+        Args:
+            visible: which of the lights, or of their parts, these points see, as in `Receivers`. (stop - start, bytes)
         Returns:
             q cos θi of each entry (1 or 3, K), and the local wo (3, K) that it belongs to.
         """
         r, lights, some = self._receivers, self._lights, slice(start, stop)
-        visible = r.visible[some] if lights.parts is None else self._see_parts(lights.parts, start, stop)
+        if lights.parts is not None:
+            visible = self._see_parts(lights.parts, visible)
         num = list_lights(
             r.normal[some], r.tangent[some], r.wo[some], visible, lights.direction, lights.radius, self._kinds,
             self._support, 0, stop - start, self.first, self.light, self._wi, self._wo,
@@ -99,10 +103,10 @@ class ListedLights:
             weigh_by_parts(self.first[: stop - start + 1], self.light, self._seen, shading)
         return shading, wo
 
-    def _see_parts(self, parts: Parts, start: int, stop: int) -> NDArray[np.uint8]:
+    def _see_parts(self, parts: Parts, visible: Bits) -> Bits:
         """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
-        see_parts(self._receivers.visible, parts.group, parts.share, start, stop, self._seen)
-        return np.packbits(self._seen[:, : stop - start].T > 0, axis=1, bitorder="little")
+        see_parts(visible, parts.group, parts.share, 0, len(visible), self._seen)
+        return np.packbits(self._seen[:, : len(visible)].T > 0, axis=1, bitorder="little")
 
 
 class ListedLamp:

@@ -69,7 +69,7 @@ class Projector:
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         its = self._listed
-        shading, wo = its.list(start, stop)
+        shading, wo = its.list(start, stop, self._receivers.visible[start:stop])
         listed = its.first, its.light, shading, wo, self._lights.nodes, its.irradiance
         self._project(listed, start, stop, out)
 

@@ -19,11 +19,12 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
+from relume.bits import WORD, into_rows
 from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
 
 U64 = NDArray[np.uint64]
 
-BLOCK = 64
+BLOCK = WORD
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
 _ENOUGH = LANES * 3 // 4  # rays to one light from which on they do not wait for the next light's
@@ -292,37 +293,6 @@ def _keep(block, region, level):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _turn_over(words):  # type: ignore[no-untyped-def]
-    """Let bit j of word k become bit k of word j: halves of the square change places, then halves of those. (64,)"""
-    size, low = 32, np.uint64(0xFFFFFFFF)
-    while size:
-        for k in range(64):
-            if not k & size:
-                changed = (words[k] >> np.uint64(size) ^ words[k + size]) & low
-                words[k] ^= changed << np.uint64(size)
-                words[k + size] ^= changed
-        size >>= 1
-        low ^= low << np.uint64(size)
-
-
-@nb.njit(nogil=True, cache=True)
-def _write(block, bits):  # type: ignore[no-untyped-def]
-    """Turn words of samples, one for each light, into bytes of lights, one row for each sample."""
-    words = np.empty(64, np.uint64)
-    in_bytes = words.view(np.uint8)
-    num_lights = block.seen.shape[0]
-    for first in range(0, num_lights, 64):
-        num = min(64, num_lights - first)
-        words[:num] = block.seen[first : first + num]
-        words[num:] = 0
-        _turn_over(words)
-        begin, num_bytes = first >> 3, (num + 7) >> 3
-        for k in range(bits.shape[0]):
-            for byte in range(num_bytes):
-                bits[k, begin + byte] = in_bytes[8 * k + byte]
-
-
-@nb.njit(nogil=True, cache=True)
 def _trace_quarter(occluded, packets, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
     (packet, alike), (whole, quarter, each) = packets, levels
@@ -374,4 +344,4 @@ def trace_blocks(  # type: ignore[no-untyped-def]
         for begin in range(0, width, _QUARTER):
             span, salt = (begin, min(begin + _QUARTER, width)), here + begin
             _trace_quarter(occluded, (packet, alike), block, points, lights, span, salt, levels, counts)
-        _write(block, bits[here:there])
+        into_rows(block.seen, bits[here:there])

@@ -9,7 +9,7 @@ import relume.operators.shade
 from relume.memory import Memory
 from relume.picture.picture import Picture
 from relume.project.projector import Projector
-from relume.project.shader import Shader
+from relume.project.shading.shader import Shader
 
 A_THOUSANDTH = 1e-3
 

@@ -18,7 +18,7 @@ from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import LocalRays, Receivers
-from relume.project.shader import Shader
+from relume.project.shading.shader import Shader
 
 PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=20.0, size=(0.9, 0.5))
 MESH = LightGeometry("mesh", material="Lamp")

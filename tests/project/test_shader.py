@@ -16,7 +16,8 @@ from relume.brdf.registry import TERMS
 from relume.light.triangles import subdivide
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.project.shader import Shader
+from relume.project.shading import shader
+from relume.project.shading.shader import Shader
 
 NUM_POINTS = 24
 SHARP = [("ggx", {"roughness": 0.2}), ("ggx", {"roughness": 0.4, "f0": [0.9, 0.5, 0.1]}), ("ward", {"alpha": 0.08})]
@@ -114,3 +115,21 @@ def test_light_that_scatters_evenly_is_its_sum(receivers, lights):
     is_up = np.einsum("nc,nc->n", receivers.normal, receivers.wo) > 0
     expected = (is_up[:, None] * seen * cosine) @ lights.irradiance.astype(float) / np.pi * [0.5, 1, 2]
     np.testing.assert_allclose(shaded(term, bands, lights, receivers), expected, rtol=2e-5)
+
+
+@pytest.mark.parametrize(("model", "params"), CASES)
+def test_groups_of_lights_bring_what_their_lights_bring(model, params, lights, receivers):
+    """To less than the thousandth by which pictures may differ from operators; `ggx_multiple` leans most."""
+    term, bands = curves_of(model, params)
+    alone = shaded(term, bands, replace(lights, codes=None), receivers)
+    assert error(shaded(term, bands, lights, receivers), alone) < 6e-4
+
+
+def test_most_lights_are_shaded_in_groups(lights, receivers, monkeypatch):
+    """A broad term, and all the sky in sight: else the test above would compare lights with themselves."""
+    left = []
+    monkeypatch.setattr(shader, "shade_points", lambda *args: left.append(args[2][args[11] - args[10]]))
+    term, bands = curves_of("blinn_phong", {"exponent": 2.0})
+    everything = twins.only_above(replace(receivers, visible=np.full_like(receivers.visible, 255)), lights)
+    shaded(term, bands, lights, everything)
+    assert 0 < sum(left) < 0.4 * np.unpackbits(everything.visible).sum()

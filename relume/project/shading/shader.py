@@ -18,7 +18,8 @@ from relume.project.lambertian import EvenShader
 from relume.project.listed_lights import POINTS_A_BLOCK, ListedLamp, ListedLights, listed_lamps
 from relume.project.ray_projector import RayProjector
 from relume.project.receivers import Receivers
-from relume.project.shade_kernel import shade_points
+from relume.project.shading.grouped_lights import GroupedLights
+from relume.project.shading.shade_kernel import shade_points
 
 F32 = NDArray[np.float32]
 
@@ -38,6 +39,8 @@ class Shader:
         self._brings = np.concatenate([self._listed.irradiance, lights.radius[:, None]], axis=1)
         is_even = term.is_lambertian and contraction.kinds.size == 0
         self._even = EvenShader(term, contraction.constant, lights) if is_even else None
+        groups = lights.groups if contraction.kinds.size else None  # nothing else tells how a quotient varies
+        self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
         self._lamps = listed_lamps(term, contraction, receivers)
 
@@ -68,8 +71,10 @@ class Shader:
         r, c, listed = self._receivers, self._contraction, self._listed
         for block in range(start, stop, POINTS_A_BLOCK):
             end = min(block + POINTS_A_BLOCK, stop)
-            shading, wo = listed.list(block, end)
+            here = out[block - start : end - start]
+            visible = self._grouped.add(block, end, here) if self._grouped else r.visible[block:end]
+            shading, wo = listed.list(block, end, visible)
             shade_points(
                 r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.by_light, self._brings,
-                c.axes, c.whole, block, end, out[block - start : end - start],
+                c.axes, c.whole, block, end, here,
             )  # fmt: skip

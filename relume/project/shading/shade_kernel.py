@@ -1,0 +1,197 @@
+"""The kernels of a term with all its curves contracted: light triangles weighed by the means of its curves.
+
+A curve's mean over a triangle is that over a box (`relume.project.shading.boxes`). Triangles over which that would not
+do are divided, where they matter to the point at all.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from relume.project.shading.boxes import CHUNK, evaluate, look_up, look_up_middles, sum_up, turn, weigh
+
+_ZERO, _ONE, _HALF, _QUARTER = np.float32(0), np.float32(1), np.float32(0.5), np.float32(0.25)
+# corners of the four children among the nodes a, b, c, ab, bc, ca
+_CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
+_MAX_DEPTH = 6
+# Triangles are divided whose error may be above both: a share of what they bring, and of all that the point receives.
+_TOLERANCE, _TOLERANCE_OF_ALL = np.float32(0.02), np.float32(1e-3)
+_ALONE = np.empty(0, np.float32)  # these are no groups
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _set_aside(value, weight, error, num, least, which):  # type: ignore[no-untyped-def]
+    """List the triangles to be divided, and let them bring nothing as they are; returns their number.
+
+    Args:
+        value, weight, error: as from `evaluate` and `weigh`; errors are spoilt. least: what may be wrong.
+        which: written. (> num,)
+    """
+    blue_row = value.shape[0] - 1
+    red, green, blue = value[0], value[blue_row // 2], value[blue_row]
+    for n in range(num):
+        brought = weight[0, n] * red[n] + weight[1, n] * green[n] + weight[2, n] * blue[n]
+        error[n] = _ONE if (error[n] > _TOLERANCE) & (error[n] * brought > least) else _ZERO
+    count = 0
+    for n in range(num):
+        which[count] = n
+        count += int(error[n])
+    for row in range(blue_row + 1):
+        of_row = value[row]
+        for n in range(num):
+            of_row[n] *= _ONE - error[n]
+    return count
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _copy(source, which, target):  # type: ignore[no-untyped-def]
+    for n in range(which.shape[0]):
+        target[n] = source[which[n]]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
+    """Make the four children of the listed triangles; returns their number.
+
+    Args:
+        local, weight, radius: of a generation, as in `evaluate` and `weigh`. which: the listed. (n,)
+        parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: of the children, written.
+    """
+    count = which.shape[0]
+    for node in range(6):
+        for axis in range(3):
+            _copy(local[axis, node], which, parent[3 * node + axis])
+    for channel in range(3):
+        _copy(weight[channel], which, parent[18 + channel])
+    _copy(radius, which, parent[21])
+    for child in range(4):
+        begin = child * count
+        for corner in range(3):
+            first = 3 * _CHILDREN[child, corner]
+            for axis in range(3):
+                of_parent, to = parent[first + axis], to_local[axis, corner]
+                for n in range(count):
+                    to[begin + n] = of_parent[n]
+        for n in range(count):
+            to_weight[0, begin + n] = _QUARTER * parent[18, n]
+            to_weight[1, begin + n] = _QUARTER * parent[19, n]
+            to_weight[2, begin + n] = _QUARTER * parent[20, n]
+            to_radius[begin + n] = _HALF * parent[21, n]
+    for edge in range(3):
+        following = (edge + 1) % 3
+        for axis in range(3):
+            a, b, middle = to_local[axis, edge], to_local[axis, following], to_local[axis, 3 + edge]
+            for n in range(4 * count):
+                middle[n] = a[n] + b[n]
+        x, y, z = to_local[0, 3 + edge], to_local[1, 3 + edge], to_local[2, 3 + edge]
+        for n in range(4 * count):
+            inverse = _ONE / math.sqrt(x[n] * x[n] + y[n] * y[n] + z[n] * z[n])
+            x[n], y[n], z[n] = x[n] * inverse, y[n] * inverse, z[n] * inverse
+    return 4 * count
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_divided(curves, scale, wo, num, least, generations, scratch, total):  # type: ignore[no-untyped-def]
+    """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
+
+    Args:
+        curves, scale, wo, scratch: as in `evaluate`. least: as in `_set_aside`.
+        generations: local, weight, radius, which, value and error of each, written but for the first's first three.
+        total: added to. (3,)
+    """
+    local, weight, radius, which, value, error = generations
+    count, done = np.zeros(_MAX_DEPTH + 1, np.int64), np.zeros(_MAX_DEPTH + 1, np.int64)
+    parent = np.empty((22, CHUNK // 4), np.float32)
+    for n in range(num):
+        which[0, n] = n
+    level, count[0] = 0, num
+    while level >= 0:
+        if done[level] == count[level]:
+            level -= 1
+            continue
+        listed = which[level, done[level] : min(done[level] + CHUNK // 4, count[level])]
+        done[level] += len(listed)
+        to = level + 1
+        parts = _divide(local[level], weight[level], radius[level], listed, parent, local[to], weight[to], radius[to])
+        evaluate(curves, scale, wo, local[to], radius[to], _ALONE, parts, scratch, value[to], error[to])
+        done[to] = count[to] = 0
+        if to < _MAX_DEPTH:
+            count[to] = _set_aside(value[to], weight[to], error[to], parts, least, which[to])
+        sum_up(value[to], weight[to], parts, total)
+        level = to
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _scratch(num, num_rows):  # type: ignore[no-untyped-def]
+    """Make room for `num` chunks of triangles: weight, radius, which are divided, value, error."""
+    weight, radius = np.empty((num, 3, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
+    value, error = np.empty((num, num_rows, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
+    return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def shade_points(  # type: ignore[no-untyped-def]
+    normal, tangent, first, light, shading, local_wo, nodes, brings, axes, curves, start, stop, out
+):
+    """Add what the listed lights bring to points [start, stop).
+
+    Args:
+        normal, tangent, first, light, shading, local_wo, start, stop: as in `project_points`.
+        nodes: of the lights. (M, 6, 3) float32 brings: their irradiance and, in radians, radius. (M, 4) float32
+        axes: `Curve.axes` of each. (C, 3) float32
+        curves: see `evaluate`.
+        out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
+    """
+    num_curves, num_rows = axes.shape[0], 1
+    scale, wo = np.empty(num_curves, np.float32), np.empty((num_curves, 3), np.float32)
+    for k in range(num_curves):
+        num_rows = max(num_rows, curves[2][k])
+        scale[k] = curves[3][k] / (np.pi / 2)
+    weight, reach, which, value, error = _scratch(nodes.shape[0] // CHUNK + 1, num_rows)
+    local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
+    of_parts, total = _scratch(_MAX_DEPTH + 1, num_rows), np.empty(3, np.float32)
+    chosen, generations = np.empty(CHUNK, np.int32), (local, *of_parts)
+    for p in range(start, stop):
+        begin, end = first[p - start], first[p - start + 1]
+        if begin == end:
+            continue
+        for k in range(num_curves):
+            for axis in range(3):
+                wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
+        total[:] = 0
+        for chunk in range((end - begin + CHUNK - 1) // CHUNK):
+            at = begin + chunk * CHUNK
+            num = min(CHUNK, end - at)
+            if num_curves > 0:
+                look_up_middles(nodes, light, at, num, local[0])
+                turn(normal[p], tangent[p], 3, num, local[0])
+            weigh(brings, light, shading, at, num, weight[chunk], reach[chunk])
+            evaluate(curves, scale, wo, local[0], reach[chunk], _ALONE, num, scratch, value[chunk], error[chunk])
+            sum_up(value[chunk], weight[chunk], num, total)
+        if num_curves == 0:
+            out[p - start, :, 0] += total
+            continue
+        for channel in range(3):  # what is there already counts as well
+            total[channel] += abs(out[p - start, channel, 0])
+        least = _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2])
+        total[:] = 0
+        for chunk in range((end - begin + CHUNK - 1) // CHUNK):
+            at = begin + chunk * CHUNK
+            num = min(CHUNK, end - at)
+            divided = _set_aside(value[chunk], weight[chunk], error[chunk], num, least, which[chunk])
+            sum_up(value[chunk], weight[chunk], num, total)
+            if divided == 0:
+                continue
+            listed = which[chunk, :divided]
+            _copy(light[at : at + num], listed, chosen)
+            _copy(reach[chunk], listed, of_parts[1][0])
+            for channel in range(3):
+                _copy(weight[chunk, channel], listed, of_parts[0][0, channel])
+            for node in range(6):
+                look_up(nodes, node, chosen, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node])
+            turn(normal[p], tangent[p], 0, divided, local[0])
+            _add_divided(curves, scale, wo, divided, least, generations, scratch, total)
+        out[p - start, :, 0] += total
