@@ -47,9 +47,9 @@ class Quotas:
         most, each = self._settings.max_sessions, self._settings.max_sessions_each
         with self._lock:
             if self._open.total() >= most:
-                raise BusyError(f"{most} sessions are open; close one and try again")
+                raise BusyError(f"as many sessions are open as may be, {most}; close one and try again")
             if each is not None and self._open[who] >= each:
-                text = f"you have {each} sessions open, and {each} may be; close one (RELUME_MAX_SESSIONS_EACH)"
+                text = f"you have as many sessions open as may be, {each}; close one (RELUME_MAX_SESSIONS_EACH)"
                 raise QuotaError(text)
             self._open[who] += 1
         try:
@@ -91,7 +91,7 @@ class Quotas:
             active = session.scalar(query) or 0
         if active >= most:
             raise QuotaError(
-                f"{active} bakes of yours wait or run, and {most} may; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
+                f"as many of your bakes wait or run as may, {most}; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
             )
 
     def used_bytes(self, who: str) -> int:
