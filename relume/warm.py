@@ -43,7 +43,7 @@ from relume.scene.model import Scene
 from relume.store import bake_here
 from relume.trace.geometry import merge
 
-SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 64, 4000
+SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 256, 4000  # as many lights as are grouped
 CACHE_BYTES = 1 << 28
 
 

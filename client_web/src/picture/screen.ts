@@ -1,6 +1,6 @@
 /** A canvas that shows one picture, as the view's settings say. Each has a graphics context of its own: a frame of one
  * view then draws that view alone, where a shared canvas would have to draw all of them again. */
-import { effect } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { solo } from "../seen/solo";
 import { brushed } from "../state/curveShape";
 import { drawn, falseColour, held, showBefore, wipe } from "../state/display";
@@ -19,6 +19,8 @@ const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
 
 export class Screen implements Shows {
   readonly renderer: Renderer;
+  /** The browser took the graphics memory away, and has not given it back yet. */
+  readonly isLost = signal(false);
   private box: [width: number, height: number] = [1, 1];
   /** Nothing has been drawn since the canvas was made or got another size. */
   private blank = true;
@@ -34,8 +36,12 @@ export class Screen implements Shows {
     private shown: Picture,
   ) {
     this.renderer = new Renderer(canvas);
-    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault(); // else it would never come back
+      this.isLost.value = true;
+    });
     canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost.value = false;
       this.renderer.restore();
       this.upload();
     });

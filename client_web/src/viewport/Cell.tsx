@@ -143,6 +143,12 @@ export function Cell({ view }: { view: string }) {
         {...pointer}
       />
       {failure !== null && <p class="failure">{failure}</p>}
+      {screen?.isLost.value === true && (
+        <p class="failure" role="status">
+          The browser took the graphics memory away. The picture returns with it, or when you reload the page; nothing of
+          your work is lost.
+        </p>
+      )}
       {screen !== null && <LightHandles screen={screen} />}
       {screen !== null && <Pins screen={screen} />}
       {wipe.value.on && screen !== null && <WipeHandle screen={screen} />}
