@@ -264,7 +264,8 @@ class MovingPicture:
         self._num_told += vectors is not self._told
         self._told = vectors
         wanted = self._wanted(self._look, vectors)
-        versions = self._num_materials, self._num_told
+        # what is exact follows from its light alone: it is not sent again after pictures that were drawn here meanwhile
+        versions = self._num_materials, self._num_told if self._is_rough else self._asked()
         return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
 
     @property

@@ -84,14 +84,16 @@ def stream(window: FrameWindow, num_frames: int, num_bytes: int, bytes_per_s: fl
 
 def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> None:
     window = FrameWindow(ack_seconds=10)
-    assert not window.is_slow_for(1_000_000)
+    assert not window.is_slow_for(1_000_000, was_slow=False)
     now_s = stream(window, 5, 1_000_000, 100e6, 0.0)
-    assert not window.is_slow_for(1_000_000)
+    assert not window.is_slow_for(1_000_000, was_slow=False)
     now_s = stream(window, 20, 1_000_000, 5e6, now_s)
-    assert window.is_slow_for(1_000_000)
-    assert window.is_slow_for(1_000_000 * 50 // 66)  # hysteresis: not quick yet
+    assert window.is_slow_for(1_000_000, was_slow=False)
+    almost = 300_000  # takes 60 ms
+    assert not window.is_slow_for(almost, was_slow=False)
+    assert window.is_slow_for(almost, was_slow=True)  # hysteresis: not quick yet
     stream(window, 20, 1_000_000, 100e6, now_s)
-    assert not window.is_slow_for(1_000_000)
+    assert not window.is_slow_for(1_000_000, was_slow=True)
 
 
 def test_pace_settles_where_steps_take_the_target() -> None:

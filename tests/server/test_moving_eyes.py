@@ -12,6 +12,7 @@ from session_client import Frame, Session, open_session
 from test_end_to_end import decode_rgb9e5, rendered_by, wait_until_done
 
 from server.app import create_app
+from server.live.state.frame_window import FrameWindow
 from server.settings import Settings
 
 SIZE = (64, 48)
@@ -297,6 +298,12 @@ def tables_of(session: Session) -> Frame:
     return frame
 
 
+def until_fine(session: Session, revision: int) -> None:
+    """Take frames up to the tables with all light of a look."""
+    while (frame := tables_of(session)).header["fidelity"] == "preview" or frame.header["revision"] != revision:
+        pass
+
+
 def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_eye(session: Session) -> None:
     found = hello(session)
     (view,), material = found["views"], found["materials"][0]
@@ -304,7 +311,10 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     session.send(**eye(view, 1, 0.2), rest="stay")
     of_eye(session, 1)
     session.send(type="evaluate", by="browser")
-    first = arrays_in(tables_of(session))
+    tables = tables_of(session)
+    first = arrays_in(tables)
+    if tables.header["fidelity"] == "preview":
+        until_fine(session, 0)
     assert {"even", "materials", "vectors/0", "sky"} <= set(first)
     session.send(**eye(view, 2, 0.4), rest="stay")
     assert arrays_in(tables_of(session)) == {}
@@ -357,3 +367,29 @@ def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Sess
         np.testing.assert_array_equal(shown(frame), shown(first))
     session.send(type="evaluate", by="nobody")
     assert "evaluate" in str(session.text("problem"))
+
+
+def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And tables when it rests; what is small comes as tables all the while, and an eye costs nothing."""
+    monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
+    found = hello(session)
+    (view,), color = found["views"], f"/materials/{found['materials'][0]}/terms/0/color"
+    session.send(**eye(view, 1, 0.05), rest="stay")
+    of_eye(session, 1)
+    session.edit(1, "/transport/show", "direct")  # colours would bring other light to all points
+    session.send(type="evaluate", by="browser")
+    until_fine(session, 1)
+    turn, kinds = "/environment/rotation", []
+    edits = [(color, [0.1, 0.2, 0.9]), (turn, 20.0), (turn, 50.0), (color, [0.9, 0.8, 0.1])]
+    for revision, (path, value) in enumerate(edits, start=2):
+        session.edit(revision, path, value, hand=path)
+        while (first := session.frame()).header["revision"] != revision:
+            pass
+        kinds.append(first.header["kind"])
+        if kinds[-1] == "picture" or first.header["fidelity"] == "preview":
+            until_fine(session, revision)
+        session.send(**eye(view, revision, 0.1 * revision), rest="stay")
+        assert arrays_in(tables_of(session)) == {}
+    assert kinds == ["picture", "picture", "picture", "tables"]  # how small those of colours are it learns once

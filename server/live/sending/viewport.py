@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from server.library.ports import Advance, MovingPicture, Picture
 from server.live.sending.coefficient_budget import CoefficientBudget
 from server.live.sending.painter import Format, FrameRequest, Painted
+from server.live.sending.tables import Tables
 from server.live.state.frame_window import FrameWindow
 from server.live.state.pending_requests import PendingRequests
 from server.live.state.target import Eye, Target
@@ -58,7 +59,7 @@ class Viewport:
         self._all_tiles = self._lacking = frozenset(picture.all_tiles())
         self.eye: Eye | None = None
         self._moves, self._evaluator = moves, "server"
-        self._known: Mapping[str, Hashable] = {}  # parts that the client's shader has
+        self._tables = Tables()
         self._is_blank = not moves  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False
         self._answered: Target | None = None
@@ -96,16 +97,19 @@ class Viewport:
         eye = pending.eyes.get(self.name)
         has_moved = self.has_to_move(pending)
         if self.has_other_evaluator(pending):
-            self._evaluator, self._known, self._lacking = pending.evaluator, {}, self._all_tiles
+            self._evaluator, self._tables, self._lacking = pending.evaluator, Tables(), self._all_tiles
         is_new = self.is_behind(newest) or has_moved
         size = self.size if eye is None else eye.size
         received_s = eye.received_s if eye is not None and has_moved else newest.received_s
-        self._is_link_slow = is_slow = window.is_slow_for(self._moving_bytes)
-        is_moving_slowly = pending.form == "auto" and is_slow and is_new and received_s is not None
+        is_moving = is_new and received_s is not None
+        is_drawn_there = self._moves and self._evaluator == "browser" and pending.form != "jpeg"
+        if is_drawn_there and is_moving and self._tables.are_too_large(newest, window, self.is_behind(newest)):
+            is_drawn_there = False
+        self._is_link_slow = is_slow = window.is_slow_for(self._moving_bytes, was_slow=self._is_link_slow)
+        is_moving_slowly = pending.form == "auto" and is_slow and is_moving and not is_drawn_there
         form: Format = "jpeg" if pending.form == "jpeg" or is_moving_slowly else "rgb9e5"
         is_early = is_slow or time.perf_counter() - self._sent_s < REFINE_SEND_S
         is_answered = self._answered is newest
-        is_drawn_there = self._moves and self._evaluator == "browser" and form != "jpeg"
         if self._moves:
             cast("MovingPicture", self.picture).draws = not is_drawn_there
         return FrameRequest(
@@ -121,7 +125,7 @@ class Viewport:
             received_s=None if is_answered and not has_moved else received_s,
             eye=eye if has_moved else None,
             shown_eye=None if eye is None else eye.number,
-            known=self._known if is_drawn_there else None,
+            known=self._tables.known if is_drawn_there else None,
             frame=window.next_frame,
             view=self.name,
             size=size,
@@ -145,8 +149,8 @@ class Viewport:
             self._budget.learn(painted.update_ms, exact)
         if self.is_behind(request.target) and tiles and request.received_s is not None:
             self._moving_bytes = 4 * sum(w * h for _, _, w, h in tiles)
+        self._tables.painted(self.is_behind(request.target), request.target, painted)
         self.target, self.job, self.advance = request.target, painted.job, painted.advance
-        self._known = self._known if painted.known is None else painted.known
         is_done = exact or not tiles
         if painted.message is None:
             self._lacking = self._lacking.union(tiles)

@@ -30,7 +30,6 @@ class FrameWindow:
         self._last_ack_s = 0.0
         self._round_trip_s = float("inf")
         self._bytes_per_s: float | None = None
-        self._is_slow = False
 
     def has_room(self, view: str, shown: ShownViews) -> bool:
         """Whether another frame of a view may be sent: one alone has all slots; of several, the focused one has a slot
@@ -77,12 +76,15 @@ class FrameWindow:
         rate = sent.num_bytes / max(taken_s - 0.5 * self._round_trip_s, 1e-4)
         self._bytes_per_s = rate if self._bytes_per_s is None else 0.7 * self._bytes_per_s + 0.3 * rate
 
-    def is_slow_for(self, num_bytes: int) -> bool:
-        """Whether a moving picture of so many bytes a frame would stutter on this link; with hysteresis."""
-        if self._bytes_per_s is not None:
-            needed_s = num_bytes / self._bytes_per_s
-            self._is_slow = needed_s > (QUICK_S if self._is_slow else SLOW_S)
-        return self._is_slow
+    def is_slow_for(self, num_bytes: int, *, was_slow: bool) -> bool:
+        """Whether what brings so many bytes a frame would stutter on this link.
+
+        Args:
+            num_bytes: of a frame. was_slow: for the frame before; it takes a quicker link to be quick again.
+        """
+        if self._bytes_per_s is None:
+            return was_slow
+        return num_bytes / self._bytes_per_s > (QUICK_S if was_slow else SLOW_S)
 
     def check(self, now_s: float) -> None:
         """Raises ProtocolError where the client has left a frame unacknowledged for too long."""
