@@ -1,7 +1,8 @@
 import { expect, test } from "vitest";
 import { energyWords } from "../src/inspector/energy";
+import { btfOf, upTo, within } from "../src/inspector/kept";
 import { mirrorsSoftly, texturesOf } from "../src/inspector/terms";
-import type { ModelBody, Rgb, SceneBody, Term } from "../src/protocol";
+import type { ModelBody, ParameterBody, Rgb, SceneBody, Term } from "../src/protocol";
 import { models, scene } from "../src/state/scene";
 
 test("a material offers the images that its own terms take, in their order", () => {
@@ -45,4 +46,15 @@ test("that more light is sent back than arrives is said, and nothing else", () =
   expect(energyWords({ mean: [0.7, 0.2, 0.4], most: 1.234, at_deg: 80.6 })).toBe(
     "Sends back more light than meets it: 123 % of it 81° from the normal, 70 % on average. No real surface does.",
   );
+});
+
+test("the quality of a texture from all sides goes as far as it has components", () => {
+  const quality = { name: "components", minimum: 0, maximum: 16, default: 16 } as ParameterBody;
+  const [five, unknown, none] = [upTo(quality, 5), upTo(quality, null), upTo(quality, 0)];
+  expect([five.maximum, five.default, unknown.maximum, none.maximum]).toEqual([5, 5, 16, 1]);
+  expect([within(five, 16), within(five, 2), within(five, undefined)]).toEqual([5, 2, 5]);
+  const scale = { name: "scale", maximum: 200, default: 1 } as ParameterBody;
+  expect(upTo(scale, 5)).toBe(scale);
+  expect(within(scale, 300)).toBe(300);
+  expect([btfOf({ data: "btf:12" } as Term), btfOf({ data: "merl:12" } as Term), btfOf({} as Term)]).toEqual(["12", null, null]);
 });

@@ -17,7 +17,9 @@ import { IconButton } from "../ui/Button";
 import { ColorField } from "../ui/ColorField";
 import { InMotion } from "./InMotion";
 import { ParamRow } from "./ParamRow";
+import { btfOf, keptOf, upTo, within } from "./kept";
 import { hasRoughnessMap, mirrorsSoftly, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
+import { useTold } from "./useTold";
 
 interface Props {
   material: string;
@@ -125,6 +127,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
   const initial = defaultLook.value?.materials[material]?.terms[index];
   const same = initial?.model === term.model ? initial : undefined;
   const open = selectedTerm.value === index;
+  const kept = useTold(open ? btfOf(term) : null, keptOf);
   const changeModel = (name: string) => {
     edit("Change model", path, withModel(term, name, models.value));
     selectTerm(index);
@@ -177,11 +180,11 @@ export function TermCard({ material, term, index, onRemove }: Props) {
               onChange={(value) => edit("Roughness map", `${path}/roughness_map`, value)}
             />
           )}
-          {model?.parameters.map((info) => (
+          {model?.parameters.map((declared) => upTo(declared, kept)).map((info) => (
             <ParamRow
               key={info.name}
               info={info}
-              value={term.params?.[info.name] ?? info.default}
+              value={within(info, term.params?.[info.name])}
               initial={same?.params?.[info.name] ?? info.default}
               onChange={(value) => edit(info.label, `${path}/params/${info.name}`, value)}
               onHold={() => hold(`${path}/params/${info.name}`)}

@@ -96,6 +96,7 @@ export async function takeBuiltIn(name: string): Promise<SceneBody> {
 export const listModels = () => getJson<ModelBody[]>("/api/models");
 export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
 export const listBtfs = () => getJson<BtfBody[]>("/api/materials/btf");
+export const getBtf = (id: string) => getJson<BtfBody>(`/api/materials/btf/${encodeURIComponent(id)}`);
 const btfWork = (id: string) => `/api/materials/btf-works/${encodeURIComponent(id)}`;
 export const listBtfWorks = () => getJson<BtfWorkBody[]>("/api/materials/btf-works");
 export async function startBtf(body: SyntheticBtfRequest): Promise<BtfWorkBody> {
