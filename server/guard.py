@@ -20,7 +20,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from relume.measured.merl import FILE_BYTES
 from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
 
-UPLOADS = ("/api/scenes", "/api/materials/btf-works")  # as large as the settings allow
+# as large as the settings allow
+UPLOADS = ("/api/scenes", "/api/materials/btf-works", "/api/materials/btf-works/geometry")
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {

@@ -306,7 +306,7 @@ export interface BtfBody {
 export interface BtfWorkBody {
   id: string;
   name: string;
-  geometry: "weave" | "pebbles" | "corduroy" | null;
+  geometry: "weave" | "pebbles" | "corduroy" | "mesh" | null;
   state: "queued" | "running" | "ready" | "failed" | "stopped";
   progress: number;
   seconds_left: number | null;

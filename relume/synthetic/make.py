@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from relume.btf.begun import Begun
 from relume.btf.compress import MOST_TEXELS, compress
@@ -28,7 +28,7 @@ from relume.synthetic.tile import Tile
 from relume.synthetic.weave import weave
 
 GEOMETRIES = {"weave": weave, "pebbles": pebbles, "corduroy": corduroy}
-MESH = "mesh"
+MESH: Final = "mesh"
 """Geometry that a file holds."""
 LEAST_SIZE = 8
 MOST_GRID = 8

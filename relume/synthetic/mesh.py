@@ -54,12 +54,12 @@ def _in_periods(positions: F64, period: float | None) -> F64:
     if period is None:
         if abs(width - depth) > _SQUARE * max(width, depth):
             raise ParameterError(
-                "--period", "not given", f"side of the square that repeats: the mesh is {width:g} × {depth:g} metres"
+                "period", "not given", f"side of the square that repeats: the mesh is {width:g} × {depth:g} metres"
             )
         period = float(max(width, depth))
     if not (period > 0 and max(width, depth) <= _MOST_REACH * period and height <= _MOST_HEIGHT * period):
         raise ParameterError(
-            "--period", period, f"metres, at least the height of the mesh, {height:g}, and half its width, "
+            "period", period, f"metres, at least the height of the mesh, {height:g}, and half its width, "
             f"{max(width, depth) / _MOST_REACH:g}"
         )  # fmt: skip
     return np.asarray((positions - [*(0.5 * (low + high))[:2], 0.0]) / period + [0.5, 0.5, 0.0])

@@ -55,6 +55,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/materials/btf/{material}/thumbnail.png": {"GET": VIEW},
     "/api/materials/btf-works": {"GET": VIEW, "POST": EDIT},
     "/api/materials/btf-works/synthetic": {"POST": EDIT},
+    "/api/materials/btf-works/geometry": {"POST": EDIT},
     "/api/materials/btf-works/{work}": {"GET": VIEW, "DELETE": EDIT},
     "/api/materials/btf-works/{work}/resume": {"POST": EDIT},
     "/api/environments": {"GET": VIEW, "POST": EDIT},

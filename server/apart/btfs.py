@@ -13,12 +13,12 @@ from relume.btf.shelf import BtfRecord
 from relume.errors import CancelledError
 from relume.picture.jobs import Cancelled, Progress
 from relume.replacing import replacing
-from relume.synthetic.make import Made, make_btf
+from relume.synthetic.make import MESH, Made, make_btf
 from server.apart.workshop import Workshop
 from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
 
-IMAGES, FOUND = "images.zip", "found.json"  # a container has the same name: its first byte tells
+SENT, FOUND = "images.zip", "found.json"  # a container or a mesh has the same name: the first bytes tell
 _MAKING, _REACHED = "making", "reached.txt"
 _GRID = 3  # places along each side of a texel
 TURN_S = 30.0
@@ -30,7 +30,7 @@ def make(
     """Render or read it, compress it, keep it; what was found when it was stopped is still there.
 
     Args:
-        request: the work's. folder: its files, the images among them.
+        request: the work's. folder: its files, what was sent among them.
     Returns:
         `is_done`: whether it is kept; else it is to be gone on with.
     """
@@ -50,8 +50,9 @@ def make(
 
 def _made(asked: BtfRequest, where: Path, shelf: Path, turn: _Turn) -> BtfRecord:
     if asked.geometry is None:
-        return import_btf(shelf, where / IMAGES, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
-    wanted = Made(asked.geometry, asked.size, _GRID, asked.error)
+        return import_btf(shelf, where / SENT, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
+    mesh = where / SENT if asked.geometry == MESH else None
+    wanted = Made(asked.geometry, asked.size, _GRID, asked.error, mesh, asked.period)
     return make_btf(shelf, wanted, asked.name, turn.tell, turn.is_over, where / _MAKING)
 
 

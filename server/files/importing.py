@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # the import process itself has no use for them, or not at on
 MAX_OUTPUT_BYTES = 64 * 1024
 DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 UPLOAD_PREFIX = "upload-"
-Kind = Literal["scene", "environment", "built_in", "grounded", "image"]
+Kind = Literal["scene", "environment", "built_in", "grounded", "image", "tile"]
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class ImportRequest:
 
     Attributes:
         kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
-            is kept in.
+            is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
         environment: path of a scene's environment map, or None.
         name: what people will call it; of a built-in scene, which one it is.
         scene: the name that a scene's file had, folders included. companions: paths of the files that came with it, by
             theirs.
-        ground: whether a scene is put on one.
+        ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
         seconds: of processor and wall. max_bytes: of address space.
     """
 
@@ -54,6 +54,7 @@ class ImportRequest:
     seconds: int
     max_bytes: int
     ground: bool = False
+    period: float | None = None
     scene: str = ""
     companions: dict[str, str] = field(default_factory=dict)
 
@@ -133,6 +134,8 @@ def _import(request: ImportRequest) -> str:
         return _put_on_ground(request)
     if request.kind == "image":
         return _import_image(request)
+    if request.kind == "tile":
+        return _look_at_tile(request)
     return _import_environment(request) if request.kind == "environment" else _import_scene(request)
 
 
@@ -148,6 +151,13 @@ def _import_image(request: ImportRequest) -> str:
     from worker.paths import images_path
 
     return keep(images_path(Path(request.data)), Path(request.file), request.name).id
+
+
+def _look_at_tile(request: ImportRequest) -> str:
+    from relume.synthetic.mesh import tile_of
+
+    tile_of(Path(request.file), request.period)
+    return ""
 
 
 def _import_scene(request: ImportRequest) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.folders import folder_bytes
-from server.apart.btfs import FOUND, IMAGES
+from server.apart.btfs import FOUND, SENT
 from server.apart.step import RunStep
 from server.apart.step_timer import StepTimer
 from server.queues.work_queue import Quota, Work, WorkQueue
@@ -68,5 +68,5 @@ class BtfQueue(WorkQueue[BtfRequest]):
             return 0
         if (material := self.material(work.id)) is not None:
             self._kept(work.id, material, folder_bytes(self._btfs / material))
-        (folder / IMAGES).unlink(missing_ok=True)
+        (folder / SENT).unlink(missing_ok=True)
         return 1

@@ -9,6 +9,10 @@ from pydantic import Field
 from server.wire.body import Body, Id, Name
 
 Geometry = Literal["weave", "pebbles", "corduroy"]
+Made = Literal[Geometry, "mesh"]
+Texels = Annotated[int, Field(ge=8, le=256)]
+Period = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False, description="side of what repeats, metres")]
+TEXELS = 128
 Bound = Annotated[float, Field(ge=1e-4, le=0.5, description="relative RMS that compression may miss")]
 BOUND = 0.05
 
@@ -17,18 +21,19 @@ class SyntheticBtfRequest(Body):
     """A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured."""
 
     geometry: Geometry
-    size: Annotated[int, Field(ge=8, le=256)] = 128
+    size: Texels = TEXELS
     error: Bound = BOUND
     name: Name | None = None
 
 
 class BtfRequest(Body):
-    """A BTF to be made: rendered from `geometry`, or of images that were sent."""
+    """A BTF to be made: rendered from `geometry`, which for `mesh` was sent, or of images that were sent."""
 
     name: Name
     error: Bound
-    geometry: Geometry | None = None
+    geometry: Made | None = None
     size: int = 0
+    period: Period | None = None
 
 
 class BtfWorkBody(Body):
@@ -36,7 +41,7 @@ class BtfWorkBody(Body):
 
     id: Id
     name: str
-    geometry: Geometry | None
+    geometry: Made | None
     state: Literal["queued", "running", "ready", "failed", "stopped"]
     progress: float
     seconds_left: float | None

@@ -74,6 +74,46 @@ def test_a_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.Mo
     assert client.get(f"/api/materials/btf/{body['material']}").json()["synthetic"] == "corduroy"
 
 
+SQUARE = "v 0 0 0\nv 2 0 0\nv 2 0.1 -2\nv 0 0 -2\nf 1 2 3 4\n"
+
+
+def test_a_mesh_that_is_sent_is_rendered_with_its_period(
+    client: TestClient, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def render(shelf: Path, wanted: Any, name: str, *others: Any) -> Any:
+        made.append((wanted.geometry, wanted.size, wanted.file.read_text(), wanted.period, name))
+        return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
+
+    made: list[Any] = []
+    monkeypatch.setattr("server.apart.btfs.make_btf", render)
+    form = {"size": 16, "period": 2.5}
+    answer = client.post(f"{WORKS}/geometry", files={"geometry": ("Roof.obj", SQUARE)}, data=form)
+    assert answer.status_code == 202
+    body = wait_for(client, answer.headers["location"], "ready", "failed")
+    assert (body["state"], body["geometry"], body["name"]) == ("ready", "mesh", "Roof (synthetic)")
+    assert made == [("mesh", 16, SQUARE, 2.5, "Roof (synthetic)")]
+    assert not list((settings.data / "btf-works" / body["id"]).glob("images*"))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "form", "said"),
+    [
+        (SQUARE.replace("-2", "-3"), {}, "2 × 3 metres"),
+        (SQUARE, {"period": "nan"}, "finite"),
+        (SQUARE, {"period": -1}, "greater than 0"),
+        (SQUARE, {"size": 10**9}, "256"),
+    ],
+)
+def test_meshes_that_are_no_period_are_refused_at_once(
+    client: TestClient, settings: Settings, mesh: str, form: dict[str, Any], said: str
+) -> None:
+    answer = client.post(f"{WORKS}/geometry", files={"geometry": ("a.obj", mesh)}, data=form)
+    assert answer.status_code == 422
+    assert said in answer.text
+    assert client.get(WORKS).json() == []
+    assert not list(settings.data.glob("upload-*"))
+
+
 def test_what_is_wrong_with_a_file_is_said_and_the_next_one_is_taken(client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "no.zip").write_bytes(b"no zip")
     body = wait_for(client, send(client, tmp_path / "no.zip"), "ready", "failed")

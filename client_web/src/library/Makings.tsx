@@ -1,10 +1,11 @@
 /** Import of measurements, making of synthetic textures from all sides, and how far both are. */
 import { useRef } from "preact/hooks";
 import type { BtfWorkBody } from "../protocol";
-import { BTFS, goOn, importMaterial, make, model, sending } from "./library";
+import { BTFS, goOn, importMaterial, make, makeOf, model, sending } from "./library";
 import { forgetMaking, GEOMETRIES, isGoingOn, isInTheMaking, makings, makingWords, sendingImages, stopMaking } from "./making";
 
 export const MATERIAL_FILES = ".binary,.zip,.btf";
+const MESH_FILES = ".glb,.obj,.ply,.zip";
 
 function Making({ work }: { work: BtfWorkBody }) {
   const { id, name, progress, state } = work;
@@ -46,6 +47,43 @@ function Import() {
   );
 }
 
+/** A mesh of one's own that holds one period, seen from above. */
+function OfMesh() {
+  const picker = useRef<HTMLInputElement>(null);
+  const period = useRef<HTMLInputElement>(null);
+  const take = (event: Event) => {
+    const input = event.currentTarget as HTMLInputElement;
+    const file = input.files?.[0];
+    input.value = "";
+    const side = period.current?.valueAsNumber ?? NaN;
+    if (file !== undefined) void makeOf(file, Number.isNaN(side) ? null : side);
+  };
+  return (
+    <div class="library-mesh">
+      <input ref={picker} type="file" accept={MESH_FILES} aria-label="Mesh of one period" hidden onChange={take} />
+      <button
+        disabled={sendingImages.value !== null}
+        title="A mesh that holds one period, seen from above (+Y): .glb, .obj, .ply, or a .zip with its materials"
+        onClick={() => picker.current?.click()}
+      >
+        a mesh of yours…
+      </button>
+      <label title="Side of the square that repeats; empty: the mesh is as wide as it">
+        repeats every
+        <input
+          ref={period}
+          type="number"
+          min={0}
+          step="any"
+          aria-label="Period of the mesh, metres"
+          onKeyDown={(event) => event.stopPropagation()}
+        />
+        m
+      </label>
+    </div>
+  );
+}
+
 /** Where textures from all sides are shown: synthetic ones are made here, too. */
 function Synthetic() {
   if (model.value !== BTFS) return null;
@@ -57,6 +95,7 @@ function Synthetic() {
           {geometry}
         </button>
       ))}
+      <OfMesh />
     </div>
   );
 }

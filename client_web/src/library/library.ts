@@ -7,9 +7,9 @@ import { uploadMeasured } from "../net/upload";
 import type { BtfBody, MaterialBody, MeasuredBody, Term } from "../protocol";
 import { libraryOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
-import { select, selectedMaterial } from "../state/selection";
+import { select, selectedMaterial, selectedTerm, selectTerm } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
-import { followMakings, type Geometry, goOnMaking, importImages, makeSynthetic } from "./making";
+import { followMakings, type Geometry, goOnMaking, importImages, makeOfMesh, makeSynthetic } from "./making";
 
 export const DRAG_TYPE = "application/x-relume-material";
 /** Among the models: what was measured and is not fitted. */
@@ -102,6 +102,7 @@ async function begin(work: () => Promise<void>): Promise<void> {
 }
 
 export const make = (geometry: Geometry) => begin(() => makeSynthetic(geometry));
+export const makeOf = (file: File, period: number | null) => begin(() => makeOfMesh(file, period));
 export const goOn = (id: string) => begin(() => goOnMaking(id));
 
 const BTF_SUFFIXES = [".zip", ".btf"];
@@ -139,6 +140,7 @@ export function putOn(target: string, id: string): void {
   if (entry === undefined) return;
   giveTerms(target, entry.name, entry.terms);
   select(target);
+  if (selectedTerm.value >= entry.terms.length) selectTerm(0); // the term that was open is gone
 }
 
 export function putOnSelected(id: string): void {

@@ -1,7 +1,7 @@
 /** Textures from all sides in the making: rendered or imported by the server, followed while the library is open. */
 import { signal } from "@preact/signals";
 import { forgetBtfWork, listBtfWorks, resumeBtfWork, startBtf, stopBtfWork } from "../net/api";
-import { uploadBtf } from "../net/upload";
+import { uploadBtf, uploadGeometry } from "../net/upload";
 import type { BtfWorkBody, SyntheticBtfRequest } from "../protocol";
 import { libraryOpen } from "../state/panels";
 import { formatSeconds } from "../ui/scale";
@@ -14,7 +14,7 @@ export const GEOMETRIES: readonly Geometry[] = ["weave", "pebbles", "corduroy"];
 
 /** What is made, waits, was stopped or failed; what is ready is in the library instead. */
 export const makings = signal<readonly BtfWorkBody[]>([]);
-/** Share of the images that has been sent; null while none are on their way. */
+/** Share of the images, or of the mesh, that has been sent; null while none are on their way. */
 export const sendingImages = signal<number | null>(null);
 
 let isFollowing = false;
@@ -56,10 +56,14 @@ export async function makeSynthetic(geometry: Geometry): Promise<void> {
   await startBtf({ geometry });
 }
 
-export async function importImages(file: File): Promise<void> {
+export const importImages = (file: File) => sent((told) => uploadBtf(file, told));
+/** `period`: side of what repeats, metres; null: that of the box about it. */
+export const makeOfMesh = (file: File, period: number | null) => sent((told) => uploadGeometry(file, period, told));
+
+async function sent(upload: (told: (share: number) => void) => Promise<BtfWorkBody>): Promise<void> {
   sendingImages.value = 0;
   try {
-    await uploadBtf(file, (share) => (sendingImages.value = share));
+    await upload((share) => (sendingImages.value = share));
   } finally {
     sendingImages.value = null;
   }

@@ -71,6 +71,18 @@ export function uploadMeasured(file: File, progress: (fraction: number) => void)
   return post("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
 }
 
+/** A mesh of one period, to be rendered; `period`: its side in metres, where it is not that of the box about it. */
+export function uploadGeometry(
+  file: File,
+  period: number | null,
+  progress: (fraction: number) => void,
+): Promise<BtfWorkBody> {
+  const form = new FormData();
+  form.append("geometry", file);
+  if (period !== null) form.append("period", String(period));
+  return post("/api/materials/btf-works/geometry", form, progress) as Promise<BtfWorkBody>;
+}
+
 /** A zip of images of a texture from all sides, or a .btf container; the server compresses them from then on. */
 export function uploadBtf(file: File, progress: (fraction: number) => void): Promise<BtfWorkBody> {
   const form = new FormData();

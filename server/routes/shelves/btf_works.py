@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,20 +13,25 @@ from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
 from relume.asset_store import check_name
+from relume.synthetic.make import MESH
 from server.access.roles import Caller, Who
-from server.apart.btfs import IMAGES
-from server.files.importing import UPLOAD_PREFIX
+from server.apart.btfs import SENT
+from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
 from server.queues.work_queue import new_id
 from server.services import Services, Shared
 from server.wire.body import Id
-from server.wire.btfs import BOUND, Bound, BtfRequest, BtfWorkBody, SyntheticBtfRequest
+from server.wire.btfs import BOUND, TEXELS, Bound, BtfRequest, BtfWorkBody, Period, SyntheticBtfRequest, Texels
 
 PREFIX = "/api/materials/btf-works"
 router = APIRouter(prefix=PREFIX, tags=["materials"])
 ImagesFile = Annotated[
     UploadFile, File(description="zip of images named by light and view (UBO2003), or .btf container (UBO2014)")
+]
+MeshFile = Annotated[
+    UploadFile,
+    File(description="mesh of one period, seen from above (+Y): .glb, .obj, .ply, or .zip with materials"),
 ]
 BtfName = Annotated[str, Form(max_length=200)]
 BoundField = Annotated[Bound, Form()]
@@ -53,8 +59,8 @@ def _submit_images(
 ) -> str:
     request = BtfRequest(name=check_name(name or plain_stem(images.filename) or "BTF"), error=error)
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
-        path = keep_upload(images, Path(folder) / IMAGES)
-        return _submit(request, sent_bytes, caller, services, lambda into: shutil.move(path, into / IMAGES))
+        path = keep_upload(images, Path(folder) / SENT)
+        return _submit(request, sent_bytes, caller, services, lambda into: shutil.move(path, into / SENT))
 
 
 def _submit(
@@ -81,6 +87,35 @@ async def make_synthetic_btf(
     await run_in_threadpool(quotas.check_bytes, caller.name, 1)  # how many it will take is known when it is made
     identity = await run_in_threadpool(_submit, wanted, 0, caller, services)
     return _answer(identity, services, response)
+
+
+@router.post("/geometry", status_code=202)
+async def make_btf_of_mesh(
+    geometry: MeshFile,
+    services: Shared,
+    caller: Who,
+    response: Response,
+    period: Annotated[Period | None, Form()] = None,
+    size: Annotated[Texels, Form()] = TEXELS,
+    name: BtfName = "",
+    error: BoundField = BOUND,
+) -> BtfWorkBody:
+    """Queue the rendering of a small geometry that is sent; what is wrong with the mesh is said at once."""
+    stem = name or f"{plain_stem(geometry.filename) or 'Mesh'} (synthetic)"
+    wanted = BtfRequest(name=check_name(stem), error=error, geometry=MESH, size=size, period=period)
+    quotas, sent_bytes = services.access.quotas, upload_bytes(geometry)
+    await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
+    async with services.import_slots:
+        identity = await run_in_threadpool(_submit_mesh, geometry, sent_bytes, wanted, caller, services)
+    return _answer(identity, services, response)
+
+
+def _submit_mesh(mesh: UploadFile, sent_bytes: int, wanted: BtfRequest, caller: Caller, services: Services) -> str:
+    with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
+        path = keep_upload(mesh, Path(folder) / SENT)
+        looked_at = ImportRequest.of(services.settings, "tile", path, wanted.name)
+        services.importers.run(replace(looked_at, period=wanted.period))
+        return _submit(wanted, sent_bytes, caller, services, lambda into: shutil.move(path, into / SENT))
 
 
 def _answer(identity: str, services: Services, response: Response) -> BtfWorkBody:
