@@ -7,6 +7,7 @@ which is what a Haar transform over them compresses.
 
 from __future__ import annotations
 
+import heapq
 from typing import NamedTuple
 
 import numba as nb
@@ -108,60 +109,95 @@ def _split(keys, rows):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _grow(keys, rows, num_leaves, first_node, first_leaf, axes, values, children, begins):  # type: ignore[no-untyped-def]
-    """Divide rows into at most `num_leaves` leaves, as evenly as they come.
+def _uneven(keys, reach, rows):  # type: ignore[no-untyped-def]
+    """Estimate how uneven the light on a cell is, times its points: q / (1 + q), q = Var(x) / R² + Var(n).
 
-    Writes nodes from `first_node` and the beginnings of leaves within rows from `first_leaf` on.
-    Returns the root, and the numbers of nodes and leaves so far.
-    """
-    node, leaf = first_node, first_leaf
-    # start, stop, leaves, parent, which child
-    stack = [(0, rows.shape[0], num_leaves, -1, 0)]
-    root = np.int64(0)
-    while stack:
-        start, stop, leaves, parent, child = stack.pop()
-        axis, first, value = -1, 0, np.float32(0)
-        if leaves > 1:
-            axis, first, value = _split(keys, rows[start:stop])
-        if axis < 0:
-            here = -1 - leaf
-            begins[leaf] = start
-            leaf += 1
-        else:
-            here = node
-            axes[node], values[node] = axis, value
-            node += 1
-            count = stop - start
-            left = min(max(1, int(np.round(leaves * first / count))), leaves - 1)
-            stack.append((start + first, stop, leaves - left, here, 1))
-            stack.append((start, start + first, left, here, 0))
-        if parent < 0:
-            root = here
-        else:
-            children[parent, child] = here
-    return root, node, leaf
-
-
-def grow_tree(keys: F32, side: I32, num_sides: int, num_cells: int) -> tuple[CellTree, list[NDArray[np.int64]]]:
-    """Divide points into cells of about the same number of them.
+    Light changes with place by at most about 1 / R and with the normal by about 1, where R is the harmonic mean of the
+    distances of what is seen from there (the split sphere of Ward 1988); what lobes see is told apart by their width.
 
     Args:
-        keys: position and unit normal. (n, 6) float32. side: number of each point's, in [0, num_sides). (n,) int32
+        keys, reach: as of `grow_tree`. rows: points of the cell.
+    """
+    mean, nearness = np.zeros(6), 0.0
+    for row in rows:
+        nearness += 1 / max(reach[row], np.float32(1e-12))
+        for axis in range(6):
+            mean[axis] += keys[row, axis]
+    mean /= len(rows)
+    nearness /= len(rows)
+    places = normals = 0.0
+    for row in rows:
+        for axis in range(3):
+            places += (keys[row, axis] - mean[axis]) ** 2
+            normals += (keys[row, 3 + axis] - mean[3 + axis]) ** 2
+    q = (places * nearness * nearness + normals) / len(rows)
+    return len(rows) * q / (1 + q)
+
+
+@nb.njit(nogil=True, cache=True)
+def _grow(keys, reach, rows, begins, num_leaves):  # type: ignore[no-untyped-def]
+    """Divide rows into at most `num_leaves` leaves, always the one on which light is most uneven.
+
+    Args:
+        keys, reach: as of `grow_tree`.
+        rows: points, those of each root one after another; sorted so that those of each leaf are.
+        begins: where the rows of each root begin, and their end. (roots + 1,) int64
+    Returns:
+        Axes, values and children of nodes; of each leaf where its rows begin, its parent (−1 − root where it is a root
+        itself) and which child it is; the node of each root, where it has one.
+    """
+    num_roots = len(begins) - 1
+    axes, values = np.empty(num_leaves, np.uint8), np.empty(num_leaves, np.float32)
+    children, roots = np.empty((num_leaves, 2), np.int32), np.full(num_roots, -1, np.int32)
+    leaves = np.empty((max(num_leaves, num_roots), 3), np.int64)
+    open_ = [(0.0, 0, 0, 0, 0) for _ in range(0)]
+    for root in range(num_roots):
+        start, stop = begins[root], begins[root + 1]
+        heapq.heappush(open_, (-_uneven(keys, reach, rows[start:stop]), start, stop, -1 - root, 0))
+    node, closed = 0, 0
+    while open_:
+        _, start, stop, parent, child = heapq.heappop(open_)
+        axis, first, value = -1, 0, np.float32(0)
+        if closed + len(open_) + 1 < num_leaves:
+            axis, first, value = _split(keys, rows[start:stop])
+        if axis < 0:
+            leaves[closed, 0], leaves[closed, 1], leaves[closed, 2] = start, parent, child
+            closed += 1
+            continue
+        axes[node], values[node] = axis, value
+        if parent < 0:
+            roots[-1 - parent] = node
+        else:
+            children[parent, child] = node
+        for which, (low, high) in enumerate(((start, start + first), (start + first, stop))):
+            heapq.heappush(open_, (-_uneven(keys, reach, rows[low:high]), low, high, node, which))
+        node += 1
+    return axes[:node], values[:node], children[:node], leaves[:closed], roots
+
+
+def grow_tree(
+    keys: F32, reach: F32, side: I32, num_sides: int, num_cells: int
+) -> tuple[CellTree, list[NDArray[np.int64]]]:
+    """Divide points into cells on which light is about as uneven, times the points.
+
+    Args:
+        keys: position and unit normal. (n, 6) float32
+        reach: how far apart places are that a ray from what sees a point cannot tell from each other. (n,) float32
+        side: number of each point's, in [0, num_sides). (n,) int32
         num_sides: twice the number of meshes.
-        num_cells: at most `MAX_CELLS`; somewhat fewer where points coincide, or more so that each side has one.
+        num_cells: at most `MAX_CELLS`; fewer where points coincide, or more so that each side has one.
     Returns:
         The tree, and the points of each cell.
     """
-    roots = np.full(num_sides, NO_CELL_NODE, np.int32)
-    sides, counts = np.unique(side, return_counts=True)
-    shares = np.maximum(1, np.minimum(counts, num_cells * counts // max(1, len(side)))).astype(np.int64)
-    total = int(shares.sum())
-    axes, values = np.empty(total, np.uint8), np.empty(total, np.float32)
-    children, begins = np.empty((total, 2), np.int32), np.empty(total, np.int64)
-    node = leaf = 0
-    cells: list[NDArray[np.int64]] = []
-    for which, share in zip(sides, shares, strict=True):
-        rows, first = np.nonzero(side == which)[0], leaf
-        roots[which], node, leaf = _grow(keys, rows, int(share), node, leaf, axes, values, children, begins)
-        cells += np.split(rows, begins[first + 1 : leaf])
-    return CellTree(axes[:node], values[:node], children[:node], roots), cells
+    rows = np.argsort(side, kind="stable")
+    sides, begins = np.unique(side[rows], return_index=True)
+    bounds = np.append(begins, len(rows)).astype(np.int64)
+    axes, values, children, leaves, nodes = _grow(keys, reach, rows, bounds, num_cells)
+    order = np.argsort(leaves[:, 0])
+    starts, parents, which = leaves[order].T
+    roots, numbers = np.full(num_sides, NO_CELL_NODE, np.int32), -1 - np.arange(len(order), dtype=np.int32)
+    roots[sides] = nodes
+    inner = parents >= 0
+    children[parents[inner], which[inner]] = numbers[inner]
+    roots[sides[-1 - parents[~inner]]] = numbers[~inner]
+    return CellTree(axes, values, children, roots), np.split(rows, starts[1:]) if len(order) else []

@@ -1,8 +1,8 @@
 """Gather cells: the pieces of surfaces that reflected light is kept for (the gather samples of Nguyen 2010).
 
-A cell is a leaf of the tree over importance photons, so that cells are small where the picture's gather rays go, and a
-few of its photons stand for its area (its sub-area samples): light that changes across a cell is averaged over it, and
-no point of it lies where no ray arrives, such as on a floor below a box.
+A cell is a leaf of the tree over importance photons, so that cells are small where the picture's gather rays go and
+light is uneven. A few of its photons stand for its area (its sub-area samples): light that changes across a cell is
+averaged over it, and no point of it lies where no ray arrives, such as on a floor below a box.
 """
 
 from __future__ import annotations
@@ -89,7 +89,11 @@ def choose_cells(
     place = surface_at(geometry, hits, directions).points.position
     side = 2 * geometry.face_mesh[hits.face] + is_behind.astype(np.int32)
     tree, members = grow_tree(
-        np.concatenate([place, normal], axis=1), side.astype(np.int32), 2 * len(scene.meshes), most
+        np.concatenate([place, normal], axis=1),
+        photons.width * hits.distance,
+        side.astype(np.int32),
+        2 * len(scene.meshes),
+        most,
     )
     # a cell's photons are in order along the axis that divided it last: every so many are far apart
     evenly = (np.arange(POINTS_A_CELL) + 0.5) / POINTS_A_CELL

@@ -47,14 +47,26 @@ class Photons:
 
     Attributes:
         hits: on triangles, all of them. directions: in which they were hit. (n, 3) float32
+        width: of the lobe by which they were shot, radians; over the distance it is what one ray cannot tell from
+            another. (n,) float32
     """
 
     hits: Hits
     directions: F32
+    width: F32
+
+    @staticmethod
+    def of_lobe(hits: Hits, directions: F32, exponent: float) -> Photons:
+        """Photons that left with density ∝ cos^exponent: the root mean square of their sines, √(2 / (e + 3)).
+
+        Args:
+            hits, directions: as of the attributes. exponent: e
+        """
+        return Photons(hits, directions, np.full(len(directions), math.sqrt(2 / (exponent + 3)), np.float32))
 
     def rows(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
         """Choose some of them."""
-        return Photons(self.hits.rows(which), self.directions[which])
+        return Photons(self.hits.rows(which), self.directions[which], self.width[which])
 
 
 class _Found(NamedTuple):
@@ -94,9 +106,8 @@ def shoot_photons(
 
 def _joined(parts: Sequence[Photons]) -> Photons:
     """Join photons in their order."""
-    columns = zip(*((p.hits.face, p.hits.uv, p.hits.distance, p.directions) for p in parts), strict=True)
-    face, uv, distance, directions = (np.concatenate(column) for column in columns)
-    return Photons(Hits(face, uv, distance), directions)
+    directions, width = (np.concatenate([getattr(p, name) for p in parts]) for name in ("directions", "width"))
+    return Photons(Hits.joined([p.hits for p in parts]), directions, width)
 
 
 def _some(parts: Sequence[Photons], count: int, rng: np.random.Generator) -> Photons:
@@ -128,15 +139,15 @@ def _walk(
     found.in_mirrors.append(_mirrored(geometry, surface.points.rows(is_mirror), directions[is_mirror], rng))
     for _ in range(_BOUNCES):
         hits, directions = _hits(geometry, surface.points.position, lobe_directions(surface.points.normal, 1.0, rng))
-        found.anywhere.append(Photons(hits, directions))
+        found.anywhere.append(Photons.of_lobe(hits, directions, 1.0))
         surface = surface_at(geometry, hits, directions)
 
 
 def _hits(geometry: Geometry, origin: F32, directions: F32) -> tuple[Hits, F32]:
     """Find the hits of the rays that hit anything, and these rays' directions."""
-    photons = Photons(trace_from(geometry.embree, origin, directions), directions)
-    photons = photons.rows(photons.hits.face >= 0)
-    return photons.hits, photons.directions
+    hits = trace_from(geometry.embree, origin, directions)
+    is_hit = hits.face >= 0
+    return hits.rows(is_hit), directions[is_hit]
 
 
 def _mirrored(geometry: Geometry, points: Points, directions: F32, rng: np.random.Generator) -> Photons:
@@ -146,7 +157,7 @@ def _mirrored(geometry: Geometry, points: Points, directions: F32, rng: np.rando
     mirrored = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
     leaving = lobe_directions(mirrored, _LOBE, rng)
     is_above = np.einsum("nc,nc->n", leaving, normal) > 0
-    return Photons(*_hits(geometry, position[is_above], leaving[is_above]))
+    return Photons.of_lobe(*_hits(geometry, position[is_above], leaving[is_above]), _LOBE)
 
 
 def _split(geometry: Geometry, points: Points, reach: F32, rng: np.random.Generator) -> list[Photons]:
@@ -157,7 +168,7 @@ def _split(geometry: Geometry, points: Points, reach: F32, rng: np.random.Genera
         hits = trace_from(geometry.embree, position, directions)
         is_short = (hits.face >= 0) & (hits.distance < reach)
         if split > 0:
-            found.append(Photons(hits, directions).rows(is_short))
+            found.append(Photons.of_lobe(hits, directions, 1.0).rows(is_short))
             reach = reach * np.float32(0.25)
             is_short &= hits.distance < reach
         divided = np.sort(rng.permutation(np.flatnonzero(is_short))[:_MOST_SPLIT])

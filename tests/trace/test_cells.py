@@ -53,7 +53,7 @@ def cell_of(tree, side, key):
 @pytest.mark.parametrize(("num_cells", "num_points"), [(1, 50), (7, 50), (300, 5000), (50, 50)])
 def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_points):
     keys, side = random_keys(num_points, 4, seed=num_cells)
-    tree, members = grow_tree(keys, side, 6, num_cells)
+    tree, members = grow_tree(keys, np.ones(len(keys), np.float32), side, 6, num_cells)
     assert sorted(np.concatenate(members)) == list(range(num_points))
     assert len(members) == pytest.approx(num_cells, abs=4)
     for cell, rows in enumerate(members):
@@ -69,7 +69,7 @@ def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
     x = np.where(z == near, rng.uniform(-2.7, -2.5, 3000), rng.uniform(-2.5, 2.5, 3000))
     place = np.stack([x, rng.random(3000), z + 1e-4 + rng.uniform(-2e-7, 2e-7, 3000)], axis=1)
     keys = np.concatenate([place, np.tile([0, 0, 1], (3000, 1))], axis=1).astype(np.float32)
-    tree, members = grow_tree(keys, np.zeros(3000, np.int32), 1, 200)
+    tree, members = grow_tree(keys, np.ones(3000, np.float32), np.zeros(3000, np.int32), 1, 200)
     is_near = [set(z[rows]) == {near} for rows in members]
     assert {len(set(z[rows])) for rows in members} == {1}
     for x, y in rng.uniform((-2.7, 0), (-2.5, 1), (50, 2)):
@@ -78,21 +78,33 @@ def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
         assert not is_near[cell_of(tree, 0, (x, y, far, 0, 0, 1))]
 
 
+@pytest.mark.parametrize("why", ["what is seen is near", "the surface bends"])
+def test_cells_are_small_where_light_is_uneven(why):
+    """On one half of a plane, where as many points lie as on the other."""
+    keys, _ = random_keys(4000, 1, seed=2)
+    is_uneven, reach = keys[:, 0] < 0.5, np.full(4000, 3, np.float32)
+    bends = is_uneven & (why == "the surface bends")
+    keys[:, 3:] = np.where(bends[:, None], keys[:, 3:] * (1, 1, 0.3), (0, 0, 1))
+    reach[is_uneven & ~bends] = 0.3
+    _, members = grow_tree(keys, reach, np.zeros(4000, np.int32), 1, 400)
+    assert sum(is_uneven[rows].mean() > 0.5 for rows in members) > 270
+
+
 def test_a_side_without_points_has_no_cell():
     keys, side = random_keys(100, 2, seed=1)
-    tree, _ = grow_tree(keys, side, 4, 10)
+    tree, _ = grow_tree(keys, np.ones(len(keys), np.float32), side, 4, 10)
     assert cell_of(tree, 3, keys[0]) == NO_CELL
 
 
 def test_coinciding_points_end_in_one_cell():
     keys, _ = random_keys(1, 1, seed=1)
-    tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.zeros(100, np.int32), 1, 10)
+    tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.ones(100, np.float32), np.zeros(100, np.int32), 1, 10)
     assert len(members) == 1
     assert cell_of(tree, 0, keys[0]) == 0
 
 
 def test_no_points_make_no_cells():
-    tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.int32), 2, 10)
+    tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.float32), np.empty(0, np.int32), 2, 10)
     assert members == []
     assert cell_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_CELL
 
