@@ -192,14 +192,14 @@ def arriving(transfer, view: View, index, look):
     return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)
 
 
-def sent_towards(sent, cell, direction):
-    """What a cell sends in a unit direction, world space. (3,)"""
+def sent_towards(sent, cell, direction, *, is_narrow=False):
+    """What a cell sends in a unit direction, world space; for narrow lobes, without rings. (3,)"""
     radiance, row = sent.even[cell].astype(float), sent.lobe[cell]
     if row >= 0:
         x, y = sent.frame[row].astype(float) @ direction
         place = np.array([x, y]) / (1 + np.sqrt(max(0.0, 1 - x * x - y * y)))
         across, along = np.clip(np.floor((place + 1) * SIDE / 2), 0, SIDE - 1).astype(int)
-        radiance += sent.scale[row] * sent.table[row, across * SIDE + along]
+        radiance += sent.scale[row] * (sent.smooth if is_narrow else sent.table)[row, across * SIDE + along]
     return radiance
 
 

@@ -120,6 +120,12 @@ def _square_hit(sent, row, n, t, b, x, y, z):  # type: ignore[no-untyped-def]
     return square_of(sent.frame, row, -dx, -dy, -dz)
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _table_for(sent, num_cosine, weight):  # type: ignore[no-untyped-def]
+    """Choose what a ray looks lobes up in: where most rays are about the mirror direction, what has no rings."""
+    return sent.smooth if _TWO * np.float32(num_cosine) * weight < _PI else sent.table
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def list_gathered(  # type: ignore[no-untyped-def]
     points, wo, links, pattern, sent, start, stop, first, wi, out, irradiance
@@ -160,8 +166,9 @@ def list_gathered(  # type: ignore[no-untyped-def]
         for which in range(_lobes_hit(links[p], sent.lobe, rows, rays) if has_lobes else 0):
             row, ray = rows[which], rays[which]
             square = _square_hit(sent, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
+            table = _table_for(sent, pattern.num_cosine, weights[ray])
             for channel in range(3):
-                value = sent.scale[row, channel] * sent.table[row, square, channel]
+                value = sent.scale[row, channel] * table[row, square, channel]
                 irradiance[channel, place[ray]] += weights[ray] * value
     first[stop - start] = end
     return end
@@ -192,8 +199,8 @@ def sum_gathered(points, wo, links, pattern, sent, start, stop, out):  # type: i
         for which in range(_lobes_hit(links[p], sent.lobe, rows, rays) if has_lobes else 0):
             row, ray = rows[which], rays[which]
             square = _square_hit(sent, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
-            weight = weights[ray]
-            red += weight * sent.scale[row, 0] * sent.table[row, square, 0]
-            green += weight * sent.scale[row, 1] * sent.table[row, square, 1]
-            blue += weight * sent.scale[row, 2] * sent.table[row, square, 2]
+            weight, table = weights[ray], _table_for(sent, pattern.num_cosine, weights[ray])
+            red += weight * sent.scale[row, 0] * table[row, square, 0]
+            green += weight * sent.scale[row, 1] * table[row, square, 1]
+            blue += weight * sent.scale[row, 2] * table[row, square, 2]
         out[p - start, 0], out[p - start, 1], out[p - start, 2] = red, green, blue

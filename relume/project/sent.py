@@ -6,6 +6,10 @@ with the functions h of the in-basis (`relume.basis.zernike`) about the cell's o
 gather ray, the sum is tabulated: by the means of each function over the squares of a grid, on which a direction has the
 place (x, y) / (1 + z), so that the horizon is as fine as the normal. Rays spread over the squares, and what they bring
 together hardly knows the difference.
+
+What few functions make of a small bright light has rings about it, in part below nothing. Who gathers widely sees none
+of them; a narrow lobe would see one alone. For those there is a second table, of L_j times a factor of its degree, with
+which no light becomes negative (docs/adr/0047-cells-send-by-direction.md).
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import SENT_DEGREE, in_basis, num_functions
+from relume.basis.zernike import DEGREES, SENT_DEGREE, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
 
@@ -43,6 +47,7 @@ class Sent(NamedTuple):
         frame: tangents and bitangents. (G, 2, 3) float32
         scale: what a step of the table is worth. (G, 3) float32
         table: of each square, x outermost. (G, SIDE², 3) int16
+        smooth: the same, without rings. (G, SIDE², 3) int16
     """
 
     even: F32
@@ -50,6 +55,7 @@ class Sent(NamedTuple):
     frame: F32
     scale: F32
     table: NDArray[np.int16]
+    smooth: NDArray[np.int16]
 
 
 def evenly(radiance: F32) -> Sent:
@@ -68,18 +74,37 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32) -> Sent
     """
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
-    scale, table = np.empty((len(rows), 3), np.float32), np.empty((len(rows), SIDE * SIDE, 3), np.int16)
+    scale = np.empty((len(rows), 3), np.float32)
+    table, smooth = np.empty((2, len(rows), SIDE * SIDE, 3), np.int16)
+    means = np.stack([grid_means(), no_rings()[:, None] * grid_means()])
 
     def fill(start: int, stop: int) -> None:
-        values = vectors[start:stop] @ grid_means()
-        largest = np.maximum(values.max(axis=2), -values.min(axis=2))
+        values = vectors[start:stop] @ means[:, None]  # (2, cells, 3, squares)
+        largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
         scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
         values /= scale[start:stop, :, None]
         np.rint(values, out=values)
-        table[start:stop] = values.transpose(0, 2, 1)
+        table[start:stop], smooth[start:stop] = values.transpose(0, 1, 3, 2)
 
     for_ranges(fill, len(rows), _ROWS_A_RANGE)
-    return Sent(even, lobe, frame, scale, table)
+    return Sent(even, lobe, frame, scale, table, smooth)
+
+
+@lru_cache(maxsize=1)
+def no_rings() -> F32:
+    """The factors w_n of all functions, with which a mirror's lobe is nowhere negative. (J,) float32
+
+    The kernel Σ_m h_nm(ω) h_nm(ω') of a degree is a mean, over an angle, of Gegenbauer's C_n^(3/2) (Xu 1999), so that
+    w are the coefficients of a function of one variable that is not negative: of those of degree N the narrowest, the
+    square of C_r^(3/2)(t) / (t − z), r = N / 2 + 1, with z the largest zero. C_n^(3/2) is the derivative of Legendre's
+    P_(n+1).
+    """
+    t, weight = np.polynomial.legendre.leggauss(SENT_DEGREE + 4)
+    polynomials = [np.polynomial.legendre.Legendre.basis(n + 1).deriv() for n in range(SENT_DEGREE + 1)]
+    last = polynomials[SENT_DEGREE // 2 + 1]
+    bump = weight * (1 - t * t) * (last(t) / (t - last.roots().max())) ** 2
+    of_degree = np.array([(bump * p(t)).sum() / p(1.0) for p in polynomials]) / bump.sum()
+    return np.asarray(of_degree[DEGREES[:NUM_SENT]], np.float32)
 
 
 @lru_cache(maxsize=1)

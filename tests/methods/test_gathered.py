@@ -133,8 +133,9 @@ def image_numpy(model, bands, receivers):
             if cell == NO_CELL:
                 continue
             wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
-            seen = twins.sent_towards(rays.sent, cell, -(wi @ frame))
-            value = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32)) * seen
+            weight = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32))
+            is_narrow = 2 * rays.pattern.num_cosine * weight < np.pi
+            value = weight * twins.sent_towards(rays.sent, cell, -(wi @ frame), is_narrow=is_narrow)
             value = value * term.quotients(*wi.astype(float), *wo)
             for curve in term.curves:
                 if not curve.outgoing:
